@@ -1,0 +1,30 @@
+"""Compiled kernels of boulder-sweep: the low-order model of a truck that hits an embedded boulder.
+
+The model is that of Brown et al., Low-order modeling of vehicle impacts upon boulders embedded in cohesionless soil;
+equation numbers in this package are theirs. Everything here is plain numbers in SI units (angles in radians, the
+subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, units or tables on disk.
+"""
+
+from .design import Constants, Design, DesignTable, constants_of, impact_height
+from .impact import Control, Record, no_record, simulate_design
+from .outcomes import Maxima, Outcome, OutcomeTable, Status
+from .readings import Readings, as_printed, corrected
+
+__all__ = [
+    "Constants",
+    "Control",
+    "Design",
+    "DesignTable",
+    "Maxima",
+    "Outcome",
+    "OutcomeTable",
+    "Readings",
+    "Record",
+    "Status",
+    "as_printed",
+    "constants_of",
+    "corrected",
+    "impact_height",
+    "no_record",
+    "simulate_design",
+]

@@ -1,0 +1,108 @@
+"""The one decorator every kernel is compiled with, and the reasons for its flags.
+
+``nogil``
+    Blocks of designs run in threads of one process, which share the compiled code and the tables.
+``error_model="numpy"``
+    A division follows IEEE 754 instead of raising; a check before every division would keep the loops
+    over lanes from being vectorised.
+``fastmath={"contract", "nsz"}``
+    Fused multiply-add, and the sign of zero does not matter. Nothing may assume that NaN or infinity never
+    occur: a state that has become non-finite must be seen and reported. Sums are reordered in one place
+    only (`summing_kernel`), so a design gives the same bits wherever in a block it is computed.
+``cache``
+    Compiled code is kept in a folder named by a hash of all kernel sources, because a cached function does
+    not notice that a function it calls has changed in another file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
+"""Environment variable that names another folder for compiled kernels."""
+
+
+def source_hash() -> str:
+    """Hash of all kernel sources: which code computed a table.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits (SHA-256 over names and contents, in order of name).
+    """
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def _cache_folder() -> str | None:
+    """Return a writable folder for this version of the kernels, or None where there is none."""
+    named = os.environ.get(CACHE_VARIABLE)
+    user_caches = os.environ.get("XDG_CACHE_HOME")
+    candidates = [Path(named)] if named else []
+    try:
+        candidates.append((Path(user_caches) if user_caches else Path.home() / ".cache") / "boulder-sweep")
+    except RuntimeError:  # no home folder, as for some service accounts
+        pass
+    candidates.append(Path(tempfile.gettempdir()) / f"boulder-sweep-{os.getuid()}")
+    for candidate in candidates:
+        folder = candidate / f"kernels-{source_hash()[:16]}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return str(folder)
+        except OSError:
+            continue
+    return None
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def _compiled(function: Callable[..., Any], fastmath: set[str]) -> Callable[..., Any]:
+    """Decorate one function, its cache in this package's folder."""
+    # Set only while decorating: other users of Numba in this process keep their own cache folder.
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = CACHE_FOLDER or ""
+    try:
+        return numba.njit(
+            nogil=True,
+            cache=CACHE_FOLDER is not None,
+            error_model="numpy",
+            fastmath=fastmath,
+        )(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function for the machine at its first call, keeping the result on disk.
+
+    Parameters
+    ----------
+    function
+        Plain Python on scalars, NamedTuples and NumPy arrays.
+
+    Returns
+    -------
+    callable
+        The compiled dispatcher; ``.py_func`` is the function itself.
+    """
+    return _compiled(function, {"contract", "nsz"})
+
+
+def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile as `kernel` does, and let sums be reordered so that one long sum is vectorised.
+
+    For sums over thousands of soil elements only; a function compiled so must not test for NaN.
+    """
+    return _compiled(function, {"contract", "nsz", "reassoc"})

@@ -1,0 +1,355 @@
+"""A design and the constants of its motion (Eqs 1-16, 24-28).
+
+Symbols are the paper's. X points in the direction of travel, Y down, theta_b > 0 turns the top of the boulder
+away from the truck; alpha is the depth below the soil line, 0 ... d.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ._jit import kernel
+from .readings import Readings
+
+G = 9.80665
+"""Standard gravity [m/s^2]."""
+
+
+class Design(NamedTuple):
+    """One boulder in one soil before one truck."""
+
+    L: float
+    """Boulder length, along the direction of travel [m]."""
+    W: float
+    """Boulder width [m]."""
+    H: float
+    """Boulder height [m]."""
+    rho_b: float
+    """Density of the boulder [kg/m^3]."""
+    d: float
+    """Embedment depth [m]."""
+    e: float
+    """Height of the blow over the soil line [m] (Eq 9)."""
+    rho_s: float
+    """Density of the soil [kg/m^3]."""
+    phi: float
+    """Effective angle of internal friction of the soil [rad]."""
+    beta: float
+    """Constant of horizontal subgrade reaction [MN/m^3]."""
+    K_epsilon: float
+    """Effect of the strain rate on the ultimate resistance of the soil [-]."""
+    m_v: float
+    """Mass of the vehicle [kg]."""
+    v_0: float
+    """Speed of impact [m/s]."""
+    k_v: float
+    """Spring of the vehicle's Maxwell element [N/m]."""
+    c_v: float
+    """Damper of the vehicle's Maxwell element [N s/m]."""
+    e_bumper: float
+    """Height of the underside of the bumper over the soil line [m]."""
+
+
+class DesignTable(NamedTuple):
+    """Many designs: the fields of `Design`, each a contiguous float64 array of shape (n,)."""
+
+    L: np.ndarray
+    W: np.ndarray
+    H: np.ndarray
+    rho_b: np.ndarray
+    d: np.ndarray
+    e: np.ndarray
+    rho_s: np.ndarray
+    phi: np.ndarray
+    beta: np.ndarray
+    K_epsilon: np.ndarray
+    m_v: np.ndarray
+    v_0: np.ndarray
+    k_v: np.ndarray
+    c_v: np.ndarray
+    e_bumper: np.ndarray
+
+
+@kernel
+def design_at(table: DesignTable, row: int) -> Design:
+    """Return one row of a table as a `Design`."""
+    return Design(
+        table.L[row],
+        table.W[row],
+        table.H[row],
+        table.rho_b[row],
+        table.d[row],
+        table.e[row],
+        table.rho_s[row],
+        table.phi[row],
+        table.beta[row],
+        table.K_epsilon[row],
+        table.m_v[row],
+        table.v_0[row],
+        table.k_v[row],
+        table.c_v[row],
+        table.e_bumper[row],
+    )
+
+
+class Constants(NamedTuple):
+    """What the motion of one design depends on; every field is constant during the impact."""
+
+    m_eff: float
+    """Mass of boulder and lumped soil [kg] (Eq 12)."""
+    J_eff: float
+    """Moment of inertia of boulder and lumped soil about their centre of mass [kg m^2] (Eq 13)."""
+    inverse_m_eff: float
+    """1/m_eff [1/kg]."""
+    inverse_J_eff: float
+    """1/J_eff [1/(kg m^2)]."""
+    c_x: float
+    """Centre of mass from the lower left corner, in X [m] (Eq 3)."""
+    c_y: float
+    """Centre of mass over the lower left corner [m] (Eq 4)."""
+    l_n: float
+    """Centre of mass to the soil elements, in X [m] (Eq 14)."""
+    z_0: float
+    """Depth of the centre of mass below the soil line, d - c_y [m]."""
+    d: float
+    """Embedment depth [m]."""
+    elements: int
+    """Number N of soil elements; 0 stands for the limit N -> infinity in closed form."""
+    K_soil: float
+    """Spring of the whole soil per unit of depth ratio, 1e6 beta W tan(phi') d [N/m] (Eqs 24-26)."""
+    R_soil: float
+    """Drag of the whole soil, rho_s W d [kg/m] (Eq 36)."""
+    x_yield: float
+    """Displacement at which every element reaches its ultimate resistance [m] (Eqs 26-28)."""
+    h: float
+    """Height of the blow over the centre of mass [m] (Eqs 5, 6)."""
+    g_x: float
+    """Signed distance of the struck face in the lever h cos + g_x sin: +c_x or -c_x [m] (Eqs 45, 48)."""
+    k_v: float
+    """Spring of the vehicle [N/m]."""
+    k_m: float
+    """k_v / m_v [1/s^2]."""
+    tau_v: float
+    """m_v / c_v [s]: crush of the damper per unit of speed lost (Eq 45, integrated)."""
+    v_0: float
+    """Speed of impact [m/s]."""
+    C_cos: float
+    """Couple against turning, part that goes with cos(theta_b) [N m] (Eqs 37-39)."""
+    C_sin: float
+    """The same, part that goes with |sin(theta_b)| [N m]."""
+    d_N: float
+    """Depth of the lowest element below the centre of mass [m]."""
+    theta_corner: float
+    """Angle beyond which sin(gamma_N + theta_b) < 0 [rad]; infinite where no reading asks for it."""
+
+
+@kernel
+def shear_wedge_angle(phi: float) -> float:
+    """Angle theta_w of the wedge of soil that moves with the boulder [rad] (Eq 1)."""
+    return 0.25 * math.pi + 0.5 * phi
+
+
+@kernel
+def element_depth(n: int, d: float, elements: int) -> float:
+    """Depth alpha_n of the middle of element n = 1 ... N below the soil line [m] (Eq 24)."""
+    return (n - 0.5) * d / elements
+
+
+@kernel
+def element_mass(n: int, design: Design, elements: int) -> float:
+    """Mass m_n of soil element n = 1 ... N [kg] (Eq 2)."""
+    h_e = design.d / elements
+    return (
+        design.rho_s
+        * design.W
+        * h_e
+        * math.tan(shear_wedge_angle(design.phi))
+        * (design.d - element_depth(n, design.d, elements))
+    )
+
+
+@kernel
+def impact_height(H: float, d: float, e_bumper: float, e_hood: float) -> float:
+    """Height e of the blow over the soil line [m] (Eq 9), halfway up the face that truck and boulder share."""
+    return 0.5 * (min(H - d, e_hood) + e_bumper)
+
+
+@kernel
+def boulder_mass(design: Design) -> float:
+    """Mass m_b of the boulder [kg] (Eq 15)."""
+    return design.rho_b * design.L * design.W * design.H
+
+
+@kernel
+def boulder_inertia(design: Design, m_b: float, c_x: float, c_y: float, box: bool) -> float:
+    """Moment of inertia J_b of the boulder about the common centre of mass [kg m^2] (Eq 16).
+
+    Departs from print where ``box``: the first term is that of a box, m_b/12 (H^2 + L^2); printed, it has
+    the half lengths and so a quarter of it.
+    """
+    H, L = design.H, design.L
+    own = m_b / 12.0 * (H * H + L * L)
+    if not box:
+        own *= 0.25
+    return own + m_b * ((c_y - 0.5 * H) ** 2 + (c_x - 0.5 * L) ** 2)
+
+
+class SoilMass(NamedTuple):
+    """The soil lumped on the boulder: sums over the elements."""
+
+    mass: float
+    """Sum of m_n [kg]."""
+    first: float
+    """Sum of m_n times height over the base [kg m] (Eq 4)."""
+    second: float
+    """Sum of m_n times height over the base, squared [kg m^2] (for Eq 13)."""
+
+
+@kernel
+def soil_mass(design: Design, elements: int) -> SoilMass:
+    """Sums of Eqs 3, 4 and 13 over the soil elements, or their limits for N -> infinity.
+
+    Parameters
+    ----------
+    design
+        The design, SI.
+    elements
+        N, or 0 for the limit: a wedge of mass rho_s W tan(theta_w) d^2/2 with its centre at 2d/3 over the base.
+    """
+    if elements == 0:
+        d = design.d
+        mass = design.rho_s * design.W * math.tan(shear_wedge_angle(design.phi)) * 0.5 * d * d
+        return SoilMass(mass, mass * (2.0 / 3.0) * d, mass * 0.5 * d * d)
+    mass = first = second = 0.0
+    for n in range(1, elements + 1):
+        m_n = element_mass(n, design, elements)
+        height = design.d - element_depth(n, design.d, elements)
+        mass += m_n
+        first += m_n * height
+        second += m_n * height * height
+    return SoilMass(mass, first, second)
+
+
+@kernel
+def passive_pressure_coefficient(phi: float) -> float:
+    """Rankine coefficient of passive earth pressure K_p [-] (with Eq 27)."""
+    return math.tan(0.25 * math.pi + 0.5 * phi) ** 2
+
+
+@kernel
+def ultimate_pressure(alpha: float, phi: float, rho_s: float, K_epsilon: float) -> float:
+    """Ultimate lateral pressure sigma of the soil at depth alpha [Pa] (Eq 27)."""
+    return passive_pressure_coefficient(phi) ** 2 * rho_s * G * alpha * K_epsilon
+
+
+@kernel
+def compression_wedge_length(d: float, phi: float) -> float:
+    """Length L_soil,c of the wedge of soil that is compressed [m] (Eq 25)."""
+    return d / math.tan(phi)
+
+
+@kernel
+def spring_per_depth(design: Design) -> float:
+    """Spring of a soil element of unit height per metre of its depth [N/m^3] (Eqs 24, 25).
+
+    A slice of unit height at depth alpha has the stiffness of a rod (Eq 23), 1e6 beta W alpha / L_soil,c.
+    """
+    return 1e6 * design.beta * design.W / compression_wedge_length(design.d, design.phi)
+
+
+@kernel
+def yield_displacement(design: Design) -> float:
+    """Displacement at which a soil element reaches its ultimate resistance [m] (Eqs 26-28).
+
+    Spring and ultimate resistance both grow in proportion to depth, so it is the same for all elements.
+    """
+    per_depth = ultimate_pressure(1.0, design.phi, design.rho_s, design.K_epsilon) * design.W
+    return per_depth / spring_per_depth(design)
+
+
+@kernel
+def constants_of(design: Design, readings: Readings, elements: int) -> Constants:
+    """Constants of the motion of one design (Eqs 1-16, 24-28).
+
+    Parameters
+    ----------
+    design
+        The design, SI.
+    readings
+        Which formulas are read as printed.
+    elements
+        Number N of soil elements, or 0 for the closed form.
+
+    Returns
+    -------
+    Constants
+        Non-finite or non-positive where the design is impossible: see `is_computable`.
+    """
+    d = design.d
+    m_b = boulder_mass(design)
+    soil = soil_mass(design, elements)
+    m_eff = m_b + soil.mass
+    c_x = (soil.mass * design.L + m_b * 0.5 * design.L) / m_eff
+    c_y = (soil.first + m_b * 0.5 * design.H) / m_eff
+    l_n = design.L - c_x
+    z_0 = d - c_y
+    # Eq 13 with d_n = c_y - height: the sum of m_n (d_n^2 + l_n^2) from the sums over heights.
+    J_soil = soil.second - 2.0 * c_y * soil.first + (c_y * c_y + l_n * l_n) * soil.mass
+    J_eff = boulder_inertia(design, m_b, c_x, c_y, readings.inertia_box) + J_soil
+    half_element = 0.5 * d / elements if elements > 0 else 0.0
+    h = design.e + z_0 if readings.arm_geometric else design.e + half_element - z_0
+    d_N = c_y - half_element
+    if readings.restoring_gravity:
+        C_cos, C_sin = 0.5 * m_b * G * design.L, -0.5 * m_b * G * design.H
+        theta_corner = np.inf
+    else:
+        C_cos, C_sin = m_b * G * d_N, m_b * G * l_n
+        theta_corner = math.atan2(l_n, d_N)
+    return Constants(
+        m_eff,
+        J_eff,
+        1.0 / m_eff,
+        1.0 / J_eff,
+        c_x,
+        c_y,
+        l_n,
+        z_0,
+        d,
+        elements,
+        spring_per_depth(design) * d * d,
+        design.rho_s * design.W * d,
+        yield_displacement(design),
+        h,
+        c_x if readings.contact_left_face else -c_x,
+        design.k_v,
+        design.k_v / design.m_v,
+        design.m_v / design.c_v,
+        design.v_0,
+        C_cos,
+        C_sin,
+        d_N,
+        theta_corner,
+    )
+
+
+@kernel
+def is_computable(c: Constants) -> bool:
+    """Whether every constant is finite and every mass, stiffness and length that divides is positive."""
+    positive = (
+        c.m_eff > 0.0
+        and c.J_eff > 0.0
+        and c.d > 0.0
+        and c.K_soil > 0.0
+        and c.R_soil > 0.0
+        and c.x_yield > 0.0
+        and c.k_v > 0.0
+        and c.k_m > 0.0
+        and c.tau_v >= 0.0
+        and c.v_0 >= 0.0
+    )
+    total = c.m_eff + c.J_eff + c.inverse_m_eff + c.inverse_J_eff + c.K_soil + c.R_soil + c.x_yield
+    total += abs(c.h) + abs(c.g_x) + c.k_v + c.k_m + c.tau_v + c.v_0 + abs(c.C_cos) + abs(c.C_sin)
+    return positive and np.isfinite(total)

@@ -1,0 +1,210 @@
+"""One impact from the first touch to its end: the reference that every faster path is held against."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ._jit import kernel
+from .design import Constants, Design, constants_of, is_computable
+from .dormand_prince import DenseOutput, dense_output, state_at, step
+from .dynamics import Acceleration, State, acceleration
+from .energy import Exchanged, add_exchanged, nothing_exchanged
+from .events import LIMIT, change_mode, first_event, gaps_of, initial_modes, locate
+from .modes import Modes, Switches, switches_of
+from .outcomes import Maxima, Outcome, Status, no_maxima, undefined_maxima, updated_maxima
+from .readings import Readings
+from .stability import shortened_step
+
+FULL_TURN = math.pi
+"""Rotation at which a simulation without a stop ends all the same [rad]: the boulder lies upside down."""
+ATTEMPTS_PER_STEP = 4
+ATTEMPTS_SPARE = 20_000
+"""A simulation gives up after so many attempts per nominal step, and these to spare for events."""
+
+
+class Control(NamedTuple):
+    """How a simulation is run."""
+
+    h: float
+    """Step [s]; shortened where a design needs it, see `shortened_step`."""
+    horizon: float
+    """Longest simulated time [s]."""
+    theta_limit: float
+    """Limit of rotation [rad]."""
+    elements: int
+    """Number N of soil elements; 0 for the closed form."""
+    error_estimate: bool
+    """Whether the numerical error of each design is estimated."""
+    stop_at_limit: bool = True
+    """Whether the simulation ends where the rotation reaches its limit."""
+
+
+class Record(NamedTuple):
+    """Where a simulation leaves its time history; empty arrays for none."""
+
+    times: np.ndarray
+    """Times asked for [s], ascending, shape (n,)."""
+    states: np.ndarray
+    """State at each, shape (n, 6), order of `State`; rows beyond the end of the simulation stay as they are."""
+    turning: np.ndarray
+    """Mode of rotation at each, int8, shape (n,)."""
+    touching: np.ndarray
+    """Whether the truck touched, bool, shape (n,)."""
+    exchanged: np.ndarray
+    """Energy exchanged up to each [J], shape (n, 4), order of `Exchanged`."""
+
+
+@kernel
+def no_record() -> Record:
+    """Return a record that keeps nothing."""
+    return Record(
+        np.empty(0, np.float64),
+        np.empty((0, 6), np.float64),
+        np.empty(0, np.int8),
+        np.empty(0, np.bool_),
+        np.empty((0, 4), np.float64),
+    )
+
+
+@kernel
+def write_samples(
+    record: Record,
+    written: int,
+    t: float,
+    h: float,
+    tau_end: float,
+    dense: DenseOutput,
+    modes: Modes,
+    switches: Switches,
+    c: Constants,
+    exchanged: Exchanged,
+) -> int:
+    """Write the samples that lie in a step, and return how many have been written in all."""
+    t_end = t + tau_end * h
+    while written < record.times.size and record.times[written] <= t_end:
+        tau = (record.times[written] - t) / h
+        y = state_at(dense, tau)
+        states = record.states[written]
+        states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
+        states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
+        record.turning[written] = modes.turning
+        record.touching[written] = modes.touching
+        so_far = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
+        sums = record.exchanged[written]
+        sums[0], sums[1], sums[2], sums[3] = so_far.drag, so_far.damper, so_far.restoring, so_far.pull
+        written += 1
+    return written
+
+
+@kernel
+def is_finite(y: State) -> bool:
+    """Whether no component of a state is NaN or infinite."""
+    return bool(np.isfinite(y.x_b + y.v_b + y.theta_b + y.omega_b + y.x_v + y.v_v))
+
+
+@kernel
+def horizon_status(y: State, m: Maxima) -> int:
+    """Status of a design that reached the horizon: outward where a maximum is still being set there."""
+    turning_out = y.theta_b * y.omega_b > 0.0 and abs(y.theta_b) >= m.theta
+    driving_on = y.v_v > 0.0 and y.x_v >= m.x_v
+    return Status.OUTWARD.value if turning_out or driving_on else Status.HORIZON.value
+
+
+@kernel
+def failed(status: int) -> Outcome:
+    """Outcome of a design that was not simulated, or not to its end."""
+    return Outcome(status, undefined_maxima(), np.nan, np.nan, 0)
+
+
+@kernel
+def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
+    """Acceleration at a state."""
+    return acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c)
+
+
+@kernel
+def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
+    """Simulate one impact by fixed steps, each cut where a mode changes.
+
+    Parameters
+    ----------
+    design
+        The design, SI.
+    readings
+        Which formulas are read as printed.
+    control
+        Step, horizon, limit, representation of the soil.
+    record
+        Filled with the time history at the times it names.
+
+    Returns
+    -------
+    Outcome
+        Maxima from the dense output; NaN with status INVALID, STEP_BUDGET or UNSTABLE.
+
+    Notes
+    -----
+    Within a step the modes are frozen and the right-hand side is smooth. Where a step passes an event, it is kept
+    up to the event by its dense output, whose local error of order five adds once per event what every step
+    adds to the solution, so the order of the method is kept.
+    """
+    if design.H - design.d <= design.e_bumper:
+        return failed(Status.NO_CONTACT.value)
+    c = constants_of(design, readings, control.elements)
+    if not is_computable(c):
+        return failed(Status.INVALID.value)
+    h_full = shortened_step(control.h, c)
+    budget = ATTEMPTS_PER_STEP * control.horizon / h_full + ATTEMPTS_SPARE
+    if not budget <= 100 * ATTEMPTS_SPARE:
+        return failed(Status.STEP_BUDGET.value)
+
+    y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
+    modes = initial_modes(readings, c)
+    switches = switches_of(modes, readings, c)
+    k1 = rate_of(y, switches, c)
+    m = no_maxima()
+    exchanged = nothing_exchanged()
+    recording = record.times.size > 0
+    written = 0
+    t, t_limit = 0.0, np.nan
+    attempts = 0
+    theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
+    while t < control.horizon:
+        attempts += 1
+        if attempts > budget:
+            return failed(Status.STEP_BUDGET.value)
+        h = min(h_full, control.horizon - t)
+        last = h >= control.horizon - t
+        y_end, stages = step(y, k1, h, switches, c)
+        if not is_finite(y_end):
+            return failed(Status.UNSTABLE.value)
+        dense = dense_output(y, h, stages)
+        gaps = gaps_of(y_end, stages.k7.M, modes, c, theta_stop)
+        event, tau = first_event(gaps, dense, modes, switches, c, theta_stop)
+        if event >= 0:
+            y_end = state_at(dense, tau)
+        if np.isnan(t_limit) and abs(y_end.theta_b) >= control.theta_limit and not control.stop_at_limit:
+            gap = control.theta_limit - abs(y_end.theta_b)
+            t_limit = t + h * min(tau, locate(LIMIT, gap, dense, modes, switches, c, control.theta_limit))
+        m = updated_maxima(m, t, h, tau, y_end, dense, switches, c)
+        if recording:
+            written = write_samples(record, written, t, h, tau, dense, modes, switches, c, exchanged)
+            exchanged = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
+        t = control.horizon if last and event < 0 else t + tau * h
+        if event == LIMIT:
+            if control.stop_at_limit:
+                t_limit = t
+            m = Maxima(theta_stop, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v)
+            return Outcome(Status.LIMIT.value, m, t_limit, t, attempts)
+        y = y_end
+        if event >= 0:
+            M = rate_of(y, switches, c).M
+            y, modes = change_mode(event, y, M, modes, c)
+            switches = switches_of(modes, readings, c)
+            k1 = rate_of(y, switches, c)
+        else:
+            k1 = stages.k7
+    return Outcome(horizon_status(y, m), m, t_limit, t, attempts)

@@ -1,0 +1,198 @@
+"""What a simulation reports: maxima, times, and how it ended."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from ._jit import kernel
+from .design import Constants
+from .dormand_prince import DenseOutput, Track, displacement_at, state_at, velocity_at
+from .dynamics import State
+from .modes import Switches
+from .trigonometry import sine_versine
+from .vehicle import contact_displacement, contact_lever, spring_compression
+
+
+class Status(IntEnum):
+    """How the simulation of a design ended."""
+
+    NO_CONTACT = 0
+    """The truck passes over the boulder: nothing was integrated."""
+    LIMIT = 1
+    """The rotation reached its limit."""
+    SETTLED = 2
+    """Nothing that is reported can still grow, proved."""
+    HORIZON = 3
+    """The horizon was reached, and nothing at its maximum was growing."""
+    OUTWARD = 4
+    """The horizon was reached with rotation or truck at its maximum and still growing."""
+    UNSTABLE = 5
+    """The state became non-finite."""
+    STEP_BUDGET = 6
+    """The design needs more steps than are allowed."""
+    INVALID = 7
+    """A constant of the design is not finite, or not positive."""
+
+
+class Maxima(NamedTuple):
+    """Largest values so far, and when."""
+
+    theta: float
+    """Largest |theta_b| [rad]."""
+    t_theta: float
+    x_b: float
+    """Largest x_b [m]."""
+    t_x_b: float
+    x_v: float
+    """Largest x_v [m]."""
+    t_x_v: float
+    F_v: float
+    """Largest contact force [N]."""
+    t_F_v: float
+
+
+class Outcome(NamedTuple):
+    """Result of one simulation; NaN where not computed."""
+
+    status: int
+    maxima: Maxima
+    t_limit: float
+    """Time at which the rotation reached its limit [s]."""
+    t_end: float
+    """Simulated time [s]."""
+    attempts: int
+    """Steps tried."""
+
+
+class OutcomeTable(NamedTuple):
+    """Results of many designs: arrays of shape (n,); NaN where not computed."""
+
+    status: np.ndarray
+    """int8, see `Status`."""
+    theta_max: np.ndarray
+    """Largest |theta_b| [rad]."""
+    x_b_max: np.ndarray
+    """Largest x_b [m]."""
+    x_v_max: np.ndarray
+    """Largest x_v [m]."""
+    F_v_max: np.ndarray
+    """Largest contact force [N]."""
+    t_limit: np.ndarray
+    """Time at which the rotation reached its limit [s]."""
+    t_end: np.ndarray
+    """Simulated time [s]."""
+    theta_error: np.ndarray
+    """Estimated numerical error of theta_max [rad]."""
+    x_error: np.ndarray
+    """Estimated numerical error of x_b_max and x_v_max, the larger [m]."""
+
+
+@kernel
+def no_maxima() -> Maxima:
+    """Maxima before the first step."""
+    return Maxima(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def undefined_maxima() -> Maxima:
+    """Maxima of a design that was not simulated."""
+    return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
+
+
+@kernel
+def turning_point(q: Track, tau_end: float) -> float:
+    """Fraction of a step at which a velocity that changes its sign before tau_end is zero (Illinois)."""
+    low, high = 0.0, tau_end
+    v_low, v_high = q.v, velocity_at(q, tau_end)
+    for _ in range(30):
+        tau = high - v_high * (high - low) / (v_high - v_low)
+        if not low < tau < high:
+            tau = 0.5 * (low + high)
+        v = velocity_at(q, tau)
+        if (v > 0.0) == (v_high > 0.0):
+            high, v_high = tau, v
+            v_low *= 0.5
+        else:
+            low, v_low = tau, v
+            v_high *= 0.5
+        if high - low < 1e-9 or v == 0.0:
+            break
+    return tau
+
+
+@kernel
+def compression_rate(y: State, s: Switches, c: Constants) -> float:
+    """Rate of the compression of the vehicle's spring [m/s]; the contact force peaks where it is zero."""
+    sin, versin = sine_versine(y.theta_b)
+    u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+    return y.v_v - y.v_b - y.omega_b * contact_lever(sin, versin, c) - c.tau_v * s.k_truck * u
+
+
+@kernel
+def force_at(y: State, s: Switches, c: Constants) -> float:
+    """Contact force at a state [N]."""
+    sin, versin = sine_versine(y.theta_b)
+    return s.k_contact * spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+
+
+@kernel
+def force_peak(dense: DenseOutput, tau_end: float, s: Switches, c: Constants) -> float:
+    """Fraction of a step at which the contact force peaks, known to lie before tau_end (bisection)."""
+    low, high = 0.0, tau_end
+    for _ in range(30):
+        tau = 0.5 * (low + high)
+        if compression_rate(state_at(dense, tau), s, c) > 0.0:
+            low = tau
+        else:
+            high = tau
+    return high
+
+
+@kernel
+def grown(best: float, t_best: float, value: float, t: float) -> tuple[float, float]:
+    """Return the larger of the best so far and a value, with its time."""
+    if value > best:
+        return value, t
+    return best, t_best
+
+
+@kernel
+def updated_maxima(
+    m: Maxima, t: float, h: float, tau_end: float, y_end: State, dense: DenseOutput, s: Switches, c: Constants
+) -> Maxima:
+    """Maxima after a step, from its end and from the turning points inside, by the dense output.
+
+    Parameters
+    ----------
+    m
+        Maxima before the step.
+    t, h
+        Start [s] and length [s] of the step.
+    tau_end
+        Fraction of the step that was kept.
+    y_end
+        State there.
+    dense, s, c
+        The step.
+    """
+    t_end = t + tau_end * h
+    theta, t_theta = grown(m.theta, m.t_theta, abs(y_end.theta_b), t_end)
+    if dense.rotation.v * y_end.omega_b < 0.0:
+        tau = turning_point(dense.rotation, tau_end)
+        theta, t_theta = grown(theta, t_theta, abs(displacement_at(dense.rotation, tau)), t + tau * h)
+    x_b, t_x_b = grown(m.x_b, m.t_x_b, y_end.x_b, t_end)
+    if dense.boulder.v > 0.0 > y_end.v_b:
+        tau = turning_point(dense.boulder, tau_end)
+        x_b, t_x_b = grown(x_b, t_x_b, displacement_at(dense.boulder, tau), t + tau * h)
+    x_v, t_x_v = grown(m.x_v, m.t_x_v, y_end.x_v, t_end)
+    if dense.truck.v > 0.0 > y_end.v_v:
+        tau = turning_point(dense.truck, tau_end)
+        x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
+    F_v, t_F_v = grown(m.F_v, m.t_F_v, force_at(y_end, s, c), t_end)
+    if compression_rate(state_at(dense, 0.0), s, c) > 0.0 > compression_rate(y_end, s, c):
+        tau = force_peak(dense, tau_end, s, c)
+        F_v, t_F_v = grown(F_v, t_F_v, force_at(state_at(dense, tau), s, c), t + tau * h)
+    return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v)

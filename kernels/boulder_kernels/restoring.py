@@ -1,0 +1,64 @@
+"""Restoring moment of the weight (Eqs 37-39), and the couple that stands in its place."""
+
+from __future__ import annotations
+
+import math
+
+from ._jit import kernel
+from .design import Constants
+from .modes import Switches
+
+
+@kernel
+def couple_moment(sin: float, versin: float, switches: Switches, c: Constants) -> float:
+    """Moment of the couple of the weight in the present mode, b (C_cos cos + w sin) [N m].
+
+    Corrected reading: m_b g (L/2 cos(theta) - H/2 sin|theta|) towards theta = 0, the weight at the boulder's own
+    centre against the corner it turns about; it vanishes at the classical tipping angle, tan(theta) = L/H.
+    Printed reading: the limit m_b g R_N |cos(gamma_N + theta)| of Eq 37.
+    """
+    return switches.couple * (c.C_cos - c.C_cos * versin + switches.couple_sin * sin)
+
+
+@kernel
+def signed_arm(sin: float, versin: float, c: Constants) -> float:
+    """Printed reading: m_b g (d_N cos(theta) + l_n sin(theta)), the moment of Eq 37 before its modulus [N m]."""
+    return c.C_cos - c.C_cos * versin + c.C_sin * sin
+
+
+@kernel
+def holding_moment(sin: float, versin: float, c: Constants) -> float:
+    """Largest moment that the restoring moment can balance [N m] (Eq 37; seated: m_b g L/2).
+
+    Printed, m_b g R_N |cos(gamma_N + theta)| = m_b g |d_N cos(theta) + l_n sin(theta)|. Corrected, it is asked for
+    only at theta = 0.
+    """
+    return abs(signed_arm(sin, versin, c))
+
+
+@kernel
+def printed_restoring_moment(
+    M: float, theta_b: float, omega_b: float, sin: float, versin: float, c: Constants
+) -> float:
+    """Restoring moment M_R exactly as printed [N m] (Eqs 37-39), with its switches inside.
+
+    Parameters
+    ----------
+    M
+        Net moment of soil and truck [N m].
+    theta_b, omega_b
+        Rotation [rad] and angular velocity [rad/s].
+    sin, versin
+        sin(theta_b) and 1 - cos(theta_b).
+    c
+        Constants of a design whose restoring moment is read as printed.
+
+    Notes
+    -----
+    It serves as the yardstick of the modes: whatever the mode, `couple_moment` and ``net`` must give this value.
+    """
+    if omega_b <= 0.0:
+        return 0.0
+    limit = holding_moment(sin, versin, c)
+    corner = math.copysign(1.0, c.theta_corner - theta_b)
+    return -corner * min(max(M, -limit), limit)

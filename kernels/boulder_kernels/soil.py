@@ -1,0 +1,201 @@
+"""Reaction of the soil on the boulder (Eqs 19-36): element sums, and their limit in closed form.
+
+With theta_b = theta and d_n = alpha_n - z_0 the polar coordinates of Eqs 7, 8 are
+
+    R_n sin(gamma_n + theta) = l_n cos(theta) - d_n sin(theta)
+    R_n cos(gamma_n + theta) = -(d_n cos(theta) + l_n sin(theta))
+
+so displacement (Eq 22), velocity (Eq 35) and lever (Eq 20) of an element are linear in its depth alpha:
+
+    Delta x(alpha) = A - sin(theta) alpha         A = x_b - l_n (1 - cos(theta)) + z_0 sin(theta)
+    v(alpha)       = B - omega cos(theta) alpha   B = v_b - omega q,   q = l_n sin(theta) - z_0 cos(theta)
+    lever(alpha)   = -(alpha cos(theta) + q)
+
+No element needs a sine or an arctangent of its own, and the limit N -> infinity is a piecewise polynomial:
+all elements reach their ultimate resistance at the same displacement, so the springs have at most two break
+points along the depth, and the drag one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ._jit import kernel, summing_kernel
+from .design import Constants
+
+TINY = 1e-30
+"""Stands in for a slope of zero, so that a break point at infinity is clamped and not 0/0."""
+
+
+class Reaction(NamedTuple):
+    """Force and moment of the soil on the boulder."""
+
+    F: float
+    """Sum of F_n [N] (Eq 19)."""
+    M: float
+    """Sum of M_n about the common centre of mass [N m] (Eq 20)."""
+
+
+class Kinematics(NamedTuple):
+    """Displacement and velocity of the soil along the depth, as lines."""
+
+    A: float
+    """Displacement at the soil line [m]."""
+    slope_x: float
+    """Decrease of displacement over the whole depth, sin(theta) d [m]."""
+    B: float
+    """Velocity at the soil line [m/s]."""
+    slope_v: float
+    """Decrease of velocity over the whole depth, omega cos(theta) d [m/s]."""
+    q: float
+    """Depth of the centre of mass relative to the soil line as a lever, l_n sin - z_0 cos [m]."""
+    lever_d: float
+    """Increase of the lever over the whole depth, cos(theta) d [m]."""
+
+
+@kernel
+def soil_kinematics(
+    x_b: float, v_b: float, omega_b: float, sin: float, versin: float, c: Constants
+) -> Kinematics:
+    """Lines of displacement (Eq 22), velocity (Eq 35) and lever (Eqs 7, 8, 20) along the depth.
+
+    Parameters
+    ----------
+    x_b, v_b, omega_b
+        Displacement [m] and velocity [m/s] of the centre of mass, angular velocity [rad/s].
+    sin, versin
+        sin(theta_b) and 1 - cos(theta_b).
+    c
+        Constants of the design.
+    """
+    cos = 1.0 - versin
+    lever_d = c.d * cos
+    q = c.l_n * sin - c.z_0 * cos
+    return Kinematics(
+        x_b - c.l_n * versin + c.z_0 * sin, c.d * sin, v_b - omega_b * q, omega_b * lever_d, q, lever_d
+    )
+
+
+@kernel
+def spring_force(displacement: float, alpha: float, h_e: float, c: Constants) -> float:
+    """Spring force F_k,n of an element of height h_e, limited to its ultimate resistance [N] (Eqs 21-28)."""
+    limited = min(max(displacement, -c.x_yield), c.x_yield)
+    return c.K_soil / (c.d * c.d) * h_e * alpha * limited
+
+
+@kernel
+def drag_force(velocity: float, h_e: float, c: Constants) -> float:
+    """Drag F_c,n of an element of height h_e [N] (Eqs 34, 36; c_n of Eq 33 is rho_s W h_e)."""
+    return c.R_soil / c.d * h_e * velocity * abs(velocity)
+
+
+@summing_kernel
+def element_sums(k: Kinematics, c: Constants) -> Reaction:
+    """Sum force and moment over the N elements: the paper's own method (Eqs 19-21, 26, 28, 36).
+
+    Parameters
+    ----------
+    k
+        Lines of displacement, velocity and lever along the depth.
+    c
+        Constants of the design; ``c.elements`` must be positive.
+    """
+    F = M = 0.0
+    h_e = c.d / c.elements
+    per_element = 1.0 / c.elements
+    for n in range(c.elements):
+        ratio = (n + 0.5) * per_element
+        F_n = -(
+            spring_force(k.A - k.slope_x * ratio, ratio * c.d, h_e, c)
+            + drag_force(k.B - k.slope_v * ratio, h_e, c)
+        )
+        F += F_n
+        M -= F_n * (k.lever_d * ratio + k.q)
+    return Reaction(F, M)
+
+
+@kernel
+def closed_form(k: Kinematics, c: Constants) -> Reaction:
+    """Integrate force and moment over the depth exactly: the limit N -> infinity of `element_sums`.
+
+    With r = alpha/d in 0 ... 1 the integrals are those of r clip(A - s r, -y, y) and v|v|, each times 1 and r.
+    The clipped line takes the values +-y up to r_1 and from r_2 on; v changes sign at r_0. All three are
+    clamped to 0 ... 1, so that no case needs a branch.
+
+    Parameters
+    ----------
+    k
+        Lines of displacement, velocity and lever along the depth.
+    c
+        Constants of the design.
+    """
+    s = math.copysign(max(abs(k.slope_x), TINY), k.slope_x)
+    p = math.copysign(max(abs(k.slope_v), TINY), k.slope_v)
+    y = math.copysign(c.x_yield, s)
+    A, B = k.A, k.B
+    # One division for the three break points.
+    inverse = 1.0 / (s * p)
+    inverse_s, inverse_p = inverse * p, inverse * s
+    below, above = y - A, y + A
+    r_1 = min(max(-below * inverse_s, 0.0), 1.0)
+    r_2 = min(max(above * inverse_s, 0.0), 1.0)
+    r_0 = min(max(B * inverse_p, 0.0), 1.0)
+
+    a_1, a_2 = r_1 * r_1, r_2 * r_2
+    b_1, b_2 = a_1 * r_1, a_2 * r_2
+    third_s = (1.0 / 3.0) * s
+    spring = 0.5 * (below * a_1 + above * a_2 - y) + third_s * (b_1 - b_2)
+    spring_r = (1.0 / 3.0) * (below * b_1 + above * b_2 - y) + 0.25 * s * (a_1 * a_1 - a_2 * a_2)
+
+    # Q(r) = integral of (B - p r)^2; v|v| integrates to sign(p) (2 Q(r_0) - Q(1)).
+    a_0 = r_0 * r_0
+    b_0 = a_0 * r_0
+    BB, Bp, pp = B * B, B * p, p * p
+    drag = BB * (2.0 * r_0 - 1.0) - Bp * (2.0 * a_0 - 1.0) + (1.0 / 3.0) * pp * (2.0 * b_0 - 1.0)
+    drag_r = (
+        0.5 * BB * (2.0 * a_0 - 1.0)
+        - (2.0 / 3.0) * Bp * (2.0 * b_0 - 1.0)
+        + 0.25 * pp * (2.0 * a_0 * a_0 - 1.0)
+    )
+    R = math.copysign(c.R_soil, p)
+    pressed = c.K_soil * spring + R * drag
+    pressed_r = c.K_soil * spring_r + R * drag_r
+    return Reaction(-pressed, k.lever_d * pressed_r + k.q * pressed)
+
+
+@kernel
+def soil_reaction(k: Kinematics, c: Constants) -> Reaction:
+    """Force and moment of the soil: element sums where the design asks for N, else the closed form."""
+    if c.elements > 0:
+        return element_sums(k, c)
+    return closed_form(k, c)
+
+
+@kernel
+def soil_energy(k: Kinematics, c: Constants) -> float:
+    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces.
+
+    The springs are elastic also beyond their limit, so an element holds u^2/2 up to the yield displacement y
+    and y |u| - y^2/2 beyond, times its stiffness.
+    """
+    if c.elements > 0:
+        total = 0.0
+        for n in range(c.elements):
+            ratio = (n + 0.5) / c.elements
+            u = abs(k.A - k.slope_x * ratio)
+            over = max(u - c.x_yield, 0.0)
+            total += ratio * 0.5 * (u * u - over * over)
+        return c.K_soil * total / c.elements
+    s = math.copysign(max(abs(k.slope_x), TINY), k.slope_x)
+    y = math.copysign(c.x_yield, s)
+    A = k.A
+    r_1 = min(max((A - y) / s, 0.0), 1.0)
+    r_2 = min(max((A + y) / s, 0.0), 1.0)
+    # u^2/2 on r_1 ... r_2; before and after it the tangents +-y u - y^2/2.
+    middle = (
+        0.25 * A * A * (r_2**2 - r_1**2) - A * s / 3.0 * (r_2**3 - r_1**3) + 0.125 * s * s * (r_2**4 - r_1**4)
+    )
+    before = y * (0.5 * A * r_1**2 - s / 3.0 * r_1**3) - 0.25 * y * y * r_1**2
+    after = -y * (0.5 * A * (1.0 - r_2**2) - s / 3.0 * (1.0 - r_2**3)) - 0.25 * y * y * (1.0 - r_2**2)
+    return c.K_soil * (before + middle + after)

@@ -1,0 +1,60 @@
+"""The truck as a Maxwell element: a spring and a damper in series (Eqs 17, 18, 40-48).
+
+Eq 45, x_v''' + (k_v/c_v) x_v'' + (k_v/m_v) x_v' = (k_v/m_v) x_c' with x_c the contact point on the boulder,
+is an exact derivative. Integrated once from the state at impact (x_v = x_c = x_v'' = 0, x_v' = v_0) it reads
+
+    m_v x_v'' = -k_v u,    u = x_v - x_c - (m_v/c_v) (v_0 - x_v')
+
+where u is the compression of the spring and the last term the crush of the damper, which takes up the momentum
+the truck has lost. So the acceleration of the truck is not a state of its own, the crush is permanent by
+itself, and after a separation contact resumes from zero force exactly when u returns to zero.
+"""
+
+from __future__ import annotations
+
+from ._jit import kernel
+from .design import Constants
+
+
+@kernel
+def contact_lever(sin: float, versin: float, c: Constants) -> float:
+    """Lever of the contact force about the centre of mass, R_v cos(gamma_v + theta) [m] (Eqs 5, 6, 48).
+
+    In Cartesian form h cos(theta) + g_x sin(theta), right in every quadrant. Printed, the struck face lies on the
+    right of the centre of mass (g_x = -c_x); truly it is the left face (g_x = c_x).
+    """
+    return c.h - c.h * versin + c.g_x * sin
+
+
+@kernel
+def contact_displacement(x_b: float, sin: float, versin: float, c: Constants) -> float:
+    """Displacement x_c of the contact point on the boulder [m]: x_b plus the integral of the lever over theta."""
+    return x_b + c.h * sin + c.g_x * versin
+
+
+@kernel
+def spring_compression(x_v: float, v_v: float, x_c: float, c: Constants) -> float:
+    """Compression u of the vehicle's spring [m]; below zero the truck has come off (Eq 45, integrated)."""
+    return x_v - x_c - c.tau_v * (c.v_0 - v_v)
+
+
+@kernel
+def contact_force(u: float, c: Constants) -> float:
+    """Force F_v of the truck on the boulder while they touch [N] (Eqs 41, 46, 47)."""
+    return c.k_v * u
+
+
+@kernel
+def vehicle_jerk(v_v: float, a_v: float, v_c: float, k_v: float, c_v: float, m_v: float) -> float:
+    """Third derivative of x_v [m/s^3] as Eq 45 has it; the motion itself uses its integral, see above.
+
+    Parameters
+    ----------
+    v_v, a_v
+        Velocity [m/s] and acceleration [m/s^2] of the truck.
+    v_c
+        Velocity of the contact point on the boulder [m/s].
+    k_v, c_v, m_v
+        Spring [N/m], damper [N s/m] and mass [kg] of the truck.
+    """
+    return -k_v / c_v * a_v - k_v / m_v * (v_v - v_c)
