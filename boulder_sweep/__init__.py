@@ -1,0 +1,66 @@
+"""Which boulder, buried how deep in which soil, stops a truck: pass/fail tables over large grids of designs.
+
+Examples
+--------
+>>> import boulder_sweep
+>>> sweep = boulder_sweep.load("configs/m30_sizing.yaml")   # doctest: +SKIP
+>>> summary = boulder_sweep.run(sweep, "m30.sweep")         # doctest: +SKIP
+>>> table = boulder_sweep.read("m30.sweep")                 # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import SettingsError, Sweep, load
+    from boulder_sweep.simulation import Trajectory, simulate
+    from boulder_sweep.store import read
+    from boulder_sweep.sweeper import Summary, run
+
+    __version__: str
+
+__all__ = [
+    "SettingsError",
+    "Summary",
+    "Sweep",
+    "Trajectory",
+    "__version__",
+    "load",
+    "read",
+    "run",
+    "simulate",
+]
+
+# Names are fetched at first use: the import of numba or pandas takes longer than checking a file.
+_HOME = {
+    "SettingsError": "boulder_sweep.settings",
+    "Sweep": "boulder_sweep.settings",
+    "load": "boulder_sweep.settings",
+    "Summary": "boulder_sweep.sweeper",
+    "run": "boulder_sweep.sweeper",
+    "Trajectory": "boulder_sweep.simulation",
+    "simulate": "boulder_sweep.simulation",
+    "read": "boulder_sweep.store",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a public name from the module it lives in."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: Any = version("boulder-sweep")
+    elif name in _HOME:
+        from importlib import import_module
+
+        value = getattr(import_module(_HOME[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return sorted(__all__)

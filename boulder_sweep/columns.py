@@ -1,0 +1,121 @@
+"""Every column of the result table: name, type, unit, meaning, in the order of the table.
+
+This is the one register. The settings take the input columns from it, the store its schema and field
+metadata, the command line and the documentation their texts. Types are plain words that do not depend on
+any table library: ``int64``, ``float64`` or ``dictionary`` (a text column with few different values).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+ColumnType = Literal["int64", "float64", "dictionary"]
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnSpec:
+    """One column of the table.
+
+    Attributes
+    ----------
+    name : str
+        Name in the table; ends in its unit where it has one.
+    type : {'int64', 'float64', 'dictionary'}
+        Type of the values.
+    unit : str
+        Unit of the values, ``"1"`` for plain numbers, ``""`` for text and numbering.
+    meaning : str
+        One sentence for people who design barriers.
+    """
+
+    name: str
+    type: ColumnType
+    unit: str
+    meaning: str
+
+
+DESIGN_ID = ColumnSpec(
+    "design_id", "int64", "", "number of the design: its position in the grid (last axis fastest), from 0"
+)
+
+INPUTS: tuple[ColumnSpec, ...] = (
+    ColumnSpec("boulder_length_m", "float64", "m", "length L of the boulder along the direction of travel"),
+    ColumnSpec("boulder_width_m", "float64", "m", "width W of the boulder across the direction of travel"),
+    ColumnSpec("boulder_height_m", "float64", "m", "whole height H of the boulder, buried part included"),
+    ColumnSpec("boulder_density_kg_m3", "float64", "kg/m^3", "density of the boulder"),
+    ColumnSpec("embedment_depth_m", "float64", "m", "depth d of the boulder's base below the soil line"),
+    ColumnSpec(
+        "impact_height_m", "float64", "m", "height e of the blow over the soil line (Eq 9, or as given)"
+    ),
+    ColumnSpec("soil_density_kg_m3", "float64", "kg/m^3", "density of the compacted soil"),
+    ColumnSpec("friction_angle_deg", "float64", "deg", "effective friction angle of the soil"),
+    ColumnSpec(
+        "subgrade_reaction_MN_m3", "float64", "MN/m^3", "constant of horizontal subgrade reaction of the soil"
+    ),
+    ColumnSpec(
+        "strain_rate_factor", "float64", "1", "factor K_epsilon on the soil's strength under rapid loading"
+    ),
+    ColumnSpec("vehicle_mass_kg", "float64", "kg", "mass of the vehicle with its ballast"),
+    ColumnSpec("impact_speed_m_s", "float64", "m/s", "speed of the vehicle at first contact"),
+    ColumnSpec("vehicle_spring_N_m", "float64", "N/m", "spring of the vehicle's front (Maxwell element)"),
+    ColumnSpec("vehicle_damper_N_s_m", "float64", "N*s/m", "damper of the vehicle's front (Maxwell element)"),
+    ColumnSpec(
+        "bumper_height_m", "float64", "m", "height of the underside of the vehicle's bumper over the ground"
+    ),
+    ColumnSpec("hood_height_m", "float64", "m", "height of the top of the vehicle's hood over the ground"),
+    ColumnSpec(
+        "bed_offset_m", "float64", "m", "distance from the front bumper to the leading edge of the cargo bed"
+    ),
+)
+
+OUTCOMES: tuple[ColumnSpec, ...] = (
+    ColumnSpec("verdict", "dictionary", "", "pass, fail, undecided or error"),
+    ColumnSpec(
+        "reason",
+        "dictionary",
+        "",
+        "why: empty for a pass, no_contact, overturns, penetration, horizon, error, "
+        "or why the row could not be computed",
+    ),
+    ColumnSpec(
+        "margin",
+        "float64",
+        "1",
+        "least distance to a limit as a fraction of that limit, positive where the design passes; "
+        "null where it overturned or was not touched",
+    ),
+    ColumnSpec("max_rotation_deg", "float64", "deg", "largest rotation of the boulder, in either direction"),
+    ColumnSpec(
+        "max_displacement_m",
+        "float64",
+        "m",
+        "largest displacement of the centre of mass of boulder and soil wedge",
+    ),
+    ColumnSpec("max_vehicle_displacement_m", "float64", "m", "largest displacement of the vehicle"),
+    ColumnSpec("peak_force_kN", "float64", "kN", "largest force between vehicle and boulder"),
+    ColumnSpec(
+        "penetration_m",
+        "float64",
+        "m",
+        "how far the leading edge of the cargo bed gets beyond the far face of the boulder "
+        "(negative: it stays short of it)",
+    ),
+    ColumnSpec(
+        "rating",
+        "dictionary",
+        "",
+        "penetration rating reached (P1, P2, P3); null beyond P3 or where not rated",
+    ),
+    ColumnSpec(
+        "time_to_limit_s", "float64", "s", "time at which the rotation reached the limit; null where never"
+    ),
+    ColumnSpec("end_time_s", "float64", "s", "time simulated"),
+    ColumnSpec("rotation_error_deg", "float64", "deg", "estimated numerical error of max_rotation_deg"),
+    ColumnSpec("displacement_error_m", "float64", "m", "estimated numerical error of the displacements"),
+)
+
+COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
+INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
+OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
+BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in COLUMNS}
