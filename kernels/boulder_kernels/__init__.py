@@ -5,10 +5,12 @@ equation numbers in this package are theirs. Everything here is plain numbers in
 subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, units or tables on disk.
 """
 
+from ._jit import source_hash
 from .design import Constants, Design, DesignTable, constants_of, impact_height
 from .impact import Control, Record, no_record, simulate_design
 from .outcomes import Maxima, Outcome, OutcomeTable, Status
 from .readings import Readings, as_printed, corrected
+from .table import simulate_table
 
 __all__ = [
     "Constants",
@@ -27,4 +29,6 @@ __all__ = [
     "impact_height",
     "no_record",
     "simulate_design",
+    "simulate_table",
+    "source_hash",
 ]

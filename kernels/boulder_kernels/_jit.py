@@ -68,7 +68,7 @@ def _cache_folder() -> str | None:
 CACHE_FOLDER = _cache_folder()
 
 
-def _compiled(function: Callable[..., Any], fastmath: set[str]) -> Callable[..., Any]:
+def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:
     """Decorate one function, its cache in this package's folder."""
     # Set only while decorating: other users of Numba in this process keep their own cache folder.
     before = numba.config.CACHE_DIR
@@ -79,6 +79,7 @@ def _compiled(function: Callable[..., Any], fastmath: set[str]) -> Callable[...,
             cache=CACHE_FOLDER is not None,
             error_model="numpy",
             fastmath=fastmath,
+            forceinline=inline,
         )(function)
     finally:
         numba.config.CACHE_DIR = before
@@ -98,6 +99,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         The compiled dispatcher; ``.py_func`` is the function itself.
     """
     return _compiled(function, {"contract", "nsz"})
+
+
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile as `kernel` does, and put the code into every caller: a loop with a call left in is not vectorised."""
+    return _compiled(function, {"contract", "nsz"}, inline=True)
 
 
 def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:

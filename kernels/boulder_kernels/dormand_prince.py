@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import kernel
+from ._jit import inlined
 from .design import Constants
 from .dynamics import Acceleration, State, acceleration
 from .modes import Switches
@@ -30,13 +30,13 @@ class Point(NamedTuple):
     v: float
 
 
-@kernel
+@inlined
 def stage_2(x: float, v: float, h: float, a1: float) -> Point:
     """Second stage of one degree of freedom."""
     return Point(x + h * (C[1] * v), v + h * (A[1][0] * a1))
 
 
-@kernel
+@inlined
 def stage_3(x: float, v: float, h: float, a1: float, a2: float) -> Point:
     """Third stage of one degree of freedom."""
     return Point(
@@ -45,7 +45,7 @@ def stage_3(x: float, v: float, h: float, a1: float, a2: float) -> Point:
     )
 
 
-@kernel
+@inlined
 def stage_4(x: float, v: float, h: float, a1: float, a2: float, a3: float) -> Point:
     """Fourth stage of one degree of freedom."""
     return Point(
@@ -54,7 +54,7 @@ def stage_4(x: float, v: float, h: float, a1: float, a2: float, a3: float) -> Po
     )
 
 
-@kernel
+@inlined
 def stage_5(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float) -> Point:
     """Fifth stage of one degree of freedom."""
     return Point(
@@ -63,7 +63,7 @@ def stage_5(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: f
     )
 
 
-@kernel
+@inlined
 def stage_6(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float, a5: float) -> Point:
     """Sixth stage of one degree of freedom."""
     return Point(
@@ -72,7 +72,7 @@ def stage_6(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: f
     )
 
 
-@kernel
+@inlined
 def stage_7(x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: float, a6: float) -> Point:
     """End of the step, of fifth order, for one degree of freedom."""
     return Point(
@@ -81,7 +81,7 @@ def stage_7(x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: f
     )
 
 
-@kernel
+@inlined
 def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tuple[State, Stages]:
     """Advance the state by one step with the modes frozen.
 
@@ -150,7 +150,7 @@ class Track(NamedTuple):
     v4: float
 
 
-@kernel
+@inlined
 def track(
     x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: float, a6: float, a7: float
 ) -> Track:
@@ -173,13 +173,13 @@ def track(
     )
 
 
-@kernel
+@inlined
 def displacement_at(q: Track, tau: float) -> float:
     """Displacement of a track at the fraction tau of its step."""
     return q.x + tau * (q.hv + tau * (q.x2 + tau * (q.x3 + tau * q.x4)))
 
 
-@kernel
+@inlined
 def velocity_at(q: Track, tau: float) -> float:
     """Velocity of a track at the fraction tau of its step."""
     return q.v + tau * (q.v1 + tau * (q.v2 + tau * (q.v3 + tau * q.v4)))
@@ -193,7 +193,7 @@ class DenseOutput(NamedTuple):
     truck: Track
 
 
-@kernel
+@inlined
 def dense_output(y: State, h: float, k: Stages) -> DenseOutput:
     """Dense output of a step from its start, its length [s] and the accelerations of its stages."""
     return DenseOutput(
@@ -213,7 +213,7 @@ def dense_output(y: State, h: float, k: Stages) -> DenseOutput:
     )
 
 
-@kernel
+@inlined
 def state_at(dense: DenseOutput, tau: float) -> State:
     """State at the fraction tau of a step, of order four."""
     return State(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import kernel
+from ._jit import inlined
 from .design import Constants
 from .modes import Switches
 from .restoring import couple_moment
@@ -43,7 +43,7 @@ class Acceleration(NamedTuple):
     """Moment of soil and truck without the restoring moment [N m]."""
 
 
-@kernel
+@inlined
 def acceleration(
     x_b: float, v_b: float, theta_b: float, omega_b: float, x_v: float, v_v: float, s: Switches, c: Constants
 ) -> Acceleration:

@@ -1,14 +1,15 @@
 """The instants at which a mode changes: what tells them, where in a step they lie, what they change.
 
 Each event has a gap, positive as long as the present mode holds. A gap that is negative at the end of a step puts
-the event inside it; there the step is cut.
+the event inside it; there the step is cut. Every gap is a sum of a few quantities of the state with factors that
+depend on the mode only, so that a loop over lanes in different modes needs no branch.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import kernel
+from ._jit import inlined, kernel
 from .design import Constants
 from .dormand_prince import DenseOutput, state_at
 from .dynamics import State, acceleration
@@ -39,19 +40,52 @@ CORNER = 3
 """Printed reading: the corner passes under the centre of mass, sin(gamma_N + theta_b) changes its sign."""
 ARM = 4
 """Printed reading: the corner passes beside the centre of mass, cos(gamma_N + theta_b) changes its sign."""
-YIELD = 5
+YIELD_TOP = 5
 """The soil at the soil line reaches its ultimate resistance, or falls below it."""
-LIMIT = 6
+YIELD_BASE = 6
+"""The same at the base of the boulder."""
+LIMIT = 7
 """The rotation reaches the limit."""
-EVENTS = 7
+EVENTS = 8
 
 NEVER = 1e300
 """Gap of an event that cannot happen in the present mode."""
 SEATING_ANGLE = 1e-9
 """A boulder that would swing through less than this [rad] about its base is taken to have come to rest."""
-ROOT_TOLERANCE = 1e-13
+ROOT_TOLERANCE = 1e-11
 """Width of the bracket of a located event, as a fraction of the step."""
 ROOT_ITERATIONS = 60
+
+
+class GapFactors(NamedTuple):
+    """What the gaps of a mode are made of; all of them are constant while the mode lasts."""
+
+    contact: float
+    """Of the compression u."""
+    rotation_0: float
+    rotation_M: float
+    """Of |M|."""
+    rotation_theta: float
+    rotation_omega: float
+    couple_0: float
+    couple_M: float
+    couple_abs_M: float
+    couple_limit: float
+    """Of the limit of the restoring moment."""
+    corner_0: float
+    corner_theta: float
+    arm_0: float
+    arm: float
+    """Of the signed arm of the weight."""
+    top_0: float
+    top_abs: float
+    """Of the modulus of the displacement at the soil line."""
+    top: float
+    base_0: float
+    base_abs: float
+    base: float
+    limit: float
+    """Limit of rotation [rad]."""
 
 
 class Gaps(NamedTuple):
@@ -62,90 +96,133 @@ class Gaps(NamedTuple):
     couple: float
     corner: float
     arm: float
-    yielding: float
+    top: float
+    base: float
     limit: float
 
 
 @kernel
-def gaps_of(y: State, M: float, modes: Modes, c: Constants, theta_limit: float) -> Gaps:
-    """Gaps of all events at a state.
+def gap_factors(modes: Modes, c: Constants, theta_stop: float) -> GapFactors:
+    """Factors of the gaps in the present modes.
 
     Parameters
     ----------
-    y
-        The state.
-    M
-        Net moment of soil and truck there [N m].
     modes
         The present modes.
     c
         Constants of the design.
-    theta_limit
-        Limit of rotation [rad].
+    theta_stop
+        Rotation at which the simulation ends [rad].
     """
+    rotation_0 = rotation_M = rotation_theta = rotation_omega = 0.0
+    couple_0, couple_M, couple_abs_M, couple_limit = NEVER, 0.0, 0.0, 0.0
+    corner_0, corner_theta = NEVER, 0.0
+    arm_0, arm = NEVER, 0.0
+    turning = modes.turning
+    if turning == SEATED:
+        rotation_0, rotation_M = c.C_cos, -1.0
+    elif turning == TURNING_FORWARD:
+        rotation_theta = 1.0
+    elif turning == TURNING_BACK:
+        rotation_theta = -1.0
+    else:
+        corner_0, corner_theta = modes.corner * c.theta_corner, -modes.corner
+        if turning == FREE:
+            rotation_omega = -1.0
+        else:
+            rotation_omega = 1.0
+            arm_0, arm = 0.0, modes.arm
+            couple_0, couple_limit = 0.0, -1.0
+            if turning == HELD:
+                couple_abs_M, couple_limit = -1.0, 1.0
+            elif turning == LIMITED_FORWARD:
+                couple_M = 1.0
+            else:
+                couple_M = -1.0
+    top_0, top_abs = (c.x_yield, -1.0) if modes.yielded_top == 0 else (-c.x_yield, 0.0)
+    base_0, base_abs = (c.x_yield, -1.0) if modes.yielded_base == 0 else (-c.x_yield, 0.0)
+    return GapFactors(
+        1.0 if modes.touching else -1.0,
+        rotation_0,
+        rotation_M,
+        rotation_theta,
+        rotation_omega,
+        couple_0,
+        couple_M,
+        couple_abs_M,
+        couple_limit,
+        corner_0,
+        corner_theta,
+        arm_0,
+        arm,
+        top_0,
+        top_abs,
+        float(modes.yielded_top),
+        base_0,
+        base_abs,
+        float(modes.yielded_base),
+        theta_stop,
+    )
+
+
+@inlined
+def gaps_of(
+    A: float, slope_x: float, theta_b: float, omega_b: float, u: float, M: float, arm: float, g: GapFactors
+) -> Gaps:
+    """Gaps of all events.
+
+    Parameters
+    ----------
+    A, slope_x
+        Displacement of the soil at the soil line and its decrease down to the base [m].
+    theta_b, omega_b
+        Rotation [rad] and angular velocity [rad/s].
+    u
+        Compression of the vehicle's spring [m].
+    M
+        Net moment of soil and truck [N m].
+    arm
+        Signed arm of the weight, as of `signed_arm` [N m].
+    g
+        Factors of the present modes.
+    """
+    base = A - slope_x
+    return Gaps(
+        g.contact * u,
+        g.rotation_0 + g.rotation_M * abs(M) + g.rotation_theta * theta_b + g.rotation_omega * omega_b,
+        g.couple_0 + g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm),
+        g.corner_0 + g.corner_theta * theta_b,
+        g.arm_0 + g.arm * arm,
+        g.top_0 + g.top_abs * abs(A) + g.top * A,
+        g.base_0 + g.base_abs * abs(base) + g.base * base,
+        g.limit - abs(theta_b),
+    )
+
+
+@inlined
+def gaps_at(y: State, M: float, g: GapFactors, c: Constants) -> Gaps:
+    """Gaps of all events at a state with net moment M [N m]."""
     sin, versin = sine_versine(y.theta_b)
     u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
-    A = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c).A
-    turning = modes.turning
-    rotation = couple = arm = NEVER
-    if turning == SEATED:
-        rotation = c.C_cos - abs(M)
-    elif turning == TURNING_FORWARD:
-        rotation = y.theta_b
-    elif turning == TURNING_BACK:
-        rotation = -y.theta_b
-    elif turning == FREE:
-        rotation = -y.omega_b
-    else:
-        rotation = y.omega_b
-        limit = holding_moment(sin, versin, c)
-        arm = modes.arm * signed_arm(sin, versin, c)
-        if turning == HELD:
-            couple = limit - abs(M)
-        elif turning == LIMITED_FORWARD:
-            couple = M - limit
-        else:
-            couple = -M - limit
-    if modes.yielded == 0:
-        yielding = c.x_yield - abs(A)
-    else:
-        yielding = modes.yielded * A - c.x_yield
-    return Gaps(
-        u if modes.touching else -u,
-        rotation,
-        couple,
-        modes.corner * (c.theta_corner - y.theta_b),
-        arm,
-        yielding,
-        theta_limit - abs(y.theta_b),
-    )
+    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+    return gaps_of(k.A, k.slope_x, y.theta_b, y.omega_b, u, M, signed_arm(sin, versin, c), g)
 
 
 @kernel
 def gap_within(
-    event: int,
-    tau: float,
-    dense: DenseOutput,
-    modes: Modes,
-    switches: Switches,
-    c: Constants,
-    theta_limit: float,
+    event: int, tau: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
 ) -> float:
     """Gap of one event at the fraction tau of a step."""
     y = state_at(dense, tau)
-    M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c).M
-    return gaps_of(y, M, modes, c, theta_limit)[event]
+    M = 0.0
+    if event == COUPLE or (event == ROTATION and g.rotation_M != 0.0):
+        M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c).M
+    return gaps_at(y, M, g, c)[event]
 
 
 @kernel
 def locate(
-    event: int,
-    gap_end: float,
-    dense: DenseOutput,
-    modes: Modes,
-    switches: Switches,
-    c: Constants,
-    theta_limit: float,
+    event: int, gap_end: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
 ) -> float:
     """Fraction of a step at which a gap that is negative at its end passes zero.
 
@@ -155,7 +232,7 @@ def locate(
         Which gap.
     gap_end
         Its value at the end of the step, negative.
-    dense, modes, switches, c, theta_limit
+    dense, g, switches, c
         The step.
 
     Returns
@@ -165,14 +242,14 @@ def locate(
         rounding counts as crossed at once: the step still moves on, and the mode that follows settles it.
     """
     low, high = 0.0, 1.0
-    gap_low = gap_within(event, low, dense, modes, switches, c, theta_limit)
+    gap_low = gap_within(event, low, dense, g, switches, c)
     if gap_low <= 0.0:
         for start in (1e-3, 1e-6):
             low = start
-            gap_low = gap_within(event, low, dense, modes, switches, c, theta_limit)
+            gap_low = gap_within(event, low, dense, g, switches, c)
             if gap_low > 0.0:
                 break
-        else:
+        if gap_low <= 0.0:
             return low
     gap_high = gap_end
     # Illinois: regula falsi that halves the value at an end which stays, so that neither end stalls.
@@ -182,21 +259,23 @@ def locate(
         tau = high - gap_high * (high - low) / (gap_high - gap_low)
         if not low < tau < high:
             tau = 0.5 * (low + high)
-        gap = gap_within(event, tau, dense, modes, switches, c, theta_limit)
-        if gap == 0.0:
-            return tau
+        gap = gap_within(event, tau, dense, g, switches, c)
         if gap > 0.0:
             low, gap_low = tau, gap
             gap_high *= 0.5
         else:
+            # Newton-like convergence from one side leaves the other end far away: a tiny gap is a root, too.
+            step_left = high - tau
             high, gap_high = tau, gap
             gap_low *= 0.5
+            if gap == 0.0 or step_left <= ROOT_TOLERANCE:
+                break
     return high
 
 
 @kernel
 def first_event(
-    end: Gaps, dense: DenseOutput, modes: Modes, switches: Switches, c: Constants, theta_limit: float
+    end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
 ) -> tuple[int, float]:
     """Earliest event of a step, and the fraction of the step at which it happens.
 
@@ -204,7 +283,7 @@ def first_event(
     ----------
     end
         Gaps at the end of the step.
-    dense, modes, switches, c, theta_limit
+    dense, g, switches, c
         The step.
 
     Returns
@@ -215,7 +294,7 @@ def first_event(
     first, earliest = -1, 1.0
     for event in range(EVENTS):
         if end[event] < 0.0:
-            tau = locate(event, end[event], dense, modes, switches, c, theta_limit)
+            tau = locate(event, end[event], dense, g, switches, c)
             if first < 0 or tau < earliest:
                 first, earliest = event, tau
     return first, earliest
@@ -243,7 +322,15 @@ def initial_modes(readings: Readings, c: Constants) -> Modes:
         turning = SEATED
     else:
         turning = HELD if c.h >= 0.0 else FREE
-    return Modes(turning, True, 1.0, 1.0, 0)
+    return Modes(turning, True, 1.0, 1.0, 0, 0)
+
+
+@kernel
+def crossed_yield(yielded: int, displacement: float) -> int:
+    """Mode of the soil after it passed its yield displacement one way or the other."""
+    if yielded != 0:
+        return 0
+    return 1 if displacement > 0.0 else -1
 
 
 @kernel
@@ -263,8 +350,9 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
     c
         Constants of the design.
     """
-    turning, touching, yielded = modes.turning, modes.touching, modes.yielded
+    turning, touching = modes.turning, modes.touching
     corner, arm = modes.corner, modes.arm
+    top, base = modes.yielded_top, modes.yielded_base
     theta_b, omega_b = y.theta_b, y.omega_b
     sin, versin = sine_versine(theta_b)
     if event == CONTACT:
@@ -290,10 +378,10 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
         corner = -corner
     elif event == ARM:
         arm = -arm
-    elif event == YIELD:
-        if yielded == 0:
-            A = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c).A
-            yielded = 1 if A > 0.0 else -1
+    elif event == YIELD_TOP or event == YIELD_BASE:
+        k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+        if event == YIELD_TOP:
+            top = crossed_yield(top, k.A)
         else:
-            yielded = 0
-    return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(turning, touching, corner, arm, yielded)
+            base = crossed_yield(base, k.A - k.slope_x)
+    return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(turning, touching, corner, arm, top, base)

@@ -12,7 +12,7 @@ from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import DenseOutput, dense_output, state_at, step
 from .dynamics import Acceleration, State, acceleration
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import LIMIT, change_mode, first_event, gaps_of, initial_modes, locate
+from .events import LIMIT, change_mode, first_event, gap_factors, gaps_at, initial_modes, locate
 from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, Outcome, Status, no_maxima, undefined_maxima, updated_maxima
 from .readings import Readings
@@ -162,8 +162,10 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
         return failed(Status.STEP_BUDGET.value)
 
     y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
+    theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
     modes = initial_modes(readings, c)
     switches = switches_of(modes, readings, c)
+    factors = gap_factors(modes, c, theta_stop)
     k1 = rate_of(y, switches, c)
     m = no_maxima()
     exchanged = nothing_exchanged()
@@ -171,7 +173,6 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     written = 0
     t, t_limit = 0.0, np.nan
     attempts = 0
-    theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
     while t < control.horizon:
         attempts += 1
         if attempts > budget:
@@ -182,13 +183,13 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
         if not is_finite(y_end):
             return failed(Status.UNSTABLE.value)
         dense = dense_output(y, h, stages)
-        gaps = gaps_of(y_end, stages.k7.M, modes, c, theta_stop)
-        event, tau = first_event(gaps, dense, modes, switches, c, theta_stop)
+        event, tau = first_event(gaps_at(y_end, stages.k7.M, factors, c), dense, factors, switches, c)
         if event >= 0:
             y_end = state_at(dense, tau)
         if np.isnan(t_limit) and abs(y_end.theta_b) >= control.theta_limit and not control.stop_at_limit:
+            at_limit = gap_factors(modes, c, control.theta_limit)
             gap = control.theta_limit - abs(y_end.theta_b)
-            t_limit = t + h * min(tau, locate(LIMIT, gap, dense, modes, switches, c, control.theta_limit))
+            t_limit = t + h * min(tau, locate(LIMIT, gap, dense, at_limit, switches, c))
         m = updated_maxima(m, t, h, tau, y_end, dense, switches, c)
         if recording:
             written = write_samples(record, written, t, h, tau, dense, modes, switches, c, exchanged)
@@ -201,9 +202,9 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
             return Outcome(Status.LIMIT.value, m, t_limit, t, attempts)
         y = y_end
         if event >= 0:
-            M = rate_of(y, switches, c).M
-            y, modes = change_mode(event, y, M, modes, c)
+            y, modes = change_mode(event, y, rate_of(y, switches, c).M, modes, c)
             switches = switches_of(modes, readings, c)
+            factors = gap_factors(modes, c, theta_stop)
             k1 = rate_of(y, switches, c)
         else:
             k1 = stages.k7

@@ -48,8 +48,10 @@ class Modes(NamedTuple):
     """Printed reading: sign of sin(gamma_N + theta_b) (Eqs 37, 39); 1 otherwise."""
     arm: float
     """Printed reading: sign of -cos(gamma_N + theta_b), whose modulus Eq 37 is limited by; 1 otherwise."""
-    yielded: int
+    yielded_top: int
     """Soil at the soil line: 0 below its ultimate resistance, 1 at it forwards, -1 backwards."""
+    yielded_base: int
+    """The same at the base of the boulder."""
 
 
 class Switches(NamedTuple):

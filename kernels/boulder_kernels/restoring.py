@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from ._jit import kernel
+from ._jit import inlined, kernel
 from .design import Constants
 from .modes import Switches
 
 
-@kernel
+@inlined
 def couple_moment(sin: float, versin: float, switches: Switches, c: Constants) -> float:
     """Moment of the couple of the weight in the present mode, b (C_cos cos + w sin) [N m].
 
@@ -20,13 +20,13 @@ def couple_moment(sin: float, versin: float, switches: Switches, c: Constants) -
     return switches.couple * (c.C_cos - c.C_cos * versin + switches.couple_sin * sin)
 
 
-@kernel
+@inlined
 def signed_arm(sin: float, versin: float, c: Constants) -> float:
     """Printed reading: m_b g (d_N cos(theta) + l_n sin(theta)), the moment of Eq 37 before its modulus [N m]."""
     return c.C_cos - c.C_cos * versin + c.C_sin * sin
 
 
-@kernel
+@inlined
 def holding_moment(sin: float, versin: float, c: Constants) -> float:
     """Largest moment that the restoring moment can balance [N m] (Eq 37; seated: m_b g L/2).
 

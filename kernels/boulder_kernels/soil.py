@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ._jit import kernel, summing_kernel
+from ._jit import inlined, kernel, summing_kernel
 from .design import Constants
 
 TINY = 1e-30
@@ -54,7 +54,7 @@ class Kinematics(NamedTuple):
     """Increase of the lever over the whole depth, cos(theta) d [m]."""
 
 
-@kernel
+@inlined
 def soil_kinematics(
     x_b: float, v_b: float, omega_b: float, sin: float, versin: float, c: Constants
 ) -> Kinematics:
@@ -77,14 +77,14 @@ def soil_kinematics(
     )
 
 
-@kernel
+@inlined
 def spring_force(displacement: float, alpha: float, h_e: float, c: Constants) -> float:
     """Spring force F_k,n of an element of height h_e, limited to its ultimate resistance [N] (Eqs 21-28)."""
     limited = min(max(displacement, -c.x_yield), c.x_yield)
     return c.K_soil / (c.d * c.d) * h_e * alpha * limited
 
 
-@kernel
+@inlined
 def drag_force(velocity: float, h_e: float, c: Constants) -> float:
     """Drag F_c,n of an element of height h_e [N] (Eqs 34, 36; c_n of Eq 33 is rho_s W h_e)."""
     return c.R_soil / c.d * h_e * velocity * abs(velocity)
@@ -115,7 +115,7 @@ def element_sums(k: Kinematics, c: Constants) -> Reaction:
     return Reaction(F, M)
 
 
-@kernel
+@inlined
 def closed_form(k: Kinematics, c: Constants) -> Reaction:
     """Integrate force and moment over the depth exactly: the limit N -> infinity of `element_sums`.
 
@@ -164,7 +164,7 @@ def closed_form(k: Kinematics, c: Constants) -> Reaction:
     return Reaction(-pressed, k.lever_d * pressed_r + k.q * pressed)
 
 
-@kernel
+@inlined
 def soil_reaction(k: Kinematics, c: Constants) -> Reaction:
     """Force and moment of the soil: element sums where the design asks for N, else the closed form."""
     if c.elements > 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import kernel
+from ._jit import inlined
 
 
 class SineVersine(NamedTuple):
@@ -14,7 +14,7 @@ class SineVersine(NamedTuple):
     versin: float
 
 
-@kernel
+@inlined
 def sine_versine(theta: float) -> SineVersine:
     """Sine and versine of an angle by polynomials of its half.
 

@@ -12,11 +12,11 @@ itself, and after a separation contact resumes from zero force exactly when u re
 
 from __future__ import annotations
 
-from ._jit import kernel
+from ._jit import inlined
 from .design import Constants
 
 
-@kernel
+@inlined
 def contact_lever(sin: float, versin: float, c: Constants) -> float:
     """Lever of the contact force about the centre of mass, R_v cos(gamma_v + theta) [m] (Eqs 5, 6, 48).
 
@@ -26,25 +26,25 @@ def contact_lever(sin: float, versin: float, c: Constants) -> float:
     return c.h - c.h * versin + c.g_x * sin
 
 
-@kernel
+@inlined
 def contact_displacement(x_b: float, sin: float, versin: float, c: Constants) -> float:
     """Displacement x_c of the contact point on the boulder [m]: x_b plus the integral of the lever over theta."""
     return x_b + c.h * sin + c.g_x * versin
 
 
-@kernel
+@inlined
 def spring_compression(x_v: float, v_v: float, x_c: float, c: Constants) -> float:
     """Compression u of the vehicle's spring [m]; below zero the truck has come off (Eq 45, integrated)."""
     return x_v - x_c - c.tau_v * (c.v_0 - v_v)
 
 
-@kernel
+@inlined
 def contact_force(u: float, c: Constants) -> float:
     """Force F_v of the truck on the boulder while they touch [N] (Eqs 41, 46, 47)."""
     return c.k_v * u
 
 
-@kernel
+@inlined
 def vehicle_jerk(v_v: float, a_v: float, v_c: float, k_v: float, c_v: float, m_v: float) -> float:
     """Third derivative of x_v [m/s^3] as Eq 45 has it; the motion itself uses its integral, see above.
 
