@@ -1,4 +1,4 @@
-"""One step of Dormand and Prince's method, and its dense output."""
+"""One step of Dormand and Prince's method."""
 
 from __future__ import annotations
 
@@ -8,19 +8,7 @@ from ._jit import inlined
 from .design import Constants
 from .dynamics import Acceleration, State, acceleration
 from .modes import Switches
-from .tableau import AA, A, C, P, PA
-
-
-class Stages(NamedTuple):
-    """The accelerations of the seven stages; the last belongs to the end of the step."""
-
-    k1: Acceleration
-    k2: Acceleration
-    k3: Acceleration
-    k4: Acceleration
-    k5: Acceleration
-    k6: Acceleration
-    k7: Acceleration
+from .tableau import AA, A, C
 
 
 class Point(NamedTuple):
@@ -82,7 +70,7 @@ def stage_7(x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: f
 
 
 @inlined
-def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tuple[State, Stages]:
+def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tuple[State, Acceleration]:
     """Advance the state by one step with the modes frozen.
 
     Parameters
@@ -102,8 +90,8 @@ def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tup
     -------
     State
         State at the end, of fifth order.
-    Stages
-        Accelerations of the stages, for `dense_output`; the last is that at the end.
+    Acceleration
+        Acceleration there, which the next step starts with.
     """
     b = stage_2(y.x_b, y.v_b, h, k1.a_b)
     r = stage_2(y.theta_b, y.omega_b, h, k1.alpha_b)
@@ -129,98 +117,4 @@ def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tup
     r = stage_7(y.theta_b, y.omega_b, h, k1.alpha_b, k3.alpha_b, k4.alpha_b, k5.alpha_b, k6.alpha_b)
     t = stage_7(y.x_v, y.v_v, h, k1.a_v, k3.a_v, k4.a_v, k5.a_v, k6.a_v)
     k7 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    return State(b.x, b.v, r.x, r.v, t.x, t.v), Stages(k1, k2, k3, k4, k5, k6, k7)
-
-
-class Track(NamedTuple):
-    """One degree of freedom within a step, as polynomials of tau = 0 ... 1."""
-
-    x: float
-    """Displacement at the start."""
-    hv: float
-    """Step times velocity at the start."""
-    x2: float
-    x3: float
-    x4: float
-    v: float
-    """Velocity at the start."""
-    v1: float
-    v2: float
-    v3: float
-    v4: float
-
-
-@inlined
-def track(
-    x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: float, a6: float, a7: float
-) -> Track:
-    """Coefficients of the dense output of one degree of freedom from its accelerations.
-
-    Displacement and velocity have the continuous extension of order four, which meets the step at both ends.
-    """
-    hh = h * h
-    return Track(
-        x,
-        h * v,
-        hh * (PA[0][1] * a1 + PA[2][1] * a3 + PA[3][1] * a4 + PA[4][1] * a5 + PA[5][1] * a6),
-        hh * (PA[0][2] * a1 + PA[2][2] * a3 + PA[3][2] * a4 + PA[4][2] * a5 + PA[5][2] * a6),
-        hh * (PA[0][3] * a1 + PA[2][3] * a3 + PA[3][3] * a4 + PA[4][3] * a5 + PA[5][3] * a6),
-        v,
-        h * a1,
-        h * (P[0][1] * a1 + P[2][1] * a3 + P[3][1] * a4 + P[4][1] * a5 + P[5][1] * a6 + P[6][1] * a7),
-        h * (P[0][2] * a1 + P[2][2] * a3 + P[3][2] * a4 + P[4][2] * a5 + P[5][2] * a6 + P[6][2] * a7),
-        h * (P[0][3] * a1 + P[2][3] * a3 + P[3][3] * a4 + P[4][3] * a5 + P[5][3] * a6 + P[6][3] * a7),
-    )
-
-
-@inlined
-def displacement_at(q: Track, tau: float) -> float:
-    """Displacement of a track at the fraction tau of its step."""
-    return q.x + tau * (q.hv + tau * (q.x2 + tau * (q.x3 + tau * q.x4)))
-
-
-@inlined
-def velocity_at(q: Track, tau: float) -> float:
-    """Velocity of a track at the fraction tau of its step."""
-    return q.v + tau * (q.v1 + tau * (q.v2 + tau * (q.v3 + tau * q.v4)))
-
-
-class DenseOutput(NamedTuple):
-    """The three degrees of freedom within a step."""
-
-    boulder: Track
-    rotation: Track
-    truck: Track
-
-
-@inlined
-def dense_output(y: State, h: float, k: Stages) -> DenseOutput:
-    """Dense output of a step from its start, its length [s] and the accelerations of its stages."""
-    return DenseOutput(
-        track(y.x_b, y.v_b, h, k.k1.a_b, k.k3.a_b, k.k4.a_b, k.k5.a_b, k.k6.a_b, k.k7.a_b),
-        track(
-            y.theta_b,
-            y.omega_b,
-            h,
-            k.k1.alpha_b,
-            k.k3.alpha_b,
-            k.k4.alpha_b,
-            k.k5.alpha_b,
-            k.k6.alpha_b,
-            k.k7.alpha_b,
-        ),
-        track(y.x_v, y.v_v, h, k.k1.a_v, k.k3.a_v, k.k4.a_v, k.k5.a_v, k.k6.a_v, k.k7.a_v),
-    )
-
-
-@inlined
-def state_at(dense: DenseOutput, tau: float) -> State:
-    """State at the fraction tau of a step, of order four."""
-    return State(
-        displacement_at(dense.boulder, tau),
-        velocity_at(dense.boulder, tau),
-        displacement_at(dense.rotation, tau),
-        velocity_at(dense.rotation, tau),
-        displacement_at(dense.truck, tau),
-        velocity_at(dense.truck, tau),
-    )
+    return State(b.x, b.v, r.x, r.v, t.x, t.v), k7

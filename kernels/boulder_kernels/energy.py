@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ._jit import kernel
+from .dense_output import DenseOutput, state_at
 from .design import Constants
-from .dormand_prince import DenseOutput, state_at
 from .dynamics import State, acceleration
 from .modes import Modes, Switches
 from .soil import Kinematics, soil_energy, soil_kinematics, soil_reaction

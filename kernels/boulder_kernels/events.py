@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ._jit import inlined, kernel
+from .dense_output import DenseOutput, displacement_at, state_at
 from .design import Constants
-from .dormand_prince import DenseOutput, state_at
 from .dynamics import State, acceleration
 from .modes import (
     FREE,
@@ -52,8 +52,10 @@ NEVER = 1e300
 """Gap of an event that cannot happen in the present mode."""
 SEATING_ANGLE = 1e-9
 """A boulder that would swing through less than this [rad] about its base is taken to have come to rest."""
-ROOT_TOLERANCE = 1e-11
-"""Width of the bracket of a located event, as a fraction of the step."""
+JUMP_TOLERANCE = 1e-11
+"""Precision of a located jump of the forces, or of the limit, as a fraction of the step."""
+KINK_TOLERANCE = 1e-6
+"""The same for a kink: forces are continuous there, so the error goes with its square."""
 ROOT_ITERATIONS = 60
 
 
@@ -213,6 +215,8 @@ def gap_within(
     event: int, tau: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
 ) -> float:
     """Gap of one event at the fraction tau of a step."""
+    if event == LIMIT:
+        return g.limit - abs(displacement_at(dense.rotation, tau))
     y = state_at(dense, tau)
     M = 0.0
     if event == COUPLE or (event == ROTATION and g.rotation_M != 0.0):
@@ -238,8 +242,8 @@ def locate(
     Returns
     -------
     float
-        tau in (0, 1], from the side on which the event has happened. A gap that starts at zero and opens only by
-        rounding counts as crossed at once: the step still moves on, and the mode that follows settles it.
+        tau in (0, 1]. A gap that starts at zero and opens only by rounding counts as crossed at once: the step still
+        moves on, and the mode that follows settles it.
     """
     low, high = 0.0, 1.0
     gap_low = gap_within(event, low, dense, g, switches, c)
@@ -252,10 +256,12 @@ def locate(
         if gap_low <= 0.0:
             return low
     gap_high = gap_end
+    exact = event == LIMIT or event == CORNER or (event == ROTATION and g.rotation_M == 0.0)
+    tolerance = JUMP_TOLERANCE if exact else KINK_TOLERANCE
+    tau = high
     # Illinois: regula falsi that halves the value at an end which stays, so that neither end stalls.
     for _ in range(ROOT_ITERATIONS):
-        if high - low <= ROOT_TOLERANCE:
-            break
+        before = tau
         tau = high - gap_high * (high - low) / (gap_high - gap_low)
         if not low < tau < high:
             tau = 0.5 * (low + high)
@@ -264,13 +270,11 @@ def locate(
             low, gap_low = tau, gap
             gap_high *= 0.5
         else:
-            # Newton-like convergence from one side leaves the other end far away: a tiny gap is a root, too.
-            step_left = high - tau
             high, gap_high = tau, gap
             gap_low *= 0.5
-            if gap == 0.0 or step_left <= ROOT_TOLERANCE:
-                break
-    return high
+        if abs(tau - before) <= tolerance or gap == 0.0:
+            break
+    return tau
 
 
 @kernel

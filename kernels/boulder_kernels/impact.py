@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
+from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, constants_of, is_computable
-from .dormand_prince import DenseOutput, dense_output, state_at, step
+from .dormand_prince import step
 from .dynamics import Acceleration, State, acceleration
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import LIMIT, change_mode, first_event, gap_factors, gaps_at, initial_modes, locate
+from .events import LIMIT, GapFactors, change_mode, first_event, gap_factors, gaps_at, initial_modes, locate
 from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, Outcome, Status, no_maxima, undefined_maxima, updated_maxima
 from .readings import Readings
@@ -23,6 +24,8 @@ FULL_TURN = math.pi
 ATTEMPTS_PER_STEP = 4
 ATTEMPTS_SPARE = 20_000
 """A simulation gives up after so many attempts per nominal step, and these to spare for events."""
+MOST_ATTEMPTS = 2_000_000
+"""A design that may need more is refused before it starts."""
 
 
 class Control(NamedTuple):
@@ -126,6 +129,58 @@ def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
 
 
 @kernel
+def attempt_budget(h: float, horizon: float) -> float:
+    """Steps after which a simulation gives up: those to the horizon [s] by steps h [s], and spare for events."""
+    return ATTEMPTS_PER_STEP * horizon / h + ATTEMPTS_SPARE
+
+
+@kernel
+def keep_up_to_event(
+    t: float,
+    h: float,
+    y_end: State,
+    M_end: float,
+    dense: DenseOutput,
+    factors: GapFactors,
+    switches: Switches,
+    m: Maxima,
+    c: Constants,
+) -> tuple[int, float, State, Maxima]:
+    """Keep a step up to its first event.
+
+    Parameters
+    ----------
+    t, h
+        Start [s] and length [s] of the step.
+    y_end, M_end
+        State and net moment [N m] at its end.
+    dense, factors, switches, c
+        The step.
+    m
+        Maxima before it.
+
+    Returns
+    -------
+    event, tau, y, m
+        The event or -1, the fraction of the step that is kept, the state there, and the maxima up to there.
+    """
+    event, tau = first_event(gaps_at(y_end, M_end, factors, c), dense, factors, switches, c)
+    if event >= 0:
+        y_end = state_at(dense, tau)
+    return event, tau, y_end, updated_maxima(m, t, h, tau, y_end, dense, switches, c)
+
+
+@kernel
+def cross_event(
+    event: int, y: State, modes: Modes, switches: Switches, readings: Readings, theta_stop: float, c: Constants
+) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
+    """Go over into the modes that follow an event: state, modes, their factors, and the acceleration to start with."""
+    y, modes = change_mode(event, y, rate_of(y, switches, c).M, modes, c)
+    switches = switches_of(modes, readings, c)
+    return y, modes, switches, gap_factors(modes, c, theta_stop), rate_of(y, switches, c)
+
+
+@kernel
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact by fixed steps, each cut where a mode changes.
 
@@ -157,8 +212,8 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     if not is_computable(c):
         return failed(Status.INVALID.value)
     h_full = shortened_step(control.h, c)
-    budget = ATTEMPTS_PER_STEP * control.horizon / h_full + ATTEMPTS_SPARE
-    if not budget <= 100 * ATTEMPTS_SPARE:
+    budget = attempt_budget(h_full, control.horizon)
+    if not budget <= MOST_ATTEMPTS:
         return failed(Status.STEP_BUDGET.value)
 
     y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
@@ -179,18 +234,15 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
             return failed(Status.STEP_BUDGET.value)
         h = min(h_full, control.horizon - t)
         last = h >= control.horizon - t
-        y_end, stages = step(y, k1, h, switches, c)
+        y_end, k_end = step(y, k1, h, switches, c)
         if not is_finite(y_end):
             return failed(Status.UNSTABLE.value)
-        dense = dense_output(y, h, stages)
-        event, tau = first_event(gaps_at(y_end, stages.k7.M, factors, c), dense, factors, switches, c)
-        if event >= 0:
-            y_end = state_at(dense, tau)
+        dense = dense_output(y, k1, y_end, k_end, h)
+        event, tau, y_end, m = keep_up_to_event(t, h, y_end, k_end.M, dense, factors, switches, m, c)
         if np.isnan(t_limit) and abs(y_end.theta_b) >= control.theta_limit and not control.stop_at_limit:
             at_limit = gap_factors(modes, c, control.theta_limit)
             gap = control.theta_limit - abs(y_end.theta_b)
             t_limit = t + h * min(tau, locate(LIMIT, gap, dense, at_limit, switches, c))
-        m = updated_maxima(m, t, h, tau, y_end, dense, switches, c)
         if recording:
             written = write_samples(record, written, t, h, tau, dense, modes, switches, c, exchanged)
             exchanged = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
@@ -202,10 +254,7 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
             return Outcome(Status.LIMIT.value, m, t_limit, t, attempts)
         y = y_end
         if event >= 0:
-            y, modes = change_mode(event, y, rate_of(y, switches, c).M, modes, c)
-            switches = switches_of(modes, readings, c)
-            factors = gap_factors(modes, c, theta_stop)
-            k1 = rate_of(y, switches, c)
+            y, modes, switches, factors, k1 = cross_event(event, y, modes, switches, readings, theta_stop, c)
         else:
-            k1 = stages.k7
+            k1 = k_end
     return Outcome(horizon_status(y, m), m, t_limit, t, attempts)

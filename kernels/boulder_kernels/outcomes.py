@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
+from .dense_output import DenseOutput, Track, displacement_at, slope_at, state_at
 from .design import Constants
-from .dormand_prince import DenseOutput, Track, displacement_at, state_at, velocity_at
 from .dynamics import State
 from .modes import Switches
 from .trigonometry import sine_versine
@@ -102,23 +102,29 @@ def undefined_maxima() -> Maxima:
     return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
+PEAK_TOLERANCE = 1e-6
+"""Width of the bracket of a peak as a fraction of the step; the peak value is off by its square only."""
+
+
 @kernel
 def turning_point(q: Track, tau_end: float) -> float:
     """Fraction of a step at which a velocity that changes its sign before tau_end is zero (Illinois)."""
     low, high = 0.0, tau_end
-    v_low, v_high = q.v, velocity_at(q, tau_end)
+    v_low, v_high = q.x1, slope_at(q, tau_end)
+    tau = high
     for _ in range(30):
+        before = tau
         tau = high - v_high * (high - low) / (v_high - v_low)
         if not low < tau < high:
             tau = 0.5 * (low + high)
-        v = velocity_at(q, tau)
+        v = slope_at(q, tau)
         if (v > 0.0) == (v_high > 0.0):
             high, v_high = tau, v
             v_low *= 0.5
         else:
             low, v_low = tau, v
             v_high *= 0.5
-        if high - low < 1e-9 or v == 0.0:
+        if abs(tau - before) < PEAK_TOLERANCE:
             break
     return tau
 
@@ -139,16 +145,34 @@ def force_at(y: State, s: Switches, c: Constants) -> float:
 
 
 @kernel
-def force_peak(dense: DenseOutput, tau_end: float, s: Switches, c: Constants) -> float:
-    """Fraction of a step at which the contact force peaks, known to lie before tau_end (bisection)."""
+def force_peak(dense: DenseOutput, tau_end: float, r: float, r_end: float, s: Switches, c: Constants) -> float:
+    """Fraction of a step at which the contact force peaks (Illinois).
+
+    Parameters
+    ----------
+    dense, s, c
+        The step.
+    tau_end
+        Fraction of the step before which the peak lies.
+    r, r_end
+        Rate of the compression at its start, positive, and at tau_end, negative [m/s].
+    """
     low, high = 0.0, tau_end
+    r_low, r_high = r, r_end
+    tau = high
     for _ in range(30):
-        tau = 0.5 * (low + high)
-        if compression_rate(state_at(dense, tau), s, c) > 0.0:
-            low = tau
+        before = tau
+        tau = high - r_high * (high - low) / (r_high - r_low)
+        rate = compression_rate(state_at(dense, tau), s, c)
+        if rate > 0.0:
+            low, r_low = tau, rate
+            r_high *= 0.5
         else:
-            high = tau
-    return high
+            high, r_high = tau, rate
+            r_low *= 0.5
+        if abs(tau - before) < PEAK_TOLERANCE:
+            break
+    return tau
 
 
 @kernel
@@ -180,19 +204,21 @@ def updated_maxima(
     """
     t_end = t + tau_end * h
     theta, t_theta = grown(m.theta, m.t_theta, abs(y_end.theta_b), t_end)
-    if dense.rotation.v * y_end.omega_b < 0.0:
+    if dense.rotation.x1 * y_end.omega_b < 0.0:
         tau = turning_point(dense.rotation, tau_end)
         theta, t_theta = grown(theta, t_theta, abs(displacement_at(dense.rotation, tau)), t + tau * h)
     x_b, t_x_b = grown(m.x_b, m.t_x_b, y_end.x_b, t_end)
-    if dense.boulder.v > 0.0 > y_end.v_b:
+    if dense.boulder.x1 > 0.0 > y_end.v_b:
         tau = turning_point(dense.boulder, tau_end)
         x_b, t_x_b = grown(x_b, t_x_b, displacement_at(dense.boulder, tau), t + tau * h)
     x_v, t_x_v = grown(m.x_v, m.t_x_v, y_end.x_v, t_end)
-    if dense.truck.v > 0.0 > y_end.v_v:
+    if dense.truck.x1 > 0.0 > y_end.v_v:
         tau = turning_point(dense.truck, tau_end)
         x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
     F_v, t_F_v = grown(m.F_v, m.t_F_v, force_at(y_end, s, c), t_end)
-    if compression_rate(state_at(dense, 0.0), s, c) > 0.0 > compression_rate(y_end, s, c):
-        tau = force_peak(dense, tau_end, s, c)
-        F_v, t_F_v = grown(F_v, t_F_v, force_at(state_at(dense, tau), s, c), t + tau * h)
+    if s.k_contact > 0.0:
+        r, r_end = compression_rate(state_at(dense, 0.0), s, c), compression_rate(y_end, s, c)
+        if r > 0.0 > r_end:
+            tau = force_peak(dense, tau_end, r, r_end, s, c)
+            F_v, t_F_v = grown(F_v, t_F_v, force_at(state_at(dense, tau), s, c), t + tau * h)
     return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .design import Design, DesignTable, design_at
+from .design import DesignTable, design_at
 from .impact import Control, no_record, simulate_design
+from .lanes import simulate_lanes
 from .outcomes import Outcome, OutcomeTable, Status
 from .readings import Readings
 
@@ -40,25 +41,41 @@ def write_outcome(out: OutcomeTable, row: int, o: Outcome) -> None:
 
 
 @kernel
-def write_error(out: OutcomeTable, row: int, coarse: Outcome, fine: Outcome) -> None:
-    """Estimate the numerical error of a row from two solutions, the finer of which is reported.
-
-    The difference of the two is nearly the error of the coarser, many times that of the finer. Where only one of them
-    reached the limit of rotation, or failed, there is no estimate that could be trusted: the error is infinite.
-    """
-    if coarse.status != fine.status and Status.LIMIT.value in (coarse.status, fine.status):
-        out.theta_error[row] = np.inf
-        out.x_error[row] = np.inf
-        return
-    a, b = coarse.maxima, fine.maxima
-    out.theta_error[row] = abs(a.theta - b.theta)
-    out.x_error[row] = max(abs(a.x_b - b.x_b), abs(a.x_v - b.x_v))
+def simulate_rows(table: DesignTable, readings: Readings, control: Control, out: OutcomeTable) -> None:
+    """Simulate the designs of a table one by one, with any representation of the soil."""
+    for row in range(table.L.size):
+        write_outcome(out, row, simulate_design(design_at(table, row), readings, control, no_record()))
 
 
 @kernel
-def simulate_one(design: Design, readings: Readings, control: Control) -> Outcome:
-    """Simulate one design without a time history."""
-    return simulate_design(design, readings, control, no_record())
+def simulate_once(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+    """Simulate every design of a table once: in lanes where they can be, else one by one."""
+    out = empty_outcomes(table.L.size)
+    if control.elements == 0 and control.stop_at_limit:
+        simulate_lanes(table, readings, control, out)
+    else:
+        simulate_rows(table, readings, control, out)
+    return out
+
+
+@kernel
+def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable) -> None:
+    """Estimate the numerical errors of a table from a coarser solution of it.
+
+    The difference of two solutions is nearly the error of the coarser, many times that of the finer. Where only one of
+    them reached the limit of rotation, or failed, no estimate could be trusted: the error is infinite.
+    """
+    for row in range(fine.status.size):
+        if np.isnan(fine.theta_max[row]):
+            continue
+        limit = Status.LIMIT.value
+        if np.isnan(coarse.theta_max[row]) or (coarse.status[row] == limit) != (fine.status[row] == limit):
+            fine.theta_error[row] = fine.x_error[row] = np.inf
+            continue
+        fine.theta_error[row] = abs(coarse.theta_max[row] - fine.theta_max[row])
+        fine.x_error[row] = max(
+            abs(coarse.x_b_max[row] - fine.x_b_max[row]), abs(coarse.x_v_max[row] - fine.x_v_max[row])
+        )
 
 
 @kernel
@@ -80,8 +97,9 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
     OutcomeTable
         Arrays of shape (n,), in the order of the designs.
     """
-    n = table.L.size
-    out = empty_outcomes(n)
+    out = simulate_once(table, readings, control)
+    if not control.error_estimate:
+        return out
     half = Control(
         0.5 * control.h,
         control.horizon,
@@ -90,12 +108,6 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
         control.error_estimate,
         control.stop_at_limit,
     )
-    for row in range(n):
-        design = design_at(table, row)
-        outcome = simulate_one(design, readings, control)
-        if control.error_estimate and outcome.maxima.theta >= 0.0:
-            fine = simulate_one(design, readings, half)
-            write_error(out, row, outcome, fine)
-            outcome = fine
-        write_outcome(out, row, outcome)
-    return out
+    fine = simulate_once(table, readings, half)
+    estimate_errors(out, fine)
+    return fine

@@ -1,0 +1,318 @@
+"""Many designs side by side, one in each lane of the vector registers.
+
+Every lane has its own clock. One attempt advances all of them by a step (`attempt_steps`), and a second loop looks
+at what came out (`take_over_steps`): most steps meet no event and set no peak, and are taken over at once. The few that need more are
+attended to one by one with the functions of the single impact, and a lane whose design has come to its end gets the next
+one. No lane waits for another, and each gives the bits that the single impact gives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._jit import kernel
+from .dense_output import dense_output
+from .design import DesignTable, constants_of, design_at, is_computable
+from .dormand_prince import step
+from .dynamics import Acceleration, State
+from .events import LIMIT, GapFactors, gap_factors, gaps_of, initial_modes
+from .impact import (
+    MOST_ATTEMPTS,
+    Control,
+    attempt_budget,
+    cross_event,
+    horizon_status,
+    is_finite,
+    keep_up_to_event,
+    rate_of,
+)
+from .modes import Modes, Switches, switches_of
+from .outcomes import Maxima, OutcomeTable, Status, compression_rate, no_maxima
+from .readings import Readings
+from .restoring import signed_arm
+from .soil import soil_kinematics
+from .stability import shortened_step
+from .trigonometry import sine_versine
+from .vehicle import contact_displacement, contact_lever, spring_compression
+from .workspace import (
+    ATTEMPTS,
+    ATTENTION,
+    LANES,
+    MAXIMA,
+    RATE,
+    SIZE,
+    STEP,
+    STEP_FULL,
+    TIME,
+    field,
+    load_constants,
+    load_end,
+    load_end_state,
+    load_factors,
+    load_maxima,
+    load_modes,
+    load_start,
+    load_state,
+    load_switches,
+    put,
+    store_constants,
+    store_end,
+    store_end_state,
+    store_factors,
+    store_maxima,
+    store_modes,
+    store_start,
+    store_state,
+    store_switches,
+)
+
+EMPTY = -1
+"""Row of a lane that holds no design."""
+RUNNING = -1
+"""Status of a design that has not come to its end."""
+
+
+@kernel
+def attempt_steps(ws: np.ndarray) -> None:
+    """Advance every lane by its step, in one vectorised loop."""
+    for lane in range(LANES):
+        y_end, k_end = step(
+            load_state(ws, lane),
+            load_start(ws, lane),
+            field(ws, STEP, 0, lane),
+            load_switches(ws, lane),
+            load_constants(ws, lane),
+        )
+        store_end_state(ws, lane, y_end)
+        store_end(ws, lane, k_end)
+
+
+@kernel
+def take_over_steps(ws: np.ndarray, horizon: float) -> None:
+    """Take over the steps that meet no event, set no peak inside and do not reach the horizon [s]; mark the others."""
+    for lane in range(LANES):
+        c = load_constants(ws, lane)
+        s = load_switches(ws, lane)
+        y, y_end = load_state(ws, lane), load_end_state(ws, lane)
+        k_end = load_end(ws, lane)
+        sin, versin = sine_versine(y_end.theta_b)
+        u = spring_compression(y_end.x_v, y_end.v_v, contact_displacement(y_end.x_b, sin, versin, c), c)
+        rate = y_end.v_v - y_end.v_b - y_end.omega_b * contact_lever(sin, versin, c) - c.tau_v * s.k_truck * u
+        k = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
+        gaps = gaps_of(
+            k.A,
+            k.slope_x,
+            y_end.theta_b,
+            y_end.omega_b,
+            u,
+            k_end.M,
+            signed_arm(sin, versin, c),
+            load_factors(ws, lane),
+        )
+        t, h = field(ws, TIME, 0, lane), field(ws, STEP, 0, lane)
+        # A comparison with NaN is false, so a state that is not a number is marked, too.
+        plain = (
+            (gaps.contact >= 0.0)
+            & (gaps.rotation >= 0.0)
+            & (gaps.couple >= 0.0)
+            & (gaps.corner >= 0.0)
+            & (gaps.arm >= 0.0)
+            & (gaps.top >= 0.0)
+            & (gaps.base >= 0.0)
+            & (gaps.limit >= 0.0)
+            & (y.omega_b * y_end.omega_b >= 0.0)
+            & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
+            & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
+            & ((field(ws, RATE, 0, lane) <= 0.0) | (rate >= 0.0))
+            & (h < horizon - t)
+        )
+        F_v = s.k_contact * u
+        t_next = t + h
+        put(ws, ATTENTION, 0, lane, 0.0 if plain else 1.0)
+        put(ws, ATTEMPTS, 0, lane, field(ws, ATTEMPTS, 0, lane) + 1.0)
+        if plain:
+            store_state(ws, lane, y_end)
+            store_start(ws, lane, k_end)
+            put(ws, RATE, 0, lane, rate)
+            put(ws, TIME, 0, lane, t_next)
+            put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t_next))
+            put(ws, MAXIMA, 0, lane, max(field(ws, MAXIMA, 0, lane), abs(y_end.theta_b)))
+            put(ws, MAXIMA, 1, lane, max(field(ws, MAXIMA, 1, lane), y_end.x_b))
+            put(ws, MAXIMA, 2, lane, max(field(ws, MAXIMA, 2, lane), y_end.x_v))
+            put(ws, MAXIMA, 3, lane, max(field(ws, MAXIMA, 3, lane), F_v))
+
+
+@kernel
+def start_lane(
+    ws: np.ndarray, lane: int, table: DesignTable, row: int, readings: Readings, control: Control
+) -> int:
+    """Put a design into a lane.
+
+    Returns
+    -------
+    int
+        -1, or the status of a design that needs no integration or allows none.
+    """
+    design = design_at(table, row)
+    if design.H - design.d <= design.e_bumper:
+        return Status.NO_CONTACT.value
+    c = constants_of(design, readings, 0)
+    if not is_computable(c):
+        return Status.INVALID.value
+    h_full = shortened_step(control.h, c)
+    if not attempt_budget(h_full, control.horizon) <= MOST_ATTEMPTS:
+        return Status.STEP_BUDGET.value
+    y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
+    modes = initial_modes(readings, c)
+    switches = switches_of(modes, readings, c)
+    store_constants(ws, lane, c)
+    store_maxima(ws, lane, no_maxima())
+    put(ws, STEP_FULL, 0, lane, h_full)
+    put(ws, ATTEMPTS, 0, lane, 0.0)
+    factors = gap_factors(modes, c, control.theta_limit)
+    set_lane(ws, lane, 0.0, y, rate_of(y, switches, c), modes, switches, factors, control.horizon)
+    return RUNNING
+
+
+@kernel
+def set_lane(
+    ws: np.ndarray,
+    lane: int,
+    t: float,
+    y: State,
+    k1: Acceleration,
+    modes: Modes,
+    switches: Switches,
+    factors: GapFactors,
+    horizon: float,
+) -> None:
+    """Put the start of the next step into a lane."""
+    store_state(ws, lane, y)
+    store_start(ws, lane, k1)
+    store_modes(ws, lane, modes)
+    store_switches(ws, lane, switches)
+    store_factors(ws, lane, factors)
+    put(ws, TIME, 0, lane, t)
+    put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t))
+    put(ws, RATE, 0, lane, compression_rate(y, switches, load_constants(ws, lane)))
+
+
+@kernel
+def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> int:
+    """Take over a step that meets an event, sets a peak or reaches the end.
+
+    Returns
+    -------
+    int
+        -1, or the status with which the design has come to its end; time and maxima are left in the lane.
+    """
+    t, h = field(ws, TIME, 0, lane), field(ws, STEP, 0, lane)
+    c = load_constants(ws, lane)
+    switches = load_switches(ws, lane)
+    factors = load_factors(ws, lane)
+    modes = load_modes(ws, lane)
+    y_end = load_end_state(ws, lane)
+    if not is_finite(y_end):
+        return Status.UNSTABLE.value
+    if field(ws, ATTEMPTS, 0, lane) > attempt_budget(field(ws, STEP_FULL, 0, lane), control.horizon):
+        return Status.STEP_BUDGET.value
+    k_end = load_end(ws, lane)
+    dense = dense_output(load_state(ws, lane), load_start(ws, lane), y_end, k_end, h)
+    event, tau, y, m = keep_up_to_event(
+        t, h, y_end, k_end.M, dense, factors, switches, load_maxima(ws, lane), c
+    )
+    last = h >= control.horizon - t
+    t = control.horizon if last and event < 0 else t + tau * h
+    put(ws, TIME, 0, lane, t)
+    if event == LIMIT:
+        m = Maxima(control.theta_limit, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v)
+    store_maxima(ws, lane, m)
+    if event == LIMIT:
+        return Status.LIMIT.value
+    if t >= control.horizon:
+        return horizon_status(y, m)
+    k1 = k_end
+    if event >= 0:
+        y, modes, switches, factors, k1 = cross_event(
+            event, y, modes, switches, readings, control.theta_limit, c
+        )
+    set_lane(ws, lane, t, y, k1, modes, switches, factors, control.horizon)
+    return RUNNING
+
+
+@kernel
+def write_lane(ws: np.ndarray, lane: int, status: int, out: OutcomeTable, row: int) -> None:
+    """Write the outcome of a lane into its row; a design that failed leaves its row NaN."""
+    out.status[row] = status
+    if status == Status.UNSTABLE.value or status == Status.STEP_BUDGET.value:
+        return
+    m = load_maxima(ws, lane)
+    t = field(ws, TIME, 0, lane)
+    out.theta_max[row], out.x_b_max[row] = m.theta, m.x_b
+    out.x_v_max[row], out.F_v_max[row] = m.x_v, m.F_v
+    out.t_end[row] = t
+    if status == Status.LIMIT.value:
+        out.t_limit[row] = t
+
+
+@kernel
+def next_design(
+    ws: np.ndarray,
+    lane: int,
+    row: int,
+    table: DesignTable,
+    readings: Readings,
+    control: Control,
+    out: OutcomeTable,
+) -> tuple[int, int]:
+    """Put the next design that needs integration into a lane, writing those that need none on the way.
+
+    Returns
+    -------
+    row_in_lane, row
+        The row now in the lane, or EMPTY, and the first row not yet looked at.
+    """
+    n = table.L.size
+    while row < n:
+        status = start_lane(ws, lane, table, row, readings, control)
+        row += 1
+        if status == RUNNING:
+            return row - 1, row
+        out.status[row - 1] = status
+    # An empty lane stands still: its steps have no length, and no one looks at them.
+    put(ws, STEP, 0, lane, 0.0)
+    put(ws, STEP_FULL, 0, lane, 0.0)
+    return EMPTY, row
+
+
+@kernel
+def simulate_lanes(table: DesignTable, readings: Readings, control: Control, out: OutcomeTable) -> None:
+    """Simulate every design of a table in lanes, by the closed form of the soil and stopping at the limit.
+
+    Parameters
+    ----------
+    table
+        Designs, SI, arrays of shape (n,).
+    readings
+        Which formulas are read as printed.
+    control
+        Step, horizon, limit; its choice of soil and of stopping is not looked at.
+    out
+        Where the outcomes go, in the order of the designs; its error columns are left alone.
+    """
+    ws = np.zeros(SIZE)
+    rows = np.full(LANES, EMPTY)
+    row, running = 0, 0
+    for lane in range(LANES):
+        rows[lane], row = next_design(ws, lane, row, table, readings, control, out)
+        running += rows[lane] != EMPTY
+    while running > 0:
+        attempt_steps(ws)
+        take_over_steps(ws, control.horizon)
+        for lane in range(LANES):
+            if field(ws, ATTENTION, 0, lane) != 0.0 and rows[lane] != EMPTY:
+                status = attend(ws, lane, readings, control)
+                if status != RUNNING:
+                    write_lane(ws, lane, status, out, rows[lane])
+                    rows[lane], row = next_design(ws, lane, row, table, readings, control, out)
+                    running -= rows[lane] == EMPTY
