@@ -63,16 +63,16 @@ def shear_wedge_angle(phi: float) -> float:
 
 def element_depths(d: float, elements: int) -> NDArray[np.float64]:
     """Depths alpha_n [m] of the element centres, d/(2N) ... d (1 - 1/(2N)), given with Eq 24."""
-    n = np.arange(1, elements + 1)
-    return d / elements * (n - 0.5)
+    n = np.arange(1.0, elements + 1)
+    return np.asarray(d / elements * (n - 0.5))
 
 
 def element_masses(inputs: Inputs, elements: int) -> NDArray[np.float64]:
     """Masses m_n [kg] of the soil elements, n = 1 at the top, Eq 2."""
-    n = np.arange(1, elements + 1)
+    n = np.arange(1.0, elements + 1)
     h_e = inputs.d / elements
     theta_w = shear_wedge_angle(inputs.phi)
-    return inputs.rho_s * inputs.W * h_e * tan(theta_w) * (inputs.d - h_e * (n - 0.5))
+    return np.asarray(inputs.rho_s * inputs.W * h_e * tan(theta_w) * (inputs.d - h_e * (n - 0.5)))
 
 
 def soil_moment(inputs: Inputs, elements: int | None, power: int, about: float = 0.0) -> float:
@@ -82,7 +82,7 @@ def soil_moment(inputs: Inputs, elements: int | None, power: int, about: float =
     (d - alpha) tan(theta_w) long, and lies d - alpha over the base.
     """
     if elements is not None:
-        n = np.arange(1, elements + 1)
+        n = np.arange(1.0, elements + 1)
         height_n = inputs.d * -(n - elements - 0.5) / elements  # as in Eq 4
         return float((element_masses(inputs, elements) * (height_n - about) ** power).sum())
     d = inputs.d

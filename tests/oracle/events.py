@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .dynamics import Modes, Problem, contact_displacement, loads, motion_of
+from .dynamics import Modes, Problem, Rotation, contact_displacement, loads, motion_of
 from .restoring import gravity_hold, printed_limit, printed_sign
 
 Array = NDArray[np.float64]
@@ -43,6 +43,7 @@ def rest_modes(impact: Problem, y: Array, modes: Modes) -> Modes:
     theta = float(y[2])
     sign = printed_sign(impact.constants, theta)
     net = loads(impact, y, replace(modes, rotation="backward")).net
+    rotation: Rotation
     if net < 0:
         rotation = "backward"  # Eq 38: nothing restrains it
     elif sign > 0 and net <= printed_limit(impact.constants, theta):

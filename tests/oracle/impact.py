@@ -22,6 +22,7 @@ from .inputs import Inputs, Readings
 from .outcome import SAMPLES_PER_STEP, Event, Impact
 
 Array = NDArray[np.float64]
+Dense = Callable[[float], Array]
 
 # Size of error tolerated per step near zero, for the states of Eq 52 and the path integrals [J].
 _ABSOLUTE = np.array([1e-12, 1e-11, 1e-13, 1e-11, 1e-12, 1e-11, 1e-9, 1e-5, 1e-5, 1e-5, 1e-5])
@@ -88,7 +89,7 @@ class _Runner:
         self.t = 0.0
         self.y = np.concatenate((impact.start, np.zeros(4)))
         self.steps = [0.0]
-        self.pieces: list[Callable[[Array], Array]] = []
+        self.pieces: list[Dense] = []
         self.events = [Event(0.0, "first touch", self.modes)]
 
     def run(self) -> Impact:
@@ -149,7 +150,7 @@ class _Runner:
     def _limit_watch(self, limit: float) -> Watch:
         return Watch("rotation limit", lambda y: limit - abs(float(y[2])), lambda y: (self.modes, y))
 
-    def _keep(self, t: float, dense: Callable[[Array], Array]) -> None:
+    def _keep(self, t: float, dense: Dense) -> None:
         """Add the dense output up to `t`, unless that is nothing."""
         self.t = float(t)
         if self.t > self.steps[-1]:
@@ -158,7 +159,7 @@ class _Runner:
 
     def _land(
         self,
-        dense: Callable[[Array], Array],
+        dense: Dense,
         before: float,
         after: float,
         crossed: list[Watch],
@@ -168,28 +169,40 @@ class _Runner:
         """Cut the step at the first of the events between two samples and change the mode."""
         found: list[tuple[float, Watch | None]] = []
         for watch in crossed:
-            found.append((_locate(lambda t, w=watch: w.value(dense(t)), before, after), watch))
-        if kink_values is not None:
-            for i in np.flatnonzero(np.sign(kink_values(dense(after))) * kink_signs < 0):
+            found.append((_locate(_along(dense, watch.value), before, after), watch))
+        if kink_values is not None and kink_signs is not None:
+            turned = np.sign(kink_values(dense(after))) * kink_signs < 0
+            for i in np.flatnonzero(turned):
                 found.append(
-                    (_locate(lambda t, i=i: kink_signs[i] * kink_values(dense(t))[i], before, after), None)
+                    (_locate(_along(dense, _component(kink_values, kink_signs, int(i))), before, after), None)
                 )
-        time, watch = min(found, key=lambda item: item[0])
+        time, first = min(found, key=lambda item: item[0])
         self._keep(time, dense)
         self.y = np.array(dense(time))
-        if watch is None:
+        if first is None:
             return
-        modes, state = watch.follow(self.y)
+        modes, state = first.follow(self.y)
         self.y = state
         if modes.contact == "coasting" and self.modes.contact == "touching":
             self.contact_at_release = float(state[4]) - contact_displacement(self.impact, state)
         self.modes = modes
-        self.events.append(Event(time, watch.name, modes))
+        self.events.append(Event(time, first.name, modes))
+
+
+def _along(dense: Dense, value: Callable[[Array], float]) -> Callable[[float], float]:
+    return lambda t: value(dense(t))
+
+
+def _component(values: Callable[[Array], Array], signs: Array, i: int) -> Callable[[Array], float]:
+    """One of several quantities, positive before it turns."""
+    return lambda y: float(signs[i] * values(y)[i])
 
 
 def _locate(value: Callable[[float], float], before: float, after: float) -> float:
     """The instant at which `value` turns negative, taken just behind the root, where the new mode holds."""
-    if value(before) <= 0:
-        return before
-    root = brentq(value, before, after, xtol=1e-15, rtol=1e-15)
-    return float(min(root + 1e-13, after))
+    # a segment may start on the very edge of its mode
+    root = brentq(value, before, after, xtol=1e-15, rtol=1e-15) if value(before) > 0 else before
+    behind = 1e-13  # [s]
+    while root + behind < after and value(root + behind) >= 0:
+        behind *= 4
+    return float(min(root + behind, after))

@@ -42,15 +42,12 @@ class SoilTotals:
         Force on the boulder [N], the sum in Eq 10.
     M : float
         Moment about the centre of mass [N m], the sum in Eq 11; clockwise is positive.
-    elastic_energy : float
-        Energy stored in the capped springs [J].
     drag_power : float
         Power the drag takes out of the boulder [W].
     """
 
     F: float
     M: float
-    elastic_energy: float
     drag_power: float
 
 
@@ -169,10 +166,16 @@ class Soil:
         F_c = drag_forces(self.inputs, height, v_n)
         F_n = -(spring_forces(k_n, F_u, dx_n) + F_c)  # Eq 19
         M_n = -F_n * R_n * np.cos(gamma_n + motion.theta - pi)  # Eq 20
-        # a node in a panel of no height has neither stiffness nor energy
-        solid = k_n > 0
-        stored = spring_energies(k_n[solid], F_u[solid], dx_n[solid]).sum()
-        return SoilTotals(float(F_n.sum()), float(M_n.sum()), float(stored), float((F_c * v_n).sum()))
+        return SoilTotals(float(F_n.sum()), float(M_n.sum()), float((F_c * v_n).sum()))
+
+    def elastic_energy(self, motion: Motion) -> float:
+        """Energy stored in the springs [J]."""
+        alpha, height, R_n, gamma_n = self.nodes(motion)
+        k_n = spring_constants(self.inputs, alpha, height)
+        solid = k_n > 0  # a node in a panel of no height has neither stiffness nor energy
+        F_u = ultimate_forces(self.inputs, alpha, height)
+        dx_n = stretch(R_n, gamma_n, motion)
+        return float(spring_energies(k_n[solid], F_u[solid], dx_n[solid]).sum())
 
     def totals_by_quad(self, motion: Motion) -> tuple[float, float]:
         """Force [N] and moment [N m] for N -> infinity by adaptive quadrature, to check `totals` by."""
