@@ -85,7 +85,9 @@ def _ask_for_wide_vectors() -> None:
 _ask_for_wide_vectors()
 
 
-def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:
+def _compiled(
+    function: Callable[..., Any], fastmath: set[str], *, inline: bool = False
+) -> Callable[..., Any]:
     """Decorate one function, its cache in this package's folder."""
     # Set only while decorating: other users of Numba in this process keep their own cache folder.
     before = numba.config.CACHE_DIR

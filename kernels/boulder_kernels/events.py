@@ -26,6 +26,7 @@ from .modes import (
 )
 from .readings import Readings
 from .restoring import holding_moment, signed_arm
+from .roots import ITERATIONS, Bracket, narrowed, next_guess
 from .soil import soil_kinematics
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, spring_compression
@@ -54,9 +55,8 @@ SEATING_ANGLE = 1e-9
 """A boulder that would swing through less than this [rad] about its base is taken to have come to rest."""
 JUMP_TOLERANCE = 1e-11
 """Precision of a located jump of the forces, or of the limit, as a fraction of the step."""
-KINK_TOLERANCE = 1e-6
+KINK_TOLERANCE = 1e-4
 """The same for a kink: forces are continuous there, so the error goes with its square."""
-ROOT_ITERATIONS = 60
 
 
 class GapFactors(NamedTuple):
@@ -210,7 +210,7 @@ def gaps_at(y: State, M: float, g: GapFactors, c: Constants) -> Gaps:
     return gaps_of(k.A, k.slope_x, y.theta_b, y.omega_b, u, M, signed_arm(sin, versin, c), g)
 
 
-@kernel
+@inlined
 def gap_within(
     event: int, tau: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
 ) -> float:
@@ -245,7 +245,7 @@ def locate(
         tau in (0, 1]. A gap that starts at zero and opens only by rounding counts as crossed at once: the step still
         moves on, and the mode that follows settles it.
     """
-    low, high = 0.0, 1.0
+    low = 0.0
     gap_low = gap_within(event, low, dense, g, switches, c)
     if gap_low <= 0.0:
         for start in (1e-3, 1e-6):
@@ -255,29 +255,20 @@ def locate(
                 break
         if gap_low <= 0.0:
             return low
-    gap_high = gap_end
     exact = event == LIMIT or event == CORNER or (event == ROTATION and g.rotation_M == 0.0)
     tolerance = JUMP_TOLERANCE if exact else KINK_TOLERANCE
-    tau = high
-    # Illinois: regula falsi that halves the value at an end which stays, so that neither end stalls.
-    for _ in range(ROOT_ITERATIONS):
+    bracket = Bracket(low, gap_low, 1.0, gap_end, 0)
+    tau = 1.0
+    for _ in range(ITERATIONS):
         before = tau
-        tau = high - gap_high * (high - low) / (gap_high - gap_low)
-        if not low < tau < high:
-            tau = 0.5 * (low + high)
-        gap = gap_within(event, tau, dense, g, switches, c)
-        if gap > 0.0:
-            low, gap_low = tau, gap
-            gap_high *= 0.5
-        else:
-            high, gap_high = tau, gap
-            gap_low *= 0.5
-        if abs(tau - before) <= tolerance or gap == 0.0:
+        tau = next_guess(bracket)
+        if abs(tau - before) <= tolerance:
             break
+        bracket = narrowed(bracket, tau, gap_within(event, tau, dense, g, switches, c))
     return tau
 
 
-@kernel
+@inlined
 def first_event(
     end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
 ) -> tuple[int, float]:
@@ -388,4 +379,6 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
             top = crossed_yield(top, k.A)
         else:
             base = crossed_yield(base, k.A - k.slope_x)
-    return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(turning, touching, corner, arm, top, base)
+    return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(
+        turning, touching, corner, arm, top, base
+    )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import inlined, kernel
 from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
@@ -134,7 +134,7 @@ def attempt_budget(h: float, horizon: float) -> float:
     return ATTEMPTS_PER_STEP * horizon / h + ATTEMPTS_SPARE
 
 
-@kernel
+@inlined
 def keep_up_to_event(
     t: float,
     h: float,
@@ -170,9 +170,15 @@ def keep_up_to_event(
     return event, tau, y_end, updated_maxima(m, t, h, tau, y_end, dense, switches, c)
 
 
-@kernel
+@inlined
 def cross_event(
-    event: int, y: State, modes: Modes, switches: Switches, readings: Readings, theta_stop: float, c: Constants
+    event: int,
+    y: State,
+    modes: Modes,
+    switches: Switches,
+    readings: Readings,
+    theta_stop: float,
+    c: Constants,
 ) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
     """Go over into the modes that follow an event: state, modes, their factors, and the acceleration to start with."""
     y, modes = change_mode(event, y, rate_of(y, switches, c).M, modes, c)

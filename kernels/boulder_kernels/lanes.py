@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import inlined, kernel
 from .dense_output import dense_output
 from .design import DesignTable, constants_of, design_at, is_computable
 from .dormand_prince import step
@@ -174,7 +174,7 @@ def start_lane(
     return RUNNING
 
 
-@kernel
+@inlined
 def set_lane(
     ws: np.ndarray,
     lane: int,

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import inlined, kernel
 from .dense_output import DenseOutput, Track, displacement_at, slope_at, state_at
 from .design import Constants
 from .dynamics import State
 from .modes import Switches
+from .roots import ITERATIONS, Bracket, narrowed, next_guess
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, contact_lever, spring_compression
 
@@ -102,34 +103,25 @@ def undefined_maxima() -> Maxima:
     return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
-PEAK_TOLERANCE = 1e-6
-"""Width of the bracket of a peak as a fraction of the step; the peak value is off by its square only."""
+PEAK_TOLERANCE = 1e-5
+"""Precision of a located peak as a fraction of the step; its value is off by the square of that only."""
 
 
 @kernel
 def turning_point(q: Track, tau_end: float) -> float:
-    """Fraction of a step at which a velocity that changes its sign before tau_end is zero (Illinois)."""
-    low, high = 0.0, tau_end
-    v_low, v_high = q.x1, slope_at(q, tau_end)
-    tau = high
-    for _ in range(30):
+    """Fraction of a step at which a velocity that changes its sign before tau_end is zero."""
+    bracket = Bracket(0.0, q.x1, tau_end, slope_at(q, tau_end), 0)
+    tau = tau_end
+    for _ in range(ITERATIONS):
         before = tau
-        tau = high - v_high * (high - low) / (v_high - v_low)
-        if not low < tau < high:
-            tau = 0.5 * (low + high)
-        v = slope_at(q, tau)
-        if (v > 0.0) == (v_high > 0.0):
-            high, v_high = tau, v
-            v_low *= 0.5
-        else:
-            low, v_low = tau, v
-            v_high *= 0.5
+        tau = next_guess(bracket)
         if abs(tau - before) < PEAK_TOLERANCE:
             break
+        bracket = narrowed(bracket, tau, slope_at(q, tau))
     return tau
 
 
-@kernel
+@inlined
 def compression_rate(y: State, s: Switches, c: Constants) -> float:
     """Rate of the compression of the vehicle's spring [m/s]; the contact force peaks where it is zero."""
     sin, versin = sine_versine(y.theta_b)
@@ -137,7 +129,7 @@ def compression_rate(y: State, s: Switches, c: Constants) -> float:
     return y.v_v - y.v_b - y.omega_b * contact_lever(sin, versin, c) - c.tau_v * s.k_truck * u
 
 
-@kernel
+@inlined
 def force_at(y: State, s: Switches, c: Constants) -> float:
     """Contact force at a state [N]."""
     sin, versin = sine_versine(y.theta_b)
@@ -145,8 +137,10 @@ def force_at(y: State, s: Switches, c: Constants) -> float:
 
 
 @kernel
-def force_peak(dense: DenseOutput, tau_end: float, r: float, r_end: float, s: Switches, c: Constants) -> float:
-    """Fraction of a step at which the contact force peaks (Illinois).
+def force_peak(
+    dense: DenseOutput, tau_end: float, r: float, r_end: float, s: Switches, c: Constants
+) -> float:
+    """Fraction of a step at which the contact force peaks.
 
     Parameters
     ----------
@@ -157,25 +151,18 @@ def force_peak(dense: DenseOutput, tau_end: float, r: float, r_end: float, s: Sw
     r, r_end
         Rate of the compression at its start, positive, and at tau_end, negative [m/s].
     """
-    low, high = 0.0, tau_end
-    r_low, r_high = r, r_end
-    tau = high
-    for _ in range(30):
+    bracket = Bracket(0.0, r, tau_end, r_end, 0)
+    tau = tau_end
+    for _ in range(ITERATIONS):
         before = tau
-        tau = high - r_high * (high - low) / (r_high - r_low)
-        rate = compression_rate(state_at(dense, tau), s, c)
-        if rate > 0.0:
-            low, r_low = tau, rate
-            r_high *= 0.5
-        else:
-            high, r_high = tau, rate
-            r_low *= 0.5
+        tau = next_guess(bracket)
         if abs(tau - before) < PEAK_TOLERANCE:
             break
+        bracket = narrowed(bracket, tau, compression_rate(state_at(dense, tau), s, c))
     return tau
 
 
-@kernel
+@inlined
 def grown(best: float, t_best: float, value: float, t: float) -> tuple[float, float]:
     """Return the larger of the best so far and a value, with its time."""
     if value > best:
@@ -183,7 +170,7 @@ def grown(best: float, t_best: float, value: float, t: float) -> tuple[float, fl
     return best, t_best
 
 
-@kernel
+@inlined
 def updated_maxima(
     m: Maxima, t: float, h: float, tau_end: float, y_end: State, dense: DenseOutput, s: Switches, c: Constants
 ) -> Maxima:

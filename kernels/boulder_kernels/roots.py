@@ -1,0 +1,44 @@
+"""Roots of a function in a bracket, by the Illinois method: regula falsi whose ends do not stall.
+
+M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an equation, BIT 11 (1971), 168-174.
+The functions here narrow a bracket; the caller evaluates its own function in between, because a function passed as an
+argument could not be compiled ahead and kept.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ._jit import inlined
+
+ITERATIONS = 50
+"""More than any root here needs: the bracket at least halves every third time."""
+
+
+class Bracket(NamedTuple):
+    """Two points between which a function changes its sign."""
+
+    low: float
+    f_low: float
+    high: float
+    f_high: float
+    side: int
+    """Which end was moved last: -1 the low one, 1 the high one, 0 none."""
+
+
+@inlined
+def next_guess(b: Bracket) -> float:
+    """Where the chord meets zero, or the middle where rounding puts that outside the bracket."""
+    tau = b.high - b.f_high * (b.high - b.low) / (b.f_high - b.f_low)
+    return tau if b.low < tau < b.high else 0.5 * (b.low + b.high)
+
+
+@inlined
+def narrowed(b: Bracket, tau: float, f: float) -> Bracket:
+    """Bracket with the point tau, at which the function is f, in place of one end.
+
+    An end that stays twice running has its value halved, which pulls the next chord over to it.
+    """
+    if (f > 0.0) == (b.f_low > 0.0):
+        return Bracket(tau, f, b.high, 0.5 * b.f_high if b.side < 0 else b.f_high, -1)
+    return Bracket(b.low, 0.5 * b.f_low if b.side > 0 else b.f_low, tau, f, 1)
