@@ -1,0 +1,278 @@
+"""From axes to columns of designs, block by block: no grid is ever written out as a whole.
+
+The number of a design is its position in the grid, the last axis changing fastest. Which value a design
+takes on an axis follows from its number by division, so any block of rows can be made without the others.
+A column that depends on few values stays a dictionary of them with a code per row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from boulder_sweep.columns import INPUT_COLUMNS
+
+MAX_DICTIONARY = 1 << 16
+"""Most values of a dictionary column; beyond that a column is written out."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """One input of a block of designs.
+
+    Attributes
+    ----------
+    codes : ndarray of int32, shape (n,), or None
+        Row i has ``values[codes[i]]``; None where `values` has one entry per row.
+    values : ndarray of float64
+        Values in the unit of the column.
+    """
+
+    codes: np.ndarray | None
+    values: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.values if self.codes is None else self.codes)
+
+    def to_numpy(self) -> np.ndarray:
+        """Return one float64 per row."""
+        return self.values if self.codes is None else self.values[self.codes]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reasons:
+    """Why rows cannot be computed.
+
+    Attributes
+    ----------
+    codes : ndarray of int8, shape (n,)
+        0 where the row can be computed, otherwise a place in `texts`.
+    texts : tuple of str
+        The reasons; the first one is empty.
+    """
+
+    codes: np.ndarray
+    texts: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def __getitem__(self, row: int) -> str:
+        return self.texts[int(self.codes[row])]
+
+    @property
+    def any(self) -> bool:
+        """Whether some row cannot be computed."""
+        return bool(self.codes.any())
+
+    def to_list(self) -> list[str]:
+        """Return one text per row, empty where the row can be computed."""
+        return [self.texts[code] for code in self.codes]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DesignBlock:
+    """Rows ``[start, stop)`` of a sweep.
+
+    Attributes
+    ----------
+    start, stop : int
+        Numbers of the first design and of the one after the last.
+    columns : dict of str to Column
+        Every input column of the table but ``design_id``, in the order of the table.
+    reasons : Reasons
+        Why single rows cannot be computed.
+    """
+
+    start: int
+    stop: int
+    columns: dict[str, Column]
+    reasons: Reasons
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def design_id(self) -> np.ndarray:
+        """Return the numbers of the designs, int64."""
+        return np.arange(self.start, self.stop, dtype=np.int64)
+
+
+class Source:
+    """Values of one quantity over some axes of the grid.
+
+    Parameters
+    ----------
+    values : ndarray, shape (product of the lengths of `axes`,)
+        Values, the last of `axes` changing fastest.
+    axes : tuple of int
+        Positions of the axes it depends on, ascending; empty for a constant.
+    """
+
+    def __init__(self, values: np.ndarray, axes: tuple[int, ...] = ()) -> None:
+        self.values = np.ascontiguousarray(values)
+        self.axes = axes
+
+    @cached_property
+    def dictionary(self) -> tuple[np.ndarray | None, np.ndarray]:
+        """Places in the dictionary for every value (None: its own place), and the dictionary."""
+        head = self.values[: 2 * MAX_DICTIONARY]
+        if len(head) < len(self.values) and len(np.unique(head)) > MAX_DICTIONARY:
+            return None, self.values  # a long list of ever different values: sorting the whole is for nothing
+        unique, inverse = np.unique(self.values, return_inverse=True)
+        if len(unique) == len(self.values):
+            return None, self.values
+        return inverse.astype(np.int32), unique
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """A quantity computed from others row by row, where the combinations are too many to keep."""
+
+    function: Callable[..., np.ndarray]
+    inputs: tuple[Source | Derived, ...]
+
+
+Quantity = Source | Derived
+
+REASONS = (
+    "",
+    "embedment depth is not less than the boulder's height",
+    "hood is lower than the bumper",
+    "impact height is above the top of the boulder",
+)
+
+
+def embedment_of_ratio(ratio: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """Return the embedment depth d = ratio * H [m]."""
+    return ratio * height
+
+
+def impact_height_of_face(
+    height: np.ndarray, embedment: np.ndarray, bumper: np.ndarray, hood: np.ndarray
+) -> np.ndarray:
+    """Return the impact height over the soil line [m], Eq 9: e = (e' + e_bumper) / 2, e' = min(H - d, hood)."""
+    return 0.5 * (np.minimum(height - embedment, hood) + bumper)
+
+
+def refusal(
+    height: np.ndarray, embedment: np.ndarray, bumper: np.ndarray, hood: np.ndarray, impact: np.ndarray
+) -> np.ndarray:
+    """Return for every row the place in `REASONS` of why it cannot be computed, int8.
+
+    An impact height given by the user must lie on the boulder; where the bumper passes over the boulder
+    there is no impact and its height does not matter.
+    """
+    exposed = height - embedment
+    codes = np.zeros(exposed.shape, dtype=np.int8)
+    codes[(impact > exposed * (1.0 + 1e-12)) & (exposed > bumper)] = 3
+    codes[hood < bumper] = 2
+    codes[exposed <= 0.0] = 1
+    return codes
+
+
+class DesignPlan:
+    """How every input column of a sweep follows from its axes.
+
+    Parameters
+    ----------
+    lengths : sequence of int
+        Lengths of the axes in the order of the file.
+    given : dict of str to Source
+        By column name; ``embedment_ratio`` in place of ``embedment_depth_m`` and a missing
+        ``impact_height_m`` are worked out here.
+    """
+
+    def __init__(self, lengths: Sequence[int], given: dict[str, Source]) -> None:
+        self.lengths = tuple(int(length) for length in lengths)
+        self.n_designs = math.prod(self.lengths)
+        self.strides = tuple(math.prod(self.lengths[k + 1 :]) for k in range(len(self.lengths)))
+        quantities: dict[str, Quantity] = dict(given)
+        height, bumper, hood = given["boulder_height_m"], given["bumper_height_m"], given["hood_height_m"]
+        if "embedment_depth_m" not in quantities:
+            ratio = quantities.pop("embedment_ratio")
+            quantities["embedment_depth_m"] = self.combine(embedment_of_ratio, ratio, height)
+        embedment = quantities["embedment_depth_m"]
+        if "impact_height_m" not in quantities:
+            face = self.combine(impact_height_of_face, height, embedment, bumper, hood)
+            quantities["impact_height_m"] = face
+            impact: Quantity = Source(np.zeros(1))
+        else:
+            impact = quantities["impact_height_m"]
+        self.columns = {name: quantities[name] for name in INPUT_COLUMNS}
+        self.refusals = self.combine(refusal, height, embedment, bumper, hood, impact)
+
+    def combine(self, function: Callable[..., np.ndarray], *inputs: Quantity) -> Quantity:
+        """Return ``function(*inputs)`` worked out over all combinations if these are few, else per row."""
+        sources = [quantity for quantity in inputs if isinstance(quantity, Source)]
+        if len(sources) < len(inputs):
+            return Derived(function, inputs)
+        axes = tuple(sorted({axis for source in sources for axis in source.axes}))
+        shape = tuple(self.lengths[axis] for axis in axes)
+        if math.prod(shape) > max(MAX_DICTIONARY, *(len(source.values) for source in sources)):
+            return Derived(function, inputs)
+        grids = []
+        for source in sources:
+            own = tuple(self.lengths[axis] if axis in source.axes else 1 for axis in axes)
+            grids.append(np.broadcast_to(source.values.reshape(own), shape))
+        return Source(function(*grids).reshape(-1), axes)
+
+    def block(self, start: int, stop: int) -> DesignBlock:
+        """Return the designs ``[start, stop)``.
+
+        Raises
+        ------
+        IndexError
+            The rows are not within the sweep.
+        """
+        if not 0 <= start <= stop <= self.n_designs:
+            raise IndexError(
+                f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep"
+            )
+        rows = _Rows(self, start, stop)
+        columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
+        codes = rows.values(self.refusals)
+        return DesignBlock(start, stop, columns, Reasons(codes, REASONS))
+
+
+class _Rows:
+    """Places of a range of rows on the axes."""
+
+    def __init__(self, plan: DesignPlan, start: int, stop: int) -> None:
+        self.plan = plan
+        self.rows = np.arange(start, stop, dtype=np.int64)
+        self.digits: dict[int, np.ndarray] = {}
+        self.places: dict[tuple[int, ...], np.ndarray] = {}
+
+    def place(self, axes: tuple[int, ...]) -> np.ndarray:
+        """Return the place of every row among the combinations of some axes, int64."""
+        if axes not in self.places:
+            place = np.zeros(len(self.rows), dtype=np.int64)
+            for axis in axes:
+                place = place * self.plan.lengths[axis] + self.digit(axis)
+            self.places[axes] = place
+        return self.places[axes]
+
+    def digit(self, axis: int) -> np.ndarray:
+        """Return the place of every row on one axis."""
+        if axis not in self.digits:
+            self.digits[axis] = self.rows // self.plan.strides[axis] % self.plan.lengths[axis]
+        return self.digits[axis]
+
+    def column(self, quantity: Quantity) -> Column:
+        """Return a quantity as a column, with codes where its dictionary is small."""
+        if isinstance(quantity, Source):
+            lookup, dictionary = quantity.dictionary
+            if len(dictionary) <= MAX_DICTIONARY:
+                place = self.place(quantity.axes)
+                return Column(place.astype(np.int32) if lookup is None else lookup[place], dictionary)
+        return Column(None, np.ascontiguousarray(self.values(quantity)))
+
+    def values(self, quantity: Quantity) -> np.ndarray:
+        """Return one value per row."""
+        if isinstance(quantity, Source):
+            return quantity.values[self.place(quantity.axes)]
+        return quantity.function(*(self.values(value) for value in quantity.inputs))

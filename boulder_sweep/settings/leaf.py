@@ -1,0 +1,273 @@
+"""One entry of the file to numbers: a value, a list, or a range with exact steps."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from boulder_sweep.settings.bounds import ADMITTED
+from boulder_sweep.settings.fields import Field
+from boulder_sweep.settings.numbers import NumberError, Quantity, describe, read_count, read_quantity
+from boulder_sweep.settings.problems import Place, did_you_mean, shorten
+from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
+
+MAX_AXIS = 1_000_000
+"""Most values on one axis."""
+
+_RANGE_KEYS = ("from", "to", "count", "step")
+_DISTRIBUTIONS = frozenset(
+    {
+        "normal",
+        "lognormal",
+        "uniform",
+        "triangular",
+        "truncated_normal",
+        "beta",
+        "distribution",
+        "mean",
+        "sd",
+        "cov",
+    }
+)
+_TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
+
+
+@dataclass(frozen=True, eq=False)
+class Leaf:
+    """Values of one entry in the unit of the contract.
+
+    Attributes
+    ----------
+    values : ndarray of float64, shape (n,)
+        The values in the order given.
+    is_axis : bool
+        Whether it was written as a list or range (an axis of the grid) or as one value.
+    place : Place
+        Where it stands.
+    """
+
+    values: np.ndarray
+    is_axis: bool
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """One mistake within an entry."""
+
+    place: Place
+    message: str
+
+
+class LeafError(Exception):
+    """An entry that cannot be used, with every mistake in it."""
+
+    def __init__(self, mistakes: list[Mistake]) -> None:
+        super().__init__("; ".join(mistake.message for mistake in mistakes))
+        self.mistakes = mistakes
+
+
+def read_leaf(node: Node, field: Field) -> Leaf:
+    """Return the values of an entry.
+
+    Parameters
+    ----------
+    node : Node
+        ``1.65 m``, ``[36, 40] deg``, ``[36 deg, 40 deg]``, ``{from: 1 m, to: 3 m, count: 5}`` or
+        ``{from: 0.4, to: 0.7, step: 0.02}``.
+    field : Field
+        What it is about.
+
+    Raises
+    ------
+    LeafError
+        With every mistake of this entry.
+    """
+    node = _unfold_text_list(node)
+    if isinstance(node, Mapping):
+        values = _read_range(node, field)
+        return Leaf(np.array(values), True, node.place)
+    items = node.items if isinstance(node, Sequence) else [node]
+    if not items:
+        raise LeafError([Mistake(node.place, "the list is empty; give at least one value")])
+    if len(items) > MAX_AXIS:
+        raise LeafError([Mistake(node.place, f"{len(items)} values are too many; an axis takes {MAX_AXIS}")])
+    quantities = _read_all(items, field, node.unit if isinstance(node, Sequence) else None)
+    values = _checked(quantities, items, field)
+    return Leaf(np.array(values), isinstance(node, Sequence), node.place)
+
+
+def read_single(node: Node, name: str, unit: str) -> float:
+    """Return the one value of an entry that cannot be an axis, within its admitted range.
+
+    Raises
+    ------
+    LeafError
+        Not one number, wrong unit, or outside the admitted range.
+    """
+    if not isinstance(node, Scalar):
+        raise LeafError([Mistake(node.place, "takes one value here, not a list or a range")])
+    try:
+        value = _to_float(read_quantity(node, unit).value)
+    except NumberError as error:
+        raise LeafError([Mistake(node.place, str(error))]) from None
+    problem = outside(value, name, unit)
+    if problem:
+        raise LeafError([Mistake(node.place, problem)])
+    return value
+
+
+def outside(value: float, name: str, unit: str) -> str:
+    """Return why a value is not admitted, empty if it is."""
+    bound = ADMITTED[name]
+    if bound.low <= value <= bound.high:
+        return ""
+    return (
+        f"{describe(value, unit)} is outside the admitted range of "
+        f"{bound.low:g} to {describe(bound.high, unit)} ({bound.reason})"
+    )
+
+
+def _unfold_text_list(node: Node) -> Node:
+    """Turn the text ``"[36, 40] deg"`` in quotation marks into the list it stands for."""
+    if not isinstance(node, Scalar):
+        return node
+    match = _TEXT_LIST.fullmatch(node.text)
+    if match is None:
+        return node
+    items: list[Node] = [Scalar(node.place, part) for part in match[1].split(",")] if match[1].strip() else []
+    unit = match[2].strip()
+    return Sequence(node.place, items, Scalar(node.place, unit) if unit else None)
+
+
+def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quantity]:
+    """Read every number of an entry; all of them with a unit or none."""
+    quantities: list[Quantity] = []
+    mistakes: dict[str, Mistake] = {}
+    for item in items:
+        try:
+            quantities.append(read_quantity(item, field.unit, unit))
+        except NumberError as error:
+            mistakes.setdefault(str(error), Mistake(item.place, str(error)))
+    if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:
+        bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.has_unit)
+        text = shorten(bare.text) if isinstance(bare, Scalar) else ""
+        message = f"'{text}' has no unit while its neighbours have one; give a unit to all or to none"
+        mistakes[message] = Mistake(bare.place, message)
+    if mistakes:
+        raise LeafError(list(mistakes.values()))
+    return quantities
+
+
+def _checked(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
+    """Return the values; every one of them must be admitted."""
+    values = [_to_float(quantity.value) for quantity in quantities]
+    problems = (
+        (node, outside(value, field.name, field.unit)) for node, value in zip(nodes, values, strict=True)
+    )
+    mistakes = [Mistake(node.place, problem) for node, problem in problems if problem]
+    if mistakes:
+        raise LeafError(mistakes)
+    return values
+
+
+def _read_range(node: Mapping, field: Field) -> list[float]:
+    """Return the values of ``{from, to, count}`` or ``{from, to, step}``."""
+    _check_range_keys(node)
+    ends = [entry for entry in node if entry.key in ("from", "to", "step")]
+    quantities = _read_all([entry.value for entry in ends], field, node.unit)
+    exact = {entry.key: quantity.value for entry, quantity in zip(ends, quantities, strict=True)}
+    bounding = [
+        (quantity, entry.value)
+        for entry, quantity in zip(ends, quantities, strict=True)
+        if entry.key != "step"
+    ]
+    _checked([quantity for quantity, _ in bounding], [value for _, value in bounding], field)
+    try:
+        if "step" in exact:
+            count = _count_of_step(exact["from"], exact["to"], exact["step"], field.unit)
+        else:
+            count = _count_of_count(exact["from"], exact["to"], node.entries["count"].value)
+    except NumberError as error:
+        key = "step" if "step" in exact else "count"
+        raise LeafError([Mistake(node.entries[key].value.place, str(error))]) from None
+    return spread(exact["from"], exact["to"], count)
+
+
+def _check_range_keys(node: Mapping) -> None:
+    mistakes = []
+    for entry in node:
+        if entry.key in _DISTRIBUTIONS:
+            raise LeafError(
+                [Mistake(entry.place, "a distribution is not accepted here; give a value, a list or a range")]
+            )
+        if entry.key not in _RANGE_KEYS:
+            hint = did_you_mean(entry.key, _RANGE_KEYS)
+            message = f"'{shorten(entry.key)}' is not a key of a range (from, to, count or step){hint}"
+            mistakes.append(Mistake(entry.place, message))
+    if not mistakes:
+        missing = [key for key in ("from", "to") if key not in node.entries]
+        if missing:
+            mistakes.append(Mistake(node.place, f"the range lacks {' and '.join(missing)}"))
+        if "count" in node.entries and "step" in node.entries:
+            mistakes.append(Mistake(node.entries["step"].place, "give count or step, not both"))
+        elif "count" not in node.entries and "step" not in node.entries:
+            mistakes.append(Mistake(node.place, "the range lacks count or step"))
+    if mistakes:
+        raise LeafError(mistakes)
+
+
+def _count_of_count(first: Fraction, last: Fraction, node: Node) -> int:
+    count = read_count(node, "count", MAX_AXIS)
+    if count == 1 and first != last:
+        raise NumberError(
+            "count 1 cannot hold both ends of the range; give a count of 2 or more, or one value"
+        )
+    return count
+
+
+def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str) -> int:
+    """Return how many values the steps make; the last one must be the end of the range, exactly."""
+    if step == 0:
+        raise NumberError("a step of 0 never arrives")
+    steps = (last - first) / step
+    if steps < 0:
+        way = "downwards" if last < first else "upwards"
+        raise NumberError(
+            f"the range goes {way} and the step does not; exchange from and to, or change the sign of the step"
+        )
+    if steps >= MAX_AXIS:
+        raise NumberError(
+            f"this makes more than {MAX_AXIS} values, the most for one axis; take a larger step"
+        )
+    if steps.denominator != 1:
+        below = first + math.floor(steps) * step
+        above = below + step
+        raise NumberError(
+            f"steps of {describe(float(step), unit)} from {describe(float(first), unit)} do not arrive at "
+            f"{describe(float(last), unit)} but at {describe(float(below), unit)} and then "
+            f"{describe(float(above), unit)}; write one of these behind 'to', or use count"
+        )
+    return int(steps) + 1
+
+
+def spread(first: Fraction, last: Fraction, count: int) -> list[float]:
+    """Return `count` equidistant values from `first` to `last`, each the float nearest to its exact value."""
+    if count == 1:
+        return [float(first)]
+    common = first.denominator * last.denominator
+    start = first.numerator * last.denominator
+    span = last.numerator * first.denominator - start
+    # Integer over integer is rounded once, to the nearest float.
+    return [(start * (count - 1) + span * i) / (common * (count - 1)) for i in range(count)]
+
+
+def _to_float(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf

@@ -1,0 +1,149 @@
+"""Numbers as engineers write them: a plain decimal number, with or without a unit behind it.
+
+A number is kept as an exact fraction of its decimal digits, so that ``0.40 + 15 * 0.02`` is 0.70 to the bit.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import NamedTuple
+
+from boulder_sweep.settings.problems import shorten
+from boulder_sweep.settings.tree import Node, Scalar, Sequence
+from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+
+_NUMBER = re.compile(r"([+-]?)(\d*)(?:\.(\d*))?(?:[eE]([+-]?\d{1,9}))?", re.ASCII)
+_YES_NO = frozenset({"true", "false", "yes", "no", "on", "off", "y", "n"})
+_NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)\b.*", re.IGNORECASE)
+_MAX_DIGITS = 40
+_MAX_EXPONENT = 300
+
+
+class NumberError(ValueError):
+    """Not a number of the kind that is asked for; the message says what is allowed."""
+
+
+class Quantity(NamedTuple):
+    """An exact number in the unit of the contract, and whether a unit was written behind it."""
+
+    value: Fraction
+    has_unit: bool
+
+
+def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Quantity:
+    """Return the number a node holds, converted to `unit`.
+
+    Parameters
+    ----------
+    node : Node
+        Must be a piece of text such as ``1.65``, ``6.5 ft`` or ``95 MN/m^3``.
+    unit : str
+        Unit of the contract; the unit of a bare number.
+    outer_unit : Scalar, optional
+        Unit written behind the bracket of the list the number stands in.
+
+    Raises
+    ------
+    NumberError
+        Not a finite decimal number, or an unknown or unfit unit.
+    """
+    if not isinstance(node, Scalar):
+        kind = "a list" if isinstance(node, Sequence) else "a block"
+        raise NumberError(f"{kind} stands where one number is needed")
+    number, unit_text = split_number(node.text, unit)
+    if outer_unit is not None:
+        if unit_text:
+            raise NumberError(
+                f"'{shorten(node.text)}' has a unit and so has the list ('{shorten(outer_unit.text)}'); give one of them"
+            )
+        unit_text = outer_unit.text
+    if not unit_text:
+        return Quantity(number, has_unit=False)
+    try:
+        return Quantity(number * factor(unit_text, unit), has_unit=True)
+    except UnitError as error:
+        raise NumberError(str(error)) from None
+
+
+def split_number(text: str, unit: str) -> tuple[Fraction, str]:
+    """Return the number at the beginning of a text and the rest, its unit.
+
+    Raises
+    ------
+    NumberError
+        The text does not begin with a plain, finite decimal number.
+    """
+    stripped = text.strip().replace("−", "-")
+    quoted = f"'{shorten(text)}'"
+    needed = _needed(unit)
+    if not stripped or stripped in ("~", "null", "Null", "NULL"):
+        raise NumberError(f"is empty; {needed}")
+    if stripped.lower() in _YES_NO:
+        raise NumberError(f"{quoted} is a yes/no word; {needed}")
+    if _NOT_FINITE.fullmatch(stripped):
+        raise NumberError(f"{quoted} is not a finite number; {needed}")
+    match = _NUMBER.match(stripped)
+    sign, whole, decimals, exponent = match.groups() if match else ("", "", None, None)
+    rest = stripped[match.end() :] if match else stripped
+    if not (whole or decimals):
+        raise NumberError(f"{quoted} is not a number; {needed}")
+    if len(whole) > 1 and whole.startswith("0"):
+        raise NumberError(
+            f"{quoted} begins with a zero, which some programs read as an octal number; write it without"
+        )
+    if rest[:1] in (",", "_", "'", ".") or re.match(r"\s+\d", rest):
+        raise NumberError(
+            f"{quoted} is not a plain number; write a decimal point and no signs between the thousands, as in 6800.5"
+        )
+    if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
+        raise NumberError(
+            f"{quoted} is not one number; {needed}, or a range {{from: ..., to: ..., count: ...}}"
+        )
+    digits = whole + (decimals or "")
+    power = int(exponent or 0)
+    if len(digits) > _MAX_DIGITS or abs(power) > _MAX_EXPONENT:
+        raise NumberError(f"{quoted} has too many digits or too large an exponent for a number of this world")
+    value = Fraction(int(digits)) * Fraction(10) ** (power - len(decimals or ""))
+    return (-value if sign == "-" else value), rest.strip()
+
+
+def read_count(node: Node, what: str, largest: int) -> int:
+    """Return a whole number from 1 to `largest`.
+
+    Raises
+    ------
+    NumberError
+        Not a whole number, or outside that range.
+    """
+    if isinstance(node, Scalar) and re.fullmatch(r"[1-9]\d{0,17}", node.text.strip(), re.ASCII):
+        value = int(node.text)
+        if value <= largest:
+            return value
+    shown = f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
+    raise NumberError(f"{shown} is not possible here; {what} is a whole number from 1 to {largest}")
+
+
+def describe(value: float, unit: str) -> str:
+    """Return a value with its unit, for messages."""
+    return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
+
+
+def _needed(unit: str) -> str:
+    expected = EXPECTED[unit]
+    if unit == "1":
+        return "a number is needed"
+    return f"{expected.words} is needed, such as {_SAMPLES[unit]}"
+
+
+_SAMPLES = {
+    "m": "1.65 m",
+    "kg": "6800 kg or 15000 lb",
+    "s": "1 s",
+    "m/s": "13.4 m/s or 30 mph",
+    "deg": "36 deg",
+    "kg/m^3": "2650 kg/m^3 or 116 pcf",
+    "MN/m^3": "95 MN/m^3 or 350 pci",
+    "N/m": "3103.3 kN/m",
+    "N*s/m": "138.91 kN*s/m",
+}

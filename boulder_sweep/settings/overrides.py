@@ -1,0 +1,103 @@
+"""``--set KEY=VALUE``: single entries put into the tree in place of what the file says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, shorten
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
+from boulder_sweep.settings.yaml_reader import parse_node
+
+_ALTERNATIVES = {
+    "site.embedment_ratio": "embedment_depth",
+    "site.embedment_depth": "embedment_ratio",
+    "solver.accuracy": "step",
+    "solver.step": "accuracy",
+}
+"""Setting the one takes the other away, since a file holds only one of them."""
+
+MAX_OVERRIDE = 20_000
+"""Longest option, in characters."""
+
+
+def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemList) -> None:
+    """Put every ``key.path=value`` into the tree, in order; mistakes go to `problems`.
+
+    Parameters
+    ----------
+    root : Mapping
+        The tree of the file, changed in place.
+    overrides : sequence of str
+        As typed behind ``--set``; the value is YAML, so lists and ranges work as in the file.
+    problems : ProblemList
+        Receives what cannot be understood.
+    """
+    for text in overrides:
+        key, equals, value_text = text.partition("=")
+        path = key.strip().split(".")
+        place = Place(f"--set {shorten(key.strip()) or shorten(text)}")
+        if not equals or not all(path) or len(path) > 4:
+            problems.add(
+                Place("--set"), "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'"
+            )
+            continue
+        if len(text) > MAX_OVERRIDE:
+            problems.add(place, "", f"is longer than {MAX_OVERRIDE} characters; write it into the file")
+            continue
+        value = _read_value(value_text, place, problems)
+        if value is not None:
+            _put(root, path, value, place)
+
+
+def _read_value(text: str, place: Place, problems: ProblemList) -> Node | None:
+    found = ProblemList()
+    try:
+        value = parse_node(text, place.file, found)
+    except SettingsError:
+        value = None  # its problems are in `found`
+    for problem in found.problems:
+        problems.add(place, problem.key, problem.message)
+    if value is None:
+        return None if found else Scalar(place, "")
+    _move(value, place)
+    return value
+
+
+def _move(node: Node, place: Place) -> None:
+    """Give a whole tree the place of its option: a line within an option tells nobody anything."""
+    node.place = place
+    if isinstance(node, Scalar):
+        return
+    if node.unit is not None:
+        node.unit.place = place
+    if isinstance(node, Mapping):
+        for entry in node:
+            entry.place = place
+            _move(entry.value, place)
+    else:
+        for item in node.items:
+            _move(item, place)
+
+
+def _put(root: Mapping, path: list[str], value: Node, place: Place) -> None:
+    """Set one entry, opening blocks on the way where there are none."""
+    block = root
+    for depth, key in enumerate(path[:-1]):
+        inner = block.get(key)
+        if not isinstance(inner, Mapping):
+            opened = Mapping(place)
+            if path[: depth + 1] == ["model", "readings"] and isinstance(inner, Scalar):
+                # `readings: corrected` with one switch on top of it: the preset stays.
+                opened.entries["preset"] = Entry("preset", inner.place, inner)
+            _store(block, key, opened, place)
+            inner = opened
+        block = inner
+    other = _ALTERNATIVES.get(".".join(path))
+    if other is not None:
+        block.entries.pop(other, None)
+    _store(block, path[-1], value, place)
+
+
+def _store(block: Mapping, key: str, value: Node, place: Place) -> None:
+    """Replace an entry where it stands, so that axes keep their order, or append it."""
+    block.entries[key] = Entry(key, place, value)

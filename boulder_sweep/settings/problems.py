@@ -1,0 +1,122 @@
+"""Mistakes in a settings file: where each one is and what would be right instead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+MAX_REPORTED = 100
+"""Most problems reported at once; a longer list helps nobody and a hostile file could make it endless."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A position in a file (or in a ``--set`` option): file, line and column counted from 1."""
+
+    file: str
+    line: int | None = None
+    column: int | None = None
+
+    def __str__(self) -> str:
+        return ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One mistake, or one remark, about a file of settings.
+
+    Attributes
+    ----------
+    file : str
+        The file as the user named it, or the ``--set`` option.
+    line, column : int or None
+        Position counted from 1, None where there is none (a file that cannot be read, a ``--set`` option).
+    key : str
+        Dotted key it is about, for example ``boulder.height``; empty if it is about the whole file.
+    message : str
+        What is wrong and what is allowed.
+    """
+
+    file: str
+    line: int | None
+    column: int | None
+    key: str
+    message: str
+
+    def __str__(self) -> str:
+        """Format as ``file:line:column: key: message``."""
+        head = str(Place(self.file, self.line, self.column))
+        return ": ".join(part for part in (head, self.key, self.message) if part)
+
+
+class SettingsError(Exception):
+    """The settings are not valid.
+
+    Attributes
+    ----------
+    problems : list of Problem
+        Every mistake that was found, in the order of the file.
+    """
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = list(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    def __reduce__(self) -> tuple[type[SettingsError], tuple[list[Problem]]]:
+        """Pickle by the problems, so that the error survives the way between processes."""
+        return type(self), (self.problems,)
+
+
+@dataclass
+class ProblemList:
+    """Collects problems; counts those beyond `MAX_REPORTED` and keeps none of them."""
+
+    problems: list[Problem] = field(default_factory=list)
+    dropped: int = 0
+
+    @property
+    def full(self) -> bool:
+        """Whether further problems are only counted."""
+        return len(self.problems) >= MAX_REPORTED
+
+    def add(self, place: Place, key: str, message: str) -> None:
+        """Add one problem, once."""
+        if self.full:
+            self.dropped += 1
+            return
+        problem = Problem(place.file, place.line, place.column, key, message)
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+    def __bool__(self) -> bool:
+        return bool(self.problems)
+
+    def in_order(self) -> list[Problem]:
+        """Return the problems in the order of their positions, each file and option by itself."""
+        files = list(dict.fromkeys(problem.file for problem in self.problems))
+        ordered = sorted(self.problems, key=lambda p: (files.index(p.file), p.line or 0, p.column or 0))
+        if self.dropped:
+            last = ordered[-1]
+            ordered.append(Problem(last.file, None, None, "", f"and {self.dropped} more problems"))
+        return ordered
+
+    def raise_if_any(self) -> None:
+        """Raise SettingsError if there is a problem."""
+        if self.problems:
+            raise SettingsError(self.in_order())
+
+
+def shorten(text: str, limit: int = 60) -> str:
+    """Return text fit for quoting in a message: one line, printable, not longer than `limit`."""
+    flat = "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
+    return flat if len(flat) <= limit else flat[: limit - 3] + "..."
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean ...?"`` for the known word nearest to `word`, or an empty string."""
+    # difflib takes a few milliseconds to import and is needed for mistakes only.
+    from difflib import get_close_matches
+
+    candidates = {name.lower(): name for name in known}
+    near = get_close_matches(word.lower()[:80], candidates, n=1, cutoff=0.6)
+    return f"; did you mean {candidates[near[0]]}?" if near else ""

@@ -1,0 +1,167 @@
+"""A sweep: everything a file of settings says, checked and in the units of the table."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.designs import DesignBlock, DesignPlan, Source
+from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
+from boulder_sweep.settings.problems import Problem
+
+MAX_LISTED = 1000
+"""Longest axis that `Sweep.resolved` lists value by value."""
+
+IMPACT_HEIGHT_RULE = "Eq 9: (min(boulder_height - embedment_depth, hood_height) + bumper_height) / 2"
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One axis of the grid.
+
+    Attributes
+    ----------
+    name : str
+        Column of the table, or ``embedment_ratio``.
+    values : ndarray of float64
+        Values in the unit of the column, in the order of the file.
+    """
+
+    name: str
+    values: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True, eq=False)
+class DesignList:
+    """The explicit list of designs of ``table: FILE``.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file, without its folder.
+    columns : dict of str to ndarray of float64, shape (n,)
+        Values by column name.
+    """
+
+    file: str
+    columns: dict[str, np.ndarray]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A checked file of settings. Made by `boulder_sweep.load`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the sweep.
+    path : Path or None
+        The file it came from.
+    axes : tuple of Axis
+        Axes in the order of the file, the last one fastest.
+    constants : dict of str to float
+        Single values by column name (or ``embedment_ratio``), defaults filled in.
+    table : DesignList or None
+        Explicit list of designs in place of axes.
+    criterion : Criterion
+        Limits a design must hold.
+    model : Model
+        Reading of the paper and representation of the soil.
+    solver : SolverSettings
+        Accuracy or step, and the time simulated.
+    notes : tuple of Problem
+        Remarks that are no errors.
+    """
+
+    name: str
+    path: Path | None
+    axes: tuple[Axis, ...]
+    constants: dict[str, float]
+    table: DesignList | None = None
+    criterion: Criterion = Criterion()
+    model: Model = Model()
+    solver: SolverSettings = SolverSettings()
+    notes: tuple[Problem, ...] = ()
+    plan: DesignPlan = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        lengths = [len(axis) for axis in self.axes]
+        given = {name: Source(np.array([value])) for name, value in self.constants.items()}
+        given |= {axis.name: Source(axis.values, (k,)) for k, axis in enumerate(self.axes)}
+        if self.table is not None:
+            lengths = [len(self.table)]
+            given |= {name: Source(values, (0,)) for name, values in self.table.columns.items()}
+        object.__setattr__(self, "plan", DesignPlan(lengths, given))
+
+    @property
+    def n_designs(self) -> int:
+        """Number of designs, exact."""
+        return self.plan.n_designs
+
+    def block(self, start: int, stop: int) -> DesignBlock:
+        """Return the designs ``[start, stop)``; nothing outside of them is made.
+
+        Raises
+        ------
+        IndexError
+            The rows are not within the sweep.
+        """
+        return self.plan.block(start, stop)
+
+    def resolved(self) -> dict[str, Any]:
+        """Return everything that decides the results as plain data: defaults filled in, units in the names.
+
+        Two files that mean the same designs, written in other units or another layout, give the same.
+        Very long axes and tables are stood for by a SHA-256 of their values.
+        """
+        inputs: dict[str, Any] = {}
+        varying = {axis.name: axis.values for axis in self.axes}
+        if self.table is not None:
+            varying |= self.table.columns
+        for name in (*INPUT_COLUMNS[:4], "embedment_ratio", *INPUT_COLUMNS[4:]):
+            if name in varying:
+                inputs[name] = _listed(varying[name])
+            elif name in self.constants:
+                inputs[name] = self.constants[name]
+        inputs.setdefault("impact_height_m", IMPACT_HEIGHT_RULE)
+        accuracy = self.solver.accuracy
+        return {
+            "name": self.name,
+            "n_designs": self.n_designs,
+            "order": "table" if self.table is not None else [axis.name for axis in self.axes],
+            "inputs": inputs,
+            "criterion": {
+                "max_rotation_deg": self.criterion.max_rotation_deg,
+                "rating": self.criterion.rating,
+            },
+            "model": {
+                "preset": self.model.preset,
+                "readings": self.model.readings.as_dict(),
+                "soil": self.model.soil_elements or CLOSED_FORM,
+            },
+            "solver": {
+                "accuracy": accuracy if isinstance(accuracy, str) else None,
+                "accuracy_deg": accuracy if isinstance(accuracy, float) else None,
+                "step_s": self.solver.step_s,
+                "horizon_s": self.solver.horizon_s,
+            },
+        }
+
+
+def _listed(values: np.ndarray) -> Any:
+    """Return values as a list, or as their number and hash where there are very many."""
+    if len(values) <= MAX_LISTED:
+        return [float(value) for value in values]
+    digest = hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()
+    return {"count": len(values), "first": float(values[0]), "last": float(values[-1]), "sha256": digest}
