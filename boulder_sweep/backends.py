@@ -1,0 +1,160 @@
+"""Where blocks are computed: threads of this process, processes of this machine, or a Dask cluster.
+
+Threads are the default: the kernels run without the interpreter's lock, and nothing has to be copied.
+Processes (loky) survive the death of a worker. A Dask cluster reaches other machines. Whatever happens to
+this process, no worker outlives it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from typing import Any
+
+BACKENDS = ("threading", "loky", "dask")
+_LOOK_FOR_PARENT_S = 0.2
+_CONNECT_S = "10s"
+
+
+def available_cores() -> int:
+    """Return how many cores this process may use."""
+    import joblib
+
+    return joblib.cpu_count()
+
+
+class BackendError(Exception):
+    """Workers cannot be had; the text says why and what to do."""
+
+    exit_code = 2
+
+
+class Backend:
+    """One way of computing blocks in parallel, by joblib.
+
+    Parameters
+    ----------
+    name
+        One of `BACKENDS`.
+    jobs
+        How many blocks are computed at once.
+    scheduler
+        Address of a Dask scheduler; None for workers of this process' own.
+
+    Raises
+    ------
+    BackendError
+        Unknown name, Dask not installed, or the scheduler cannot be reached.
+    """
+
+    def __init__(self, name: str, jobs: int, scheduler: str | None = None):
+        if name not in BACKENDS:
+            raise BackendError(f"unknown backend {name!r}: choose one of {', '.join(BACKENDS)}")
+        if scheduler is not None and name != "dask":
+            raise BackendError(f"a scheduler address needs the backend dask, not {name}")
+        self.name = name
+        self.jobs = jobs
+        self._client = _dask_client(jobs, scheduler) if name == "dask" else None
+        if self._client is not None and scheduler is not None:
+            self.jobs = max(sum(self._client.nthreads().values()), 1)
+
+    @property
+    def shares_memory(self) -> bool:
+        """Whether workers see this process' objects, so that nothing has to be sent."""
+        return self.name == "threading"
+
+    @contextmanager
+    def pool(self, jobs: int | None = None) -> Iterator[Any]:
+        """Give a `joblib.Parallel` that yields results in the order in which they are ready.
+
+        Parameters
+        ----------
+        jobs
+            How many workers; as many as the backend has by default.
+        """
+        import joblib
+
+        settings: dict[str, Any] = {
+            "n_jobs": jobs or self.jobs,
+            "return_as": "generator_unordered",
+            "batch_size": 1,
+            "pre_dispatch": "2*n_jobs",
+        }
+        if self.name == "loky":
+            settings |= {"max_nbytes": None, "initializer": _guard, "initargs": (os.getpid(),)}
+        if self._client is None:
+            settings["backend"] = self.name
+            with joblib.Parallel(**settings) as parallel:
+                yield parallel
+        else:
+            with (
+                joblib.parallel_config(backend="dask", client=self._client),
+                joblib.Parallel(**settings) as parallel,
+            ):
+                yield parallel
+
+    def kill_workers(self) -> None:
+        """End worker processes of this machine now, whatever they are doing."""
+        if self.name == "loky":
+            from joblib.externals.loky import get_reusable_executor
+
+            with suppress(Exception):  # they may be dying already
+                get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
+
+    def close(self) -> None:
+        """Let all workers go."""
+        self.kill_workers()
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+
+
+def _dask_client(jobs: int, scheduler: str | None) -> Any:
+    """Connect to a cluster, or make one of threads in this process."""
+    try:
+        Client = import_module("distributed").Client  # an extra: most users have no cluster
+    except ImportError:
+        raise BackendError("the backend dask needs a package: pip install 'dask[distributed]'") from None
+    if scheduler is None:
+        return Client(processes=False, n_workers=1, threads_per_worker=jobs, dashboard_address=None)
+    try:
+        client = Client(scheduler, timeout=_CONNECT_S)
+    except (OSError, ValueError) as problem:
+        raise BackendError(f"no Dask scheduler answers at {scheduler}: {problem}") from problem
+    from .store.provenance import kernels_sha256, rules_sha256, versions
+
+    # Rows of different kernels or versions must not be mixed, wherever they are computed.
+    here = (versions(), kernels_sha256(), rules_sha256())
+    there = client.run(_what_computes)
+    different = [address for address, what in there.items() if tuple(what) != here]
+    if different:
+        client.close()
+        raise BackendError(
+            f"the workers {', '.join(different)} have another version of boulder-sweep, Python or NumPy than "
+            f"this machine; install the same everywhere"
+        )
+    return client
+
+
+def _what_computes() -> tuple[dict[str, str], str, str]:
+    """Return versions and hashes of the code on a worker."""
+    from boulder_sweep.store.provenance import kernels_sha256, rules_sha256, versions
+
+    return versions(), kernels_sha256(), rules_sha256()
+
+
+def _guard(parent: int) -> None:
+    """Make a worker process ignore Ctrl-C, which is its parent's to handle, and end when its parent does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK_FOR_PARENT_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent watch", daemon=True).start()

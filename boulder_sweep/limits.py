@@ -1,0 +1,239 @@
+"""What a run will take: rows by exact arithmetic; time, disk and memory from a timed sample."""
+
+from __future__ import annotations
+
+import resource
+import shutil
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .evaluation import Evaluation
+from .store.writer import ROWS_PER_PART
+
+if TYPE_CHECKING:
+    from .designs import DesignBlock
+
+LARGEST_BLOCK = 32_768
+"""Rows; more would gain nothing and keep memory busy."""
+BLOCK_S = 0.1
+"""Work of one block [s]: long against handing it out, short against the patience of who presses Ctrl-C."""
+MOST_ROWS = 2**63 - 1
+"""Rows that a design_id of 64 bits can number."""
+_SAMPLE_S = 0.1
+_SAMPLE_SIZES = (1, 4, 16, 64, 256, 256, 256, 256, 256, 256)
+_BYTES_UNDER_WAY = 400
+"""Memory of a row between being handed out and being written, inputs, outcomes and encoding together."""
+_WORKER_PROCESS_BYTES = 250_000_000
+_GOLDEN = 0.618033988749895
+
+
+class Sample(NamedTuple):
+    """What a few rows took."""
+
+    seconds_per_row: float
+    """Of one worker."""
+    bytes_per_row: float
+    bytes_per_part: float
+    """What a part takes beside its rows."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a run will take.
+
+    Parameters
+    ----------
+    rows
+        Rows of the whole table.
+    rows_to_compute
+        Those that are not there yet.
+    seconds
+        Time to compute them.
+    disk_bytes, disk_free_bytes
+        Size of what will be written, and room on that disk; room is None where no output was named.
+    memory_bytes, memory_free_bytes
+        Most memory in use, and memory available; None where the system does not tell.
+    rows_per_second
+        Of all workers together.
+    rows_per_block
+        Rows handed to a worker at once.
+    jobs
+        Workers.
+    """
+
+    rows: int
+    rows_to_compute: int
+    seconds: float
+    disk_bytes: int
+    disk_free_bytes: int | None
+    memory_bytes: int
+    memory_free_bytes: int | None
+    rows_per_second: float
+    rows_per_block: int
+    jobs: int
+
+    def objections(self) -> list[str]:
+        """Say what does not fit, with the numbers; empty where all does."""
+        found = []
+        if self.disk_free_bytes is not None and self.disk_bytes > self.disk_free_bytes:
+            found.append(
+                f"the table of {self.rows:,} rows needs about {size_text(self.disk_bytes)} of disk, "
+                f"and {size_text(self.disk_free_bytes)} are free"
+            )
+        if self.memory_free_bytes is not None and self.memory_bytes > self.memory_free_bytes:
+            found.append(
+                f"{self.jobs} workers need about {size_text(self.memory_bytes)} of memory, "
+                f"and {size_text(self.memory_free_bytes)} are available"
+            )
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return asdict(self)
+
+
+def take_sample(
+    evaluation: Evaluation,
+    make_block: Callable[[int, int], DesignBlock],
+    rows: int,
+    metadata: Mapping[bytes, bytes],
+) -> Sample:
+    """Compute a few rows spread over the table and take the time; the kernels must be warm.
+
+    Parameters
+    ----------
+    evaluation
+        How designs are simulated and judged.
+    make_block
+        Gives the inputs of some rows.
+    rows
+        Rows of the whole table.
+    metadata
+        For the metadata of a part.
+    """
+    from .store.schema import encode, part_table
+
+    sampled, spent, written, parts = 0, 0.0, 0, 0
+    for place, size in enumerate(_SAMPLE_SIZES):
+        size = min(size, rows)
+        start = int(place * _GOLDEN % 1.0 * (rows - size))
+        begun = time.perf_counter()
+        block = make_block(start, start + size)
+        judged = evaluation(block)
+        spent += time.perf_counter() - begun
+        written += len(encode(part_table(block, judged, metadata)))
+        sampled += size
+        parts += 1
+        if spent > _SAMPLE_S or sampled >= rows:
+            break
+    empty = len(encode(part_table(make_block(0, 1), evaluation(make_block(0, 1)), metadata)))
+    return Sample(
+        seconds_per_row=spent / sampled,
+        bytes_per_row=max(written - parts * empty, 0) / sampled,
+        bytes_per_part=empty,
+    )
+
+
+def estimated(
+    sample: Sample,
+    *,
+    rows: int,
+    rows_to_compute: int,
+    jobs: int,
+    out: Path | None,
+    rows_per_part: int = ROWS_PER_PART,
+    worker_processes: bool = False,
+) -> Estimate:
+    """Work out what a run will take from a sample.
+
+    Parameters
+    ----------
+    sample
+        What a few rows took.
+    rows, rows_to_compute
+        Of the whole table; not there yet.
+    jobs
+        Workers.
+    out
+        Output folder, for the room on its disk.
+    rows_per_part
+        Rows of a part.
+    worker_processes
+        Whether workers are processes of their own.
+    """
+    per_block = rows_per_block(sample.seconds_per_row, rows_to_compute, jobs)
+    parts = -(-rows_to_compute // rows_per_part)
+    memory = _BYTES_UNDER_WAY * rows_under_way(per_block, jobs, rows_per_part) + _resident_bytes()
+    if worker_processes:
+        memory += jobs * _WORKER_PROCESS_BYTES
+    return Estimate(
+        rows=rows,
+        rows_to_compute=rows_to_compute,
+        seconds=rows_to_compute * sample.seconds_per_row / jobs,
+        disk_bytes=int(rows_to_compute * sample.bytes_per_row + parts * sample.bytes_per_part),
+        disk_free_bytes=None if out is None else _disk_free(out),
+        memory_bytes=memory,
+        memory_free_bytes=_memory_free(),
+        rows_per_second=jobs / sample.seconds_per_row,
+        rows_per_block=per_block,
+        jobs=jobs,
+    )
+
+
+def rows_per_block(seconds_per_row: float, rows: int, jobs: int) -> int:
+    """Return how many rows to hand out at once: some work each, and enough blocks for every worker."""
+    by_time = int(BLOCK_S / max(seconds_per_row, 1e-9))
+    by_share = -(-rows // (4 * jobs))
+    return max(1, min(by_time, by_share, LARGEST_BLOCK))
+
+
+def rows_under_way(block: int, jobs: int, rows_per_part: int) -> int:
+    """Return how many rows may be under way: two parts being filled, and blocks to keep workers busy."""
+    return 2 * rows_per_part + 4 * jobs * block
+
+
+def blocks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:
+    """Cut ranges of rows [start, stop) into blocks of a size or less, lazily."""
+    for start, stop in ranges:
+        for first in range(start, stop, size):
+            yield first, min(first + size, stop)
+
+
+def size_text(size: float) -> str:
+    """Write a number of bytes for people."""
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if size < 1000:
+            return f"{size:.0f} bytes" if unit == "bytes" else f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:,.0f} PB"
+
+
+def _disk_free(out: Path) -> int:
+    """Room on the disk where a folder is, or would be made."""
+    place = out
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    return shutil.disk_usage(place).free
+
+
+def _resident_bytes() -> int:
+    """Memory this process has used at most so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _memory_free() -> int | None:
+    """Memory this process may still take, its own included: the system's, or less if its group is limited."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
+    except (OSError, StopIteration, ValueError):
+        return None
+    for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        try:
+            free = min(free, int(Path(name).read_text()))
+        except (OSError, ValueError):  # no such group, or "max"
+            continue
+    return free + _resident_bytes()

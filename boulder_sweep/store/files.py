@@ -1,0 +1,123 @@
+"""Files that appear whole or not at all, and that survive a power cut once they are there.
+
+A file is written without a name where the file system can do that (``O_TMPFILE``: Linux on ext4, XFS,
+Btrfs, tmpfs), else under a name that begins with ``_``; it is flushed to the disk, gets its name in one step,
+and then the folder is flushed. So whoever reads the folder meets finished files only, also after ``kill -9``
+at any instant, and a killed run leaves nothing half-written behind.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+WRITING_SUFFIX = ".writing"
+"""Ending of a file that has not got its final name yet; such names begin with ``_``: readers skip them."""
+_PIECE = 8 << 20
+_NO_REMEDY = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+
+
+@contextmanager
+def opened_folder(folder: Path) -> Iterator[int]:
+    """Give a descriptor of a folder, to flush it and to create files relative to it."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def flush_folder(folder: Path) -> None:
+    """Make the names in a folder durable."""
+    with opened_folder(folder) as descriptor:
+        os.fsync(descriptor)
+
+
+def put_file(folder: Path, name: str, content: memoryview | bytes, passing_name: str | None = None) -> None:
+    """Put a file into a folder in one step, replacing what has its name, and make it durable.
+
+    Parameters
+    ----------
+    folder
+        Where.
+    name
+        Its name.
+    content
+        All of it.
+    passing_name
+        Name it may have for an instant when it replaces a file; by default ``_<name>.writing``.
+
+    Raises
+    ------
+    OSError
+        Nothing has changed then: a file of that name is still the old one, and nothing is left behind.
+    """
+    passing = passing_name or f"_{name}{WRITING_SUFFIX}"
+    with opened_folder(folder) as at:
+        if not _put_unnamed(at, name, content, passing):
+            _put_named(at, name, content, passing)
+        os.fsync(at)
+
+
+def _put_unnamed(at: int, name: str, content: memoryview | bytes, passing: str) -> bool:
+    """Write a file that has no name until it is whole; False where the file system cannot do that."""
+    flag = getattr(os, "O_TMPFILE", None)
+    if flag is None:
+        return False
+    try:
+        descriptor = os.open(".", flag | os.O_WRONLY, 0o666, dir_fd=at)
+    except OSError:
+        # Not every file system can; a real reason (no right, no space) meets _put_named as well.
+        return False
+    try:
+        _write_all(descriptor, content)
+        # linkat follows the link to the nameless file only if the folder is given by a descriptor.
+        source = f"/proc/self/fd/{descriptor}"
+        try:
+            os.link(source, name, dst_dir_fd=at, follow_symlinks=True)
+        except FileExistsError:
+            _remove(at, passing)
+            os.link(source, passing, dst_dir_fd=at, follow_symlinks=True)
+            try:
+                os.rename(passing, name, src_dir_fd=at, dst_dir_fd=at)
+            except BaseException:
+                _remove(at, passing)
+                raise
+    except OSError as problem:
+        if problem.errno in _NO_REMEDY:
+            raise
+        return False  # no /proc, or links from there not allowed
+    finally:
+        os.close(descriptor)
+    return True
+
+
+def _put_named(at: int, name: str, content: memoryview | bytes, passing: str) -> None:
+    """Write a file under a passing name, then give it its own."""
+    descriptor = os.open(passing, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666, dir_fd=at)
+    try:
+        try:
+            _write_all(descriptor, content)
+        finally:
+            os.close(descriptor)
+        os.rename(passing, name, src_dir_fd=at, dst_dir_fd=at)
+    except BaseException:
+        _remove(at, passing)
+        raise
+
+
+def _remove(at: int, name: str) -> None:
+    """Remove a file if it can be."""
+    with suppress(OSError):
+        os.unlink(name, dir_fd=at)
+
+
+def _write_all(descriptor: int, content: memoryview | bytes) -> None:
+    """Write everything and flush it to the disk."""
+    rest = memoryview(content)
+    while rest:
+        rest = rest[os.write(descriptor, rest[:_PIECE]) :]
+    os.fsync(descriptor)

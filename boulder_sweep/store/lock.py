@@ -1,0 +1,146 @@
+"""One writer to a folder: a lock that the system lets go of when its holder dies.
+
+The lock is `flock` on the empty file ``_lock``. A killed run therefore never leaves a folder locked, and the
+file it leaves behind is recognised as stale because the lock on it can be had. On network folders the lock
+may not reach other machines; there the holder's sign of life counts, the time of ``_lock``, which it renews.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import socket
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from .errors import FolderInUseError, WriteError
+
+LOCK_NAME = "_lock"
+SIGN_OF_LIFE_S = 10.0
+"""How often the holder renews the time of the lock file [s]."""
+_DEAD_AFTER_S = 6 * SIGN_OF_LIFE_S
+_ATTEMPTS = 4
+_NOT_SUPPORTED = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
+
+
+class FolderLock:
+    """The right to write into a folder, held from construction to `release`.
+
+    Parameters
+    ----------
+    folder
+        The folder, which exists.
+    last_host
+        Machine of the last run into this folder that did not end properly, if any.
+    holder
+        Words for the run that seems to hold the lock.
+
+    Raises
+    ------
+    FolderInUseError
+        Another run holds it.
+    WriteError
+        The lock file cannot be made, as in a read-only folder.
+    """
+
+    def __init__(self, folder: Path, last_host: str | None, holder: str):
+        self._path = folder / LOCK_NAME
+        self.stale = self._path.exists()
+        """Whether a run that died had left its lock file."""
+        age = self._age()
+        while True:
+            try:
+                descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            except OSError as problem:
+                raise WriteError(f"cannot write into {folder}: {problem.strerror}") from problem
+            try:
+                shared = _lock(descriptor)
+            except BlockingIOError:
+                os.close(descriptor)
+                raise FolderInUseError(f"{folder} is being written by {holder}") from None
+            # The holder before may have removed the file between opening and locking: then begin again.
+            if _is(self._path, descriptor):
+                break
+            os.close(descriptor)
+        elsewhere = last_host is not None and last_host != socket.gethostname()
+        if (elsewhere or not shared) and self.stale and age < _DEAD_AFTER_S:
+            os.close(descriptor)
+            raise FolderInUseError(
+                f"{folder} seems to be written by {holder}: it gave a sign of life {age:.0f} s ago. "
+                f"If that run is dead, try again in {_DEAD_AFTER_S:.0f} s"
+            )
+        self._descriptor: int | None = descriptor
+        self._renewed = time.monotonic()
+        os.utime(descriptor)
+
+    def renew(self) -> None:
+        """Give a sign of life; cheap, to be called often."""
+        if self._descriptor is not None and time.monotonic() - self._renewed > SIGN_OF_LIFE_S:
+            self._renewed = time.monotonic()
+            with suppress(OSError):
+                os.utime(self._descriptor)
+
+    def release(self) -> None:
+        """Let go; may be called twice."""
+        if self._descriptor is None:
+            return
+        with suppress(OSError):
+            if _is(self._path, self._descriptor):
+                self._path.unlink()
+        os.close(self._descriptor)
+        self._descriptor = None
+
+    def _age(self) -> float:
+        """Seconds since the last sign of life."""
+        try:
+            return max(time.time() - self._path.stat().st_mtime, 0.0)
+        except OSError:
+            return float("inf")
+
+
+def is_locked(folder: Path) -> bool:
+    """Whether a run on this machine, or one that shares its locks, writes into a folder now."""
+    try:
+        descriptor = os.open(folder / LOCK_NAME, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    else:
+        return False
+    finally:
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open file; False where the file system knows no locks."""
+    for attempt in range(_ATTEMPTS):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if attempt == _ATTEMPTS - 1:
+                raise
+            time.sleep(0.05)  # it may only be someone who asks `is_locked`
+        except OSError as problem:
+            if problem.errno in _NOT_SUPPORTED:
+                return False
+            raise
+        else:
+            break
+    return True
+
+
+def _is(path: Path, descriptor: int) -> bool:
+    """Whether a path still names an open file."""
+    try:
+        there = path.stat()
+    except OSError:
+        return False
+    mine = os.fstat(descriptor)
+    return (there.st_dev, there.st_ino) == (mine.st_dev, mine.st_ino)

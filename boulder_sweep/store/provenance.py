@@ -1,0 +1,208 @@
+"""Who can repeat this table? What it was computed from, with what, and on what.
+
+The *identity* is what must be equal for rows to belong to one table: settings, control of the integration,
+versions and the hashes of the code that decides a row. It goes into every part and into the manifest, and a
+run goes on only with the same. When, where and with how many workers rows were computed changes nothing in
+them; that is kept in the manifest only, so that equal runs give equal parts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import socket
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from .manifest import Session
+
+PREFIX = "boulder_sweep."
+"""Beginning of the names of this package's entries in the metadata of a file."""
+_PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
+_PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
+_DECIDING_SOURCES = ("accuracy.py", "designs.py", "evaluation.py", "verdict.py")
+"""Modules beside the kernels whose code decides what stands in a row."""
+
+
+def canonical(content: Any) -> str:
+    """JSON that is the same text for the same content."""
+    return json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def sha256_of(content: Any) -> str:
+    """SHA-256 of the canonical JSON of some content."""
+    return hashlib.sha256(canonical(content).encode()).hexdigest()
+
+
+def identity(
+    settings: Mapping[str, Any], readings: Mapping[str, Any], control: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Collect what rows of one table have in common.
+
+    Parameters
+    ----------
+    settings
+        The resolved settings: every default filled in, units in the names.
+    readings
+        Which formulas are read as printed.
+    control
+        How the motion is integrated: step, horizon, limit, soil elements.
+
+    Returns
+    -------
+    dict
+        Plain data with the keys ``settings``, ``readings``, ``control``, ``versions``, ``settings_sha256``,
+        ``kernels_sha256``, ``rules_sha256``.
+    """
+    return {
+        "settings": dict(settings),
+        "readings": dict(readings),
+        "control": dict(control),
+        "versions": versions(),
+        "settings_sha256": sha256_of(settings),
+        "kernels_sha256": kernels_sha256(),
+        "rules_sha256": rules_sha256(),
+    }
+
+
+def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+    """Say in which entries two identities differ, one line each; hashes only where nothing else tells."""
+    before, after = _flat(there), _flat(here)
+    changed = [key for key in {**before, **after} if before.get(key, _ABSENT) != after.get(key, _ABSENT)]
+    telling = [key for key in changed if not key.endswith("_sha256")]
+    if any(key.startswith("settings.") for key in telling):
+        changed = [key for key in changed if key != "settings_sha256"]
+    return [f"{key}: {_shown(before, key)} -> {_shown(after, key)}" for key in changed]
+
+
+def file_metadata(identity_: Mapping[str, Any], repeat: str) -> dict[bytes, bytes]:
+    """Metadata of a part: its identity, and beside it the command, commit and processor.
+
+    Parameters
+    ----------
+    identity_
+        See `identity`.
+    repeat
+        Command that computes the same table.
+    """
+    entries = {**identity_, "repeat": repeat, "commit": commit(), "cpu": cpu_name()}
+    return {
+        f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode()
+        for key, value in entries.items()
+        if value is not None
+    }
+
+
+def new_session(command: str, jobs: int, backend: str) -> Session:
+    """Describe the run that begins now."""
+    return Session(
+        started=now(),
+        host=socket.gethostname(),
+        pid=os.getpid(),
+        cpu=cpu_name(),
+        jobs=jobs,
+        backend=backend,
+        command=command,
+    )
+
+
+def now() -> str:
+    """Time in ISO 8601, UTC, to the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that compute and write rows."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:  # a source tree that is not installed
+            found[package] = "unknown"
+    return found
+
+
+@cache
+def kernels_sha256() -> str:
+    """Hash of the sources of the compiled kernels."""
+    import boulder_kernels
+
+    folder = Path(boulder_kernels.__file__).parent
+    return _sources_sha256(sorted(folder.glob("*.py")))
+
+
+@cache
+def rules_sha256() -> str:
+    """Hash of the sources that turn settings into designs and outcomes into verdicts."""
+    return _sources_sha256([_PACKAGE_FOLDER / name for name in _DECIDING_SOURCES])
+
+
+@cache
+def cpu_name() -> str:
+    """Name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor() or platform.machine())
+
+
+@cache
+def commit() -> str | None:
+    """Git commit of the source tree this package runs from; None for an installed package."""
+    folder = _PACKAGE_FOLDER.parent
+    try:
+        if 'name = "boulder-sweep"' not in (folder / "pyproject.toml").read_text():
+            return None
+        head = (folder / ".git" / "HEAD").read_text().strip()
+        if not head.startswith("ref: "):
+            return head
+        reference = head.removeprefix("ref: ")
+        loose = folder / ".git" / reference
+        if loose.exists():
+            return loose.read_text().strip()
+        packed = (folder / ".git" / "packed-refs").read_text().splitlines()
+    except OSError:
+        return None
+    return next((line.split()[0] for line in packed if line.endswith(f" {reference}")), None)
+
+
+def _sources_sha256(sources: list[Path]) -> str:
+    """Hash over names and contents."""
+    digest = hashlib.sha256()
+    for source in sources:
+        digest.update(source.name.encode())
+        digest.update(source.read_bytes() if source.exists() else b"")
+    return digest.hexdigest()
+
+
+_ABSENT = object()
+
+
+def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Entries of nested mappings under dotted names."""
+    entries: dict[str, Any] = {}
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            entries.update(_flat(value, f"{prefix}{key}."))
+        else:
+            entries[f"{prefix}{key}"] = value
+    return entries
+
+
+def _shown(entries: Mapping[str, Any], key: str) -> str:
+    """Short text of one entry."""
+    if key not in entries:
+        return "(none)"
+    text = json.dumps(entries[key], ensure_ascii=False)
+    if key.endswith("_sha256"):
+        return text.strip('"')[:12]
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,159 @@
+"""The table on disk: types, units, encodings, and the way from columns of numbers to the bytes of a part.
+
+Inputs repeat a few values over and over, so they are stored by a dictionary and travel as codes from the grid
+to the file, never row by row. Computed numbers hardly ever repeat: their bytes are stored split by
+significance, which compresses best. Every page carries a checksum. Nothing here depends on the time or on the
+load of the machine, so the same rows give the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUTS, OUTCOME_COLUMNS, OUTCOMES, ColumnSpec
+from boulder_sweep.judged import RATINGS, REASONS, VERDICTS, Judged
+
+if TYPE_CHECKING:
+    from boulder_sweep.designs import Column, DesignBlock
+
+COMPRESSION, COMPRESSION_LEVEL = "zstd", 3
+PANDAS_ATTRIBUTES = b"PANDAS_ATTRS"
+"""Metadata that pandas puts into ``DataFrame.attrs`` of what it reads."""
+_WORDS = {"verdict": VERDICTS, "rating": RATINGS}
+_TYPES = {
+    "int64": pa.int64(),
+    "float64": pa.float64(),
+    "dictionary": pa.dictionary(pa.int32(), pa.string()),
+}
+
+
+def table_schema(metadata: Mapping[bytes, bytes] | None = None) -> pa.Schema:
+    """Return the schema of the table, with unit and meaning of every column in its field metadata.
+
+    Parameters
+    ----------
+    metadata
+        Goes into the metadata of the file.
+    """
+    return pa.schema([_field(spec, _TYPES[spec.type]) for spec in COLUMNS], metadata=_complete(metadata))
+
+
+def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, bytes]) -> pa.Table:
+    """Put the inputs and outcomes of the same rows together.
+
+    Parameters
+    ----------
+    block
+        Inputs of the rows [start, stop).
+    judged
+        Outcomes of the same rows.
+    metadata
+        Goes into the metadata of the file.
+
+    Returns
+    -------
+    pyarrow.Table
+        Columns in the order of the register; null where a value is NaN.
+    """
+    arrays = [pa.array(np.arange(block.start, block.stop, dtype=np.int64))]
+    arrays += [_input_array(block.columns[spec.name]) for spec in INPUTS]
+    arrays += [_outcome_array(spec.name, judged) for spec in OUTCOMES]
+    fields = [_field(spec, array.type) for spec, array in zip(COLUMNS, arrays, strict=True)]
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata)))
+
+
+def encode(table: pa.Table) -> memoryview:
+    """Return the bytes of a Parquet file with the whole table in one row group."""
+    split = [
+        field.name
+        for field in table.schema
+        if field.name != DESIGN_ID.name and pa.types.is_floating(field.type)
+    ]
+    by_dictionary = [field.name for field in table.schema if pa.types.is_dictionary(field.type)]
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table,
+        sink,
+        compression=COMPRESSION,
+        compression_level=COMPRESSION_LEVEL,
+        use_dictionary=by_dictionary,
+        use_byte_stream_split=split,
+        column_encoding={DESIGN_ID.name: "DELTA_BINARY_PACKED"},
+        write_page_checksum=True,
+        row_group_size=max(len(table), 1),
+    )
+    return memoryview(sink.getvalue())
+
+
+def judged_rows(table: pa.Table) -> Judged:
+    """Return the outcomes held by a table that was read back, as they were before it was written."""
+    columns: dict[str, Any] = {}
+    for name in OUTCOME_COLUMNS:
+        column = table[name]
+        if name == "reason":
+            reasons, columns[name] = _coded(column, REASONS)
+        elif name in _WORDS:
+            _, columns[name] = _coded(column, _WORDS[name])
+            columns[name] = columns[name].astype(np.int8)
+        else:
+            columns[name] = column.to_numpy()  # null becomes NaN
+    return Judged(**columns, reasons=reasons)
+
+
+def _field(spec: ColumnSpec, type_: pa.DataType) -> pa.Field:
+    """One field with its unit and meaning."""
+    return pa.field(spec.name, type_, metadata={"unit": spec.unit, "meaning": spec.meaning})
+
+
+def _complete(metadata: Mapping[bytes, bytes] | None) -> dict[bytes, bytes]:
+    """File metadata with the units for pandas added."""
+    attributes = {
+        "units": {spec.name: spec.unit for spec in COLUMNS},
+        "meanings": {spec.name: spec.meaning for spec in COLUMNS},
+    }
+    return {PANDAS_ATTRIBUTES: json.dumps(attributes).encode(), **(metadata or {})}
+
+
+def _input_array(column: Column) -> pa.Array:
+    """One input column; its codes become the indices of a dictionary array without being looked up."""
+    missing = np.isnan(column.values)
+    if column.codes is None:
+        return pa.array(column.values, mask=missing)
+    mask = missing[column.codes] if missing.any() else None
+    return pa.DictionaryArray.from_arrays(pa.array(column.codes, mask=mask), pa.array(column.values))
+
+
+def _outcome_array(name: str, judged: Judged) -> pa.Array:
+    """One outcome column."""
+    values = getattr(judged, name)
+    if name == "reason":
+        return _word_array(values, judged.reasons)
+    if name in _WORDS:
+        return _word_array(values, _WORDS[name])
+    return pa.array(values, mask=np.isnan(values))
+
+
+def _word_array(codes: np.ndarray, words: tuple[str, ...]) -> pa.DictionaryArray:
+    """Array of words from codes; code -1 is null."""
+    indices = pa.array(codes.astype(np.int32), mask=codes < 0)
+    return pa.DictionaryArray.from_arrays(indices, pa.array(words, pa.string()))
+
+
+def _coded(column: pa.ChunkedArray, words: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+    """Words of a column, the known ones first, and the code of each row; -1 where it is null."""
+    array = column.unify_dictionaries().combine_chunks()
+    if isinstance(array, pa.ChunkedArray):
+        array = array.chunk(0)
+    found = array.dictionary.to_pylist()
+    words = (*words, *(word for word in found if word not in words))
+    translation = np.array([words.index(word) for word in found], dtype=np.int32)
+    codes = np.full(len(array), -1, dtype=np.int32)
+    present = array.is_valid().to_numpy(zero_copy_only=False)
+    codes[present] = translation[array.indices.drop_null().to_numpy()]
+    return words, codes

@@ -1,0 +1,129 @@
+"""How far a run got, what is missing or damaged, and how to go on."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .lock import is_locked
+from .manifest import Session, load
+from .verify import sized_parts, verified_parts
+
+
+@dataclass(frozen=True)
+class RunStatus:
+    """State of an output folder.
+
+    Parameters
+    ----------
+    out
+        The folder.
+    rows, rows_done
+        Rows of the whole table, and those in finished, undamaged parts.
+    parts, parts_done
+        Files of the whole table, and finished ones that hold all their rows.
+    running
+        Whether a run writes into it now.
+    verified
+        Whether every part was read and its checksum compared.
+    damaged
+        What is wrong with damaged parts, by file name.
+    missing
+        Ranges [start, stop) of rows that are not there; the first hundred, neighbours joined.
+    verdicts
+        How many rows have each verdict and reason, keyed ``verdict/reason``.
+    bytes
+        Size of the finished parts.
+    sessions
+        Runs into this folder, oldest first.
+    identity
+        Settings, versions and hashes that all rows share.
+    resume_command
+        The command to go on with; None when everything is there.
+    """
+
+    out: str
+    rows: int
+    rows_done: int
+    parts: int
+    parts_done: int
+    running: bool
+    verified: bool
+    damaged: dict[str, str]
+    missing: list[tuple[int, int]]
+    verdicts: dict[str, int]
+    bytes: int
+    resume_command: str | None
+    sessions: list[Session] = field(repr=False)
+    identity: dict[str, Any] = field(repr=False)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every row is there."""
+        return self.rows_done == self.rows
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {**asdict(self), "complete": self.complete}
+
+
+_MISSING_SHOWN = 100
+_ATTEMPTS = 3
+
+
+def status(out: str | Path, *, verify: bool = False) -> RunStatus:
+    """Look at an output folder; nothing is changed, and a run may be writing into it.
+
+    Parameters
+    ----------
+    out
+        The folder.
+    verify
+        Read every part and compare its checksum: finds changed bytes, not only missing ones.
+
+    Raises
+    ------
+    NotASweepError
+        There is no result in the folder.
+    DamagedError
+        The manifest cannot be trusted.
+    """
+    folder = Path(out)
+    for _ in range(_ATTEMPTS):
+        running = is_locked(folder)
+        manifest = load(folder)
+        whole, damaged = verified_parts(folder, manifest) if verify else sized_parts(folder, manifest)
+        # A part may have been replaced by a longer one since the manifest was read: then look again.
+        if not (damaged and running):
+            break
+    manifest.parts = whole
+    missing: list[tuple[int, int]] = []
+    for start, stop in manifest.missing():
+        if missing and missing[-1][1] == start:
+            missing[-1] = (missing[-1][0], stop)
+        elif len(missing) == _MISSING_SHOWN:
+            break
+        else:
+            missing.append((start, stop))
+    full = sum(
+        part.now.rows == min(manifest.rows_per_part, manifest.rows - part.first)
+        for part in manifest.parts.values()
+    )
+    done = manifest.rows_done
+    return RunStatus(
+        out=str(folder),
+        rows=manifest.rows,
+        rows_done=done,
+        parts=manifest.part_count,
+        parts_done=full,
+        running=running,
+        verified=verify,
+        damaged=damaged,
+        missing=missing,
+        verdicts=manifest.verdicts,
+        bytes=sum(part.now.bytes for part in manifest.parts.values()),
+        resume_command=None if done == manifest.rows else manifest.resume_command,
+        sessions=manifest.sessions,
+        identity=manifest.identity,
+    )
