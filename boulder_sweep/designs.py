@@ -154,7 +154,10 @@ def embedment_of_ratio(ratio: np.ndarray, height: np.ndarray) -> np.ndarray:
 def impact_height_of_face(
     height: np.ndarray, embedment: np.ndarray, bumper: np.ndarray, hood: np.ndarray
 ) -> np.ndarray:
-    """Return the impact height over the soil line [m], Eq 9: e = (e' + e_bumper) / 2, e' = min(H - d, hood)."""
+    """Return the impact height over the soil line [m], Eq 9.
+
+    e = (e' + e_bumper) / 2 with e' = min(H - d, hood height).
+    """
     return 0.5 * (np.minimum(height - embedment, hood) + bumper)
 
 

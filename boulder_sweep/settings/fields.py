@@ -1,4 +1,4 @@
-"""The quantities a file can give: key, column, unit, default. One register for reading, checking and telling."""
+"""The quantities a file can give: key, column, unit, default. One register for all."""
 
 from __future__ import annotations
 

@@ -91,7 +91,9 @@ def read_leaf(node: Node, field: Field) -> Leaf:
     if isinstance(node, Mapping):
         values = _read_range(node, field)
         return Leaf(np.array(values), True, node.place)
-    items = node.items if isinstance(node, Sequence) else [node]
+    items: list[Node] = [node]
+    if isinstance(node, Sequence):
+        items = node.items
     if not items:
         raise LeafError([Mistake(node.place, "the list is empty; give at least one value")])
     if len(items) > MAX_AXIS:
@@ -238,7 +240,8 @@ def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str) -
     if steps < 0:
         way = "downwards" if last < first else "upwards"
         raise NumberError(
-            f"the range goes {way} and the step does not; exchange from and to, or change the sign of the step"
+            f"the range goes {way} and the step does not; "
+            "exchange from and to, or change the sign of the step"
         )
     if steps >= MAX_AXIS:
         raise NumberError(

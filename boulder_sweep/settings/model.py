@@ -104,7 +104,8 @@ class SolverSettings:
     Attributes
     ----------
     accuracy : str, float or None
-        ``fast``, ``balanced``, ``fine``, or the admitted error of the rotation [deg]; None where a step is given.
+        ``fast``, ``balanced``, ``fine``, or the admitted error of the rotation [deg];
+        None where a step is given.
     step_s : float or None
         Step [s]; None where an accuracy is given.
     horizon_s : float

@@ -81,9 +81,10 @@ def _mixed_families(sweep: Sweep, angle: np.ndarray, reaction: np.ndarray) -> st
         return ""
     one, other = np.flatnonzero(near_api)[-1], np.flatnonzero(~near_api)[0]
     return (
-        f"two families of data are mixed: {pairs[1][one]:g} MN/m^3 at {pairs[0][one]:g} deg lies near the API curve, "
-        f"{pairs[1][other]:g} MN/m^3 at {pairs[0][other]:g} deg near Terzaghi's values, which are about five times "
-        "smaller for the same soil; take both soil constants from one source"
+        "two families of data are mixed: "
+        f"{pairs[1][one]:g} MN/m^3 at {pairs[0][one]:g} deg lies near the API curve, "
+        f"{pairs[1][other]:g} MN/m^3 at {pairs[0][other]:g} deg near Terzaghi's values, which are "
+        "several times smaller for the same soil; take both soil constants from one source"
     )
 
 

@@ -55,7 +55,8 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Qu
     if outer_unit is not None:
         if unit_text:
             raise NumberError(
-                f"'{shorten(node.text)}' has a unit and so has the list ('{shorten(outer_unit.text)}'); give one of them"
+                f"'{shorten(node.text)}' has a unit and so has the list ('{shorten(outer_unit.text)}'); "
+                "give one of them"
             )
         unit_text = outer_unit.text
     if not unit_text:
@@ -94,7 +95,8 @@ def split_number(text: str, unit: str) -> tuple[Fraction, str]:
         )
     if rest[:1] in (",", "_", "'", ".") or re.match(r"\s+\d", rest):
         raise NumberError(
-            f"{quoted} is not a plain number; write a decimal point and no signs between the thousands, as in 6800.5"
+            f"{quoted} is not a plain number; "
+            "write a decimal point and no signs between the thousands, as in 6800.5"
         )
     if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
         raise NumberError(

@@ -35,28 +35,26 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
     for text in overrides:
         key, equals, value_text = text.partition("=")
         path = key.strip().split(".")
-        place = Place(f"--set {shorten(key.strip()) or shorten(text)}")
+        place, name = Place("--set"), shorten(key.strip())
         if not equals or not all(path) or len(path) > 4:
-            problems.add(
-                Place("--set"), "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'"
-            )
+            problems.add(place, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
             continue
         if len(text) > MAX_OVERRIDE:
-            problems.add(place, "", f"is longer than {MAX_OVERRIDE} characters; write it into the file")
+            problems.add(place, name, f"is longer than {MAX_OVERRIDE} characters; write it into the file")
             continue
-        value = _read_value(value_text, place, problems)
+        value = _read_value(value_text, name, place, problems)
         if value is not None:
             _put(root, path, value, place)
 
 
-def _read_value(text: str, place: Place, problems: ProblemList) -> Node | None:
+def _read_value(text: str, name: str, place: Place, problems: ProblemList) -> Node | None:
     found = ProblemList()
     try:
         value = parse_node(text, place.file, found)
     except SettingsError:
         value = None  # its problems are in `found`
     for problem in found.problems:
-        problems.add(place, problem.key, problem.message)
+        problems.add(place, name, problem.message)
     if value is None:
         return None if found else Scalar(place, "")
     _move(value, place)

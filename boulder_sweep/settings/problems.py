@@ -112,11 +112,17 @@ def shorten(text: str, limit: int = 60) -> str:
     return flat if len(flat) <= limit else flat[: limit - 3] + "..."
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean ...?"`` for the known word nearest to `word`, or an empty string."""
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word nearest to `word`, None if there is none near."""
     # difflib takes a few milliseconds to import and is needed for mistakes only.
     from difflib import get_close_matches
 
     candidates = {name.lower(): name for name in known}
     near = get_close_matches(word.lower()[:80], candidates, n=1, cutoff=0.6)
-    return f"; did you mean {candidates[near[0]]}?" if near else ""
+    return candidates[near[0]] if near else None
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean ...?"`` for the known word nearest to `word`, or an empty string."""
+    near = nearest(word, known)
+    return f"; did you mean {near}?" if near else ""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, ValidationInfo, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from boulder_sweep.settings.bounds import MAX_ELEMENTS
@@ -31,11 +31,18 @@ T = TypeVar("T")
 
 
 def _reader(read: Callable[[Node], T]) -> PlainValidator:
-    """Return `read` as a validator of pydantic: all mistakes of an entry, each with its own place."""
+    """Return `read` as a validator of pydantic: all mistakes of an entry, each with its own place.
 
-    def validate(node: Any) -> T:
+    What could be read is left in the validation context under the key's name, so that it can be compared with
+    other entries even if its block holds a mistake elsewhere.
+    """
+
+    def validate(node: Any, info: ValidationInfo) -> T:
         try:
-            return read(node)
+            value = read(node)
+            if info.context is not None:
+                info.context[info.field_name] = value
+            return value
         except LeafError as error:
             lines = [
                 InitErrorDetails(
@@ -89,7 +96,8 @@ def _read_readings(node: Node) -> ReadingChoice:
                 switches[entry.key] = SWITCHES[entry.key] if value == "corrected" else value
             else:
                 known = ("preset", *SWITCHES)
-                message = f"'{shorten(entry.key)}' is not a reading ({', '.join(known)}){did_you_mean(entry.key, known)}"
+                hint = did_you_mean(entry.key, known)
+                message = f"'{shorten(entry.key)}' is not a reading ({', '.join(known)}){hint}"
                 mistakes.append(Mistake(entry.place, message))
         except LeafError as error:
             mistakes.extend(error.mistakes)

@@ -89,9 +89,9 @@ class Sweep:
     axes: tuple[Axis, ...]
     constants: dict[str, float]
     table: DesignList | None = None
-    criterion: Criterion = Criterion()
-    model: Model = Model()
-    solver: SolverSettings = SolverSettings()
+    criterion: Criterion = field(default_factory=Criterion)
+    model: Model = field(default_factory=Model)
+    solver: SolverSettings = field(default_factory=SolverSettings)
     notes: tuple[Problem, ...] = ()
     plan: DesignPlan = field(init=False, repr=False)
 

@@ -1,4 +1,4 @@
-"""Units at the edge: every unit a user may write, its conversion, and what is wrong with one that does not fit.
+"""Units at the edge: every unit a user may write, its conversion, and what does not fit.
 
 The vocabulary is closed: pint knows exactly the units below and nothing else, so that a slip of the pen is
 an error and not some exotic unit of the same name. Conversions are exact decimal fractions.
@@ -166,11 +166,11 @@ def factor(text: str, target: str) -> Fraction:
 
 
 @cache
-def _registry() -> UnitRegistry:
+def _registry() -> UnitRegistry[Decimal]:
     # pint takes as long to import as everything else of `sweep check`: only files with units pay for it.
     from pint import UnitRegistry
 
-    registry = UnitRegistry(None, non_int_type=Decimal)
+    registry: UnitRegistry[Decimal] = UnitRegistry(None, non_int_type=Decimal)
     registry.load_definitions(_DEFINITIONS.strip().splitlines())
     return registry
 
@@ -182,7 +182,7 @@ def _base(units: dict[str, int]) -> tuple[Fraction, UnitsContainer]:
     dimension = registry.UnitsContainer()
     for name, power in units.items():
         magnitude, _ = registry.get_base_units(name)
-        scale *= Fraction(magnitude) ** power
+        scale *= Fraction(str(magnitude)) ** power
         dimension = dimension * registry.get_dimensionality(name) ** power
     return scale, dimension
 

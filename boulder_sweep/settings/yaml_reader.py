@@ -203,7 +203,7 @@ class _Builder:
 
     def check_tag(self, event: Any) -> None:
         if event.tag is not None:
-            tag = shorten(str(event.tag))
+            tag = shorten(str(event.tag).replace("tag:yaml.org,2002:", "!!"))
             self.problems.add(
                 self.place(event),
                 "",
@@ -257,9 +257,9 @@ class _Builder:
         if first is None:
             mapping.entries[key.text] = Entry(key.text, key.place, node)
         else:
-            self.problems.add(
-                key.place, shorten(key.text), f"is given twice (first in line {first.place.line})"
-            )
+            words = [*(opened.key.text for opened in self.stack if opened.key), key.text]
+            path = ".".join(shorten(word) for word in words)
+            self.problems.add(key.place, path, f"is given twice (first in line {first.place.line})")
 
 
 _PLAIN_WORDS = (

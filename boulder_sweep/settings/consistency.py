@@ -1,0 +1,73 @@
+"""Checks that need more than one entry: what is missing, what contradicts, what excludes each other."""
+
+from __future__ import annotations
+
+from boulder_sweep.settings import fields
+from boulder_sweep.settings.entries import Entries
+from boulder_sweep.settings.schema import SolverBlock
+
+
+def check_complete(entries: Entries) -> None:
+    """Report what is required and missing, what is given twice, and axes beside a table."""
+    listed = set() if entries.table is None else set(entries.table.columns)
+    # What a table lacks that could not be read is unknown.
+    unread_table = entries.root.get("table") is not None and entries.table is None
+    present = {field.path for field in fields.FIELDS if field.name in listed} | entries.given
+    for field in fields.FIELDS:
+        if field.name in listed and field.path in entries.given:
+            message = f"is given here and as column {field.name} of the table; remove one"
+            entries.problems.add(entries.place_of(field), field.path, message)
+        required = field.name not in fields.OPTIONAL
+        if required and not unread_table and field.path not in present | entries.misspelled:
+            entries.problems.add(entries.place_of(field), field.path, "is required and missing")
+    _check_embedment(entries, present, unread_table)
+    if entries.root.get("table") is not None:
+        for name, leaf in entries.leaves.items():
+            if leaf.is_axis:
+                message = "takes one value beside a table; lists and ranges are axes of a grid"
+                entries.problems.add(leaf.place, fields.BY_NAME[name].path, message)
+
+
+def _check_embedment(entries: Entries, present: set[str], unread_table: bool) -> None:
+    ways = [fields.BY_NAME[name] for name in fields.EMBEDMENT]
+    given = [field for field in ways if field.path in present]
+    keys = " or ".join(field.key for field in ways)
+    if len(given) > 1:
+        entries.problems.add(entries.place_of(given[1]), given[1].path, f"give {keys}, not both")
+    elif not given and not unread_table and not {field.path for field in ways} & entries.misspelled:
+        entries.problems.add(entries.place_of(ways[0]), "site", f"{keys} is required and missing")
+
+
+def check_pairs(entries: Entries) -> None:
+    """Report single values that contradict each other; those of axes and tables are told row by row."""
+    bumper, hood = entries.single("bumper_height_m"), entries.single("hood_height_m")
+    if bumper is not None and hood is not None and hood < bumper:
+        key = "hood_height" if "vehicle.hood_height" in entries.given else "bumper_height"
+        message = f"the hood ({hood:g} m) is lower than the bumper ({bumper:g} m)"
+        entries.problems.add(entries.key_place("vehicle", key), f"vehicle.{key}", message)
+    _check_impact_height(entries, bumper)
+    _check_solver(entries)
+
+
+def _check_impact_height(entries: Entries, bumper: float | None) -> None:
+    height, depth = entries.single("boulder_height_m"), entries.single("embedment_depth_m")
+    ratio, impact = entries.single("embedment_ratio"), entries.single("impact_height_m")
+    if depth is None and ratio is not None and height is not None:
+        depth = ratio * height
+    if height is None or depth is None or impact is None or bumper is None:
+        return
+    exposed = height - depth
+    if exposed > bumper and impact > exposed * (1 + 1e-12):
+        message = (
+            f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
+        )
+        entries.problems.add(entries.leaves["impact_height_m"].place, "site.impact_height", message)
+
+
+def _check_solver(entries: Entries) -> None:
+    solver = entries.blocks.get("solver")
+    place = entries.key_place("solver", "step")
+    if {"solver.accuracy", "solver.step"} <= entries.given:
+        entries.problems.add(place, "solver.step", "give accuracy or step, not both")
+    elif isinstance(solver, SolverBlock) and solver.step is not None and solver.step > solver.horizon:
+        entries.problems.add(place, "solver.step", f"is longer than the horizon of {solver.horizon:g} s")

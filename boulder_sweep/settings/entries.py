@@ -1,0 +1,140 @@
+"""The entries of a file, read block by block; after a mistake reading goes on with the next entry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from boulder_sweep.settings import fields
+from boulder_sweep.settings.leaf import Leaf
+from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
+from boulder_sweep.settings.schema import BLOCKS, Section
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings.sweep import DesignList
+
+TOP_KEYS = ("name", *BLOCKS, "table")
+
+
+class Entries:
+    """What a file gives, as far as it can be read.
+
+    Attributes
+    ----------
+    blocks : dict of str to Section
+        The blocks without a mistake, defaults filled in.
+    leaves : dict of str to Leaf
+        Quantities by column (or axis) name, as far as they have no mistake.
+    given : set of str
+        Dotted keys that stand in the file, right or wrong.
+    misspelled : set of str
+        Dotted keys that are missing, while an unknown key beside them looks like them.
+    table : DesignList or None
+        The table named in the file.
+    """
+
+    def __init__(self, root: Mapping, path: Path, problems: ProblemList) -> None:
+        self.root = root
+        self.path = path
+        self.problems = problems
+        self.blocks: dict[str, Section] = {}
+        self.leaves: dict[str, Leaf] = {}
+        self.given: set[str] = set()
+        self.misspelled: set[str] = set()
+        self.table: DesignList | None = None
+
+    def read(self) -> None:
+        """Read the whole file; mistakes go to `problems`."""
+        for entry in self.root:
+            if entry.key not in TOP_KEYS:
+                self._unknown(entry, "", TOP_KEYS)
+        self._read_table()
+        for section in BLOCKS:
+            self._read_block(section)
+
+    def _read_table(self) -> None:
+        node = self.root.get("table")
+        if node is None:
+            return
+        # The csv module is needed for tables only.
+        from boulder_sweep.settings.table import read_table
+
+        if not isinstance(node, Scalar) or not node.text.strip():
+            self.problems.add(node.place, "table", "must be the name of a .csv or .parquet file")
+            return
+        # A name in the file is meant from the file's folder, one typed behind --set from where one stands.
+        folder = self.path.parent if node.place.file == str(self.path) else Path()
+        self.table = read_table(node, folder, self.problems)
+
+    def _read_block(self, section: str) -> None:
+        entry = self.root.entries.get(section)
+        if entry is None:
+            self.blocks[section] = BLOCKS[section]()
+            return
+        node: Node = entry.value
+        if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
+            node = Mapping(node.place)  # a block of which every line is commented out
+        if isinstance(node, Mapping):
+            self.given |= {f"{section}.{inner.key}" for inner in node}
+        read: dict[str, Any] = {}
+        try:
+            self.blocks[section] = BLOCKS[section].model_validate(node, context=read)
+        except ValidationError as error:
+            for line in error.errors():
+                self._report(section, node, line)
+        for field in fields.fields_of(section):
+            if field.key in read:
+                self.leaves[field.name] = read[field.key]
+
+    def _report(self, section: str, node: Node, line: Any) -> None:
+        """Turn one error of pydantic into a problem at its place."""
+        if line["type"] == "extra_forbidden" and isinstance(node, Mapping):
+            self._unknown(node.entries[line["loc"][0]], section, tuple(BLOCKS[section].model_fields))
+            return
+        key = ".".join(str(part) for part in (section, *line["loc"][:1]))
+        context = line.get("ctx", {})
+        self.problems.add(context.get("place", node.place), key, context.get("message", line["msg"]))
+
+    def _unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
+        """Report a key nobody knows, with the nearest one that is known."""
+        word = entry.key.lower()
+        synonym = next((field.key for field in fields.fields_of(section) if word in field.also), None)
+        meant = synonym or (None if self.problems.full else nearest(entry.key, known))
+        hint = f"; did you mean {meant}?" if meant else ""
+        if meant and not section:
+            self.misspelled |= {field.path for field in fields.fields_of(meant)}
+        elif meant:
+            self.misspelled.add(f"{section}.{meant}")
+        else:
+            other = next((field for field in fields.FIELDS if word in (field.key, *field.also)), None)
+            if other is not None:
+                hint = f"; {other.key} belongs under {other.section}"
+        where = f"under {section}" if section else "at the top level"
+        name = shorten(entry.key) or "(empty)"
+        path = f"{section}.{name}" if section else name
+        self.problems.add(entry.place, path, f"is not known {where} (known: {', '.join(known)}){hint}")
+
+    def single(self, name: str) -> float | None:
+        """Return the single value of a quantity, its default where it has one, None for axes and tables."""
+        field = fields.BY_NAME[name]
+        if self.table is not None and name in self.table.columns:
+            return None
+        leaf = self.leaves.get(name)
+        if leaf is None:
+            return None if field.path in self.given else field.default
+        return None if leaf.is_axis else float(leaf.values[0])
+
+    def place_of(self, field: fields.Field) -> Place:
+        """Return where a quantity stands, else its block, else the beginning of the file."""
+        return self.key_place(field.section, field.key)
+
+    def key_place(self, section: str, key: str) -> Place:
+        """Return where a key stands, else its block, else the beginning of the file."""
+        entry = self.root.entries.get(section)
+        if entry is None:
+            return self.root.place
+        inner = entry.value.entries.get(key) if isinstance(entry.value, Mapping) else None
+        return entry.place if inner is None else inner.place
