@@ -1,0 +1,137 @@
+"""Options that several commands share, and the examples that ``--help`` shows."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+Command = Callable[..., Any]
+
+# "\b" tells click to keep the lines of a paragraph as they are.
+GROUP_EPILOG = """\b
+Begin with:
+  sweep check configs/m30_sizing.yaml     is the file right, how many designs are in it?
+  sweep run configs/m30_sizing.yaml       simulate them all into the folder m30-sizing.sweep
+  sweep simulate configs/rwg.yaml         one design with its time history
+
+\b
+Exit codes:
+  0 done (also when designs fail)         1 internal error
+  2 wrong use or invalid file             3 some designs could not be computed
+  4 the output exists already             130, 143 interrupted; the run can go on
+"""
+
+RUN_EXAMPLES = """\b
+Examples:
+  sweep run configs/m30_sizing.yaml
+  sweep run grid.yaml -o results/m50 --set vehicle.speed='50 mph'
+  sweep run grid.yaml --dry-run
+  sweep run grid.yaml --resume
+"""
+
+CHECK_EXAMPLES = """\b
+Example:
+  sweep check configs/m30_sizing.yaml
+"""
+
+SIMULATE_EXAMPLES = """\b
+Examples:
+  sweep simulate configs/rwg.yaml --plot rwg.png
+  sweep simulate configs/crash_tests.yaml --design 1 --trajectory rwg.parquet
+  sweep simulate configs/abg.yaml --set model.readings=as_printed --json
+"""
+
+STATUS_EXAMPLES = """\b
+Example:
+  sweep status m30-sizing.sweep --verify
+"""
+
+
+class OrderedGroup(click.Group):
+    """Group that lists its commands in the order of a session, not of the alphabet."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the commands in the order they were added."""
+        return list(self.commands)
+
+
+def version_option(function: Command) -> Command:
+    """Add ``--version``."""
+    return click.option(
+        "--version",
+        is_flag=True,
+        is_eager=True,
+        expose_value=False,
+        callback=_show_version,
+        help="Show the version.",
+    )(function)
+
+
+def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        # Reading the installed version takes longer than printing the help.
+        from importlib.metadata import version
+
+        click.echo(f"sweep {version('boulder-sweep')}")
+        ctx.exit()
+
+
+def set_option(function: Command) -> Command:
+    """Add ``--set KEY=VALUE``, any number of times."""
+    return click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Replace one entry of the file, e.g. --set vehicle.speed='50 mph' (may be repeated).",
+    )(function)
+
+
+def json_option(function: Command) -> Command:
+    """Add ``--json``."""
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")(function)
+
+
+def talk_options(function: Command) -> Command:
+    """Add ``-q`` and ``-v``, which exclude each other."""
+
+    @click.option("-q", "--quiet", is_flag=True, help="No progress, no notes.")
+    @click.option("-v", "--verbose", is_flag=True, help="More detail; tracebacks of internal errors.")
+    @functools.wraps(function)
+    def command(*args: Any, quiet: bool, verbose: bool, **options: Any) -> Any:
+        if quiet and verbose:
+            raise click.UsageError("--quiet and --verbose exclude each other")
+        return function(*args, quiet=quiet, verbose=verbose, **options)
+
+    return command
+
+
+def run_options(function: Command) -> Command:
+    """Add what is particular to ``sweep run``."""
+    path = click.Path()
+    for option in reversed(
+        (
+            click.option(
+                "-o", "--output", "out", type=path, help="Folder of the table [default: NAME.sweep]."
+            ),
+            click.option("--jobs", type=click.IntRange(min=1), help="Workers [default: all cores]."),
+            click.option(
+                "--backend",
+                type=click.Choice(["threading", "loky", "dask"]),
+                default="threading",
+                show_default=True,
+                help="Threads, processes, or a Dask cluster.",
+            ),
+            click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, with --backend dask."),
+            click.option("--resume", is_flag=True, help="Go on with an interrupted run."),
+            click.option("--overwrite", is_flag=True, help="Replace the table an earlier run wrote."),
+            click.option("--force", is_flag=True, help="Run even if disk or memory seem too small."),
+            click.option("--dry-run", is_flag=True, help="Show designs, settings and effort; write nothing."),
+            click.option("--accuracy", metavar="NAME", help="fast, balanced, fine, or '0.01 deg'."),
+        )
+    ):
+        function = option(function)
+    return function
