@@ -71,10 +71,7 @@ class Entries:
 
     def _read_block(self, section: str) -> None:
         entry = self.root.entries.get(section)
-        if entry is None:
-            self.blocks[section] = BLOCKS[section]()
-            return
-        node: Node = entry.value
+        node: Node = Mapping(self.root.place) if entry is None else entry.value
         if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
             node = Mapping(node.place)  # a block of which every line is commented out
         if isinstance(node, Mapping):
