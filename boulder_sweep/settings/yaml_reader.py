@@ -26,11 +26,15 @@ from ruamel.yaml.tokens import FlowMappingEndToken, FlowSequenceEndToken
 
 from boulder_sweep.settings.problems import Place, ProblemList, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.yaml_words import explain
 
 MAX_DEPTH = 20
 """Deepest nesting of lists and blocks; the format itself needs four levels."""
 MAX_NODES = 100_000
 """Most values in a file with every alias written out."""
+
+MAX_UNIT = 100
+"""Longest unit behind a bracket, in characters."""
 
 
 class _TooDeepError(YAMLError):
@@ -70,7 +74,9 @@ class _UnitScanner(Scanner):
         if not (first.isalpha() or first in "%°"):
             return
         length = skip
-        while reader.peek(length) not in ",[]{}\r\n\x00" and reader.prefix(length + 2)[length:] != " #":
+        while length < skip + MAX_UNIT and reader.peek(length) not in ",[]{}\r\n\x00":
+            if reader.peek(length) == " " and reader.peek(length + 1) == "#":
+                break
             length += 1
         bracket = self.tokens[-1].start_mark
         self.units[bracket.line, bracket.column] = (reader.prefix(length).strip(), reader.column + skip)
@@ -135,7 +141,8 @@ def parse_node(text: str, label: str, problems: ProblemList) -> Node | None:
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         at = Place(label) if mark is None else Place(label, mark.line + 1, mark.column + 1)
-        problems.add(at, "", _explain(error))
+        reason = str(error.problem) if isinstance(error, _TooDeepError) else explain(error)
+        problems.add(at, "", reason)
         problems.raise_if_any()
     return builder.root
 
@@ -232,7 +239,7 @@ class _Builder:
         parent = self.stack[-1]
         parent.size += size
         if parent.size > MAX_NODES:
-            raise YAMLError(f"with its aliases written out the file holds more than {MAX_NODES} values")
+            raise YAMLError(f"the file holds more than {MAX_NODES} values with its aliases written out")
         if isinstance(parent.node, Sequence):
             parent.node.items.append(node)
         elif parent.key is None:
@@ -260,32 +267,3 @@ class _Builder:
             words = [*(opened.key.text for opened in self.stack if opened.key), key.text]
             path = ".".join(shorten(word) for word in words)
             self.problems.add(key.place, path, f"is given twice (first in line {first.place.line})")
-
-
-_PLAIN_WORDS = (
-    ("expected ',' or ']'", "a list is not closed: ',' or ']' is missing"),
-    ("expected ',' or '}'", "a {...} block is not closed, or a ',' is missing in it"),
-    ("cannot start any token", "this character cannot stand here; put the text into quotation marks"),
-    (
-        "mapping values are not allowed here",
-        "a ':' where none can stand; check the indentation and the quotation marks",
-    ),
-    ("could not find expected ':'", "a key without ':' behind it"),
-    ("found unexpected end of stream", "quotation marks are not closed"),
-    ("expected <block end>", "the indentation does not fit the lines above"),
-)
-
-
-def _explain(error: Any) -> str:
-    """Return a YAML syntax error in words for people who do not write YAML every day."""
-    if isinstance(error, _TooDeepError):
-        return str(error.problem)
-    problem = " ".join(str(getattr(error, "problem", None) or error).split())
-    for technical, plain in _PLAIN_WORDS:
-        if technical in problem:
-            return f"not valid YAML: {plain}"
-    if type(error) is YAMLError:
-        return problem
-    if "special characters are not allowed" in str(error):
-        return "contains control characters; a plain text file in UTF-8 is needed"
-    return f"not valid YAML: {shorten(problem, 120)}"
