@@ -7,6 +7,7 @@ this process, no worker outlives it.
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
@@ -19,6 +20,8 @@ from typing import Any
 BACKENDS = ("threading", "loky", "dask")
 _LOOK_FOR_PARENT_S = 0.2
 _CONNECT_S = "10s"
+_COMPLAINERS = ("concurrent.futures", "distributed", "distributed.worker.state_machine")
+"""Loggers that report cancelled work as if it were a mistake."""
 
 
 def available_cores() -> int:
@@ -59,6 +62,7 @@ class Backend:
             raise BackendError(f"a scheduler address needs the backend dask, not {name}")
         self.name = name
         self.jobs = jobs
+        self._levels: dict[str, int] = {}
         self._client = _dask_client(jobs, scheduler) if name == "dask" else None
         if self._client is not None and scheduler is not None:
             self.jobs = max(sum(self._client.nthreads().values()), 1)
@@ -106,12 +110,23 @@ class Backend:
             with suppress(Exception):  # they may be dying already
                 get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
+    def abandon(self) -> None:
+        """End the workers in the middle of their work, and let nobody complain about that."""
+        for name in _COMPLAINERS:
+            logger = logging.getLogger(name)
+            self._levels.setdefault(name, logger.level)
+            logger.setLevel(logging.CRITICAL)
+        self.kill_workers()
+
     def close(self) -> None:
         """Let all workers go."""
         self.kill_workers()
         if self._client is not None:
             self._client.close()
             self._client = None
+        for name, level in self._levels.items():
+            logging.getLogger(name).setLevel(level)
+        self._levels.clear()
 
 
 def _dask_client(jobs: int, scheduler: str | None) -> Any:

@@ -80,11 +80,7 @@ class Collector(threading.Thread):
                 start, judged = piece
                 self._waiting[start] = judged
                 self._append_ready()
-                if (
-                    self._growing
-                    and self._growing.fresh
-                    and time.monotonic() - self._written_at > self._pause
-                ):
+                if self._growing and self._growing.fresh and time.monotonic() - self._written_at > self._pause:
                     self._write(self._growing)
             if self._growing and self._growing.fresh:
                 self._write(self._growing)

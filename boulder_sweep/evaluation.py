@@ -24,7 +24,17 @@ if TYPE_CHECKING:
     from .settings import Sweep
 
 Simulate = Callable[[DesignTable, Readings, Control], OutcomeTable]
-"""What simulates a table of designs; always `boulder_kernels.simulate_table` outside of tests."""
+"""What simulates a table of designs; always `by_kernels` outside of tests."""
+
+
+def by_kernels(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+    """Simulate with the compiled kernels.
+
+    A plain function, so that worker processes find it by its name and use the compiled code on the disk; the
+    kernel itself would be sent as source and compiled again.
+    """
+    return simulate_table(table, readings, control)
+
 
 _SOURCES = {
     "L": "boulder_length_m",
@@ -65,7 +75,7 @@ class Evaluation:
     readings: Readings
     control: Control
     limits: Limits
-    simulate: Simulate = simulate_table
+    simulate: Simulate = by_kernels
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -146,7 +156,7 @@ def design_table(block: DesignBlock, rows: np.ndarray | None = None) -> DesignTa
     return DesignTable(**columns)
 
 
-def evaluation_of(sweep: Sweep, simulate: Simulate = simulate_table) -> Evaluation:
+def evaluation_of(sweep: Sweep, simulate: Simulate = by_kernels) -> Evaluation:
     """Return how the designs of a sweep are simulated and judged."""
     return Evaluation(
         readings=readings_of(sweep),

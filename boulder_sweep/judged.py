@@ -101,9 +101,7 @@ def joined(pieces: list[Judged]) -> Judged:
 
 def rows_of(judged: Judged, start: int, stop: int) -> Judged:
     """Return the rows [start, stop) of some judged rows; views, not copies."""
-    return Judged(
-        **{name: getattr(judged, name)[start:stop] for name in OUTCOME_COLUMNS}, reasons=judged.reasons
-    )
+    return Judged(**{name: getattr(judged, name)[start:stop] for name in OUTCOME_COLUMNS}, reasons=judged.reasons)
 
 
 def _translated(piece: Judged, place: dict[str, int]) -> np.ndarray:

@@ -40,6 +40,10 @@ class Sample(NamedTuple):
     """What a part takes beside its rows."""
 
 
+_GUESS = Sample(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
+"""For a sweep none of whose sampled rows can be computed."""
+
+
 @dataclass(frozen=True)
 class Estimate:
     """What a run will take.
@@ -114,27 +118,27 @@ def take_sample(
     metadata
         For the metadata of a part.
     """
-    from .store.schema import encode, part_table
+    from .store.schema import encode, part_table, table_schema
 
-    sampled, spent, written, parts = 0, 0.0, 0, 0
-    for place, size in enumerate(_SAMPLE_SIZES):
-        size = min(size, rows)
+    beside_rows = len(encode(table_schema(metadata).empty_table()))
+    sampled, spent, written = 0, 0.0, 0
+    for place, wanted in enumerate(_SAMPLE_SIZES):
+        size = min(wanted, rows)
         start = int(place * _GOLDEN % 1.0 * (rows - size))
         begun = time.perf_counter()
-        block = make_block(start, start + size)
-        judged = evaluation(block)
+        try:
+            block = make_block(start, start + size)
+            judged = evaluation(block)
+        except Exception:  # the run itself will meet it, try again and name the rows
+            continue
         spent += time.perf_counter() - begun
-        written += len(encode(part_table(block, judged, metadata)))
+        written += len(encode(part_table(block, judged, metadata))) - beside_rows
         sampled += size
-        parts += 1
         if spent > _SAMPLE_S or sampled >= rows:
             break
-    empty = len(encode(part_table(make_block(0, 1), evaluation(make_block(0, 1)), metadata)))
-    return Sample(
-        seconds_per_row=spent / sampled,
-        bytes_per_row=max(written - parts * empty, 0) / sampled,
-        bytes_per_part=empty,
-    )
+    if not sampled:
+        return _GUESS
+    return Sample(spent / sampled, max(written, 0) / sampled, beside_rows)
 
 
 def estimated(

@@ -35,9 +35,7 @@ class Run:
 
     def __init__(self, sweep: Sweep, evaluation: Evaluation, folder: OutputFolder, signals: Signals):
         self.rows_computed = 0
-        self.notes = [
-            f"{name} was damaged ({what}) and is computed again" for name, what in folder.damaged.items()
-        ]
+        self.notes = [f"{name} was damaged ({what}) and is computed again" for name, what in folder.damaged.items()]
         self._sweep = sweep
         self._evaluation = evaluation
         self._folder = folder
@@ -48,9 +46,7 @@ class Run:
         self._estimate: Estimate | None = None
         others = {session.cpu for session in folder.manifest.sessions} - {cpu_name()}
         if self._rows_before and others:
-            self.notes.append(
-                f"earlier rows were computed on another processor ({', '.join(sorted(others))})"
-            )
+            self.notes.append(f"earlier rows were computed on another processor ({', '.join(sorted(others))})")
 
     def prepare(self, backend: str, jobs: int, scheduler: str | None, force: bool) -> None:
         """Get workers, warm up the kernels, and see that the result will fit."""
@@ -97,6 +93,7 @@ class Run:
             workers.stop()
             collector.finish()
             collector.join(_PATIENCE_S)
+            workers.join(_PATIENCE_S / 3)
             raise
         finally:
             self.notes += workers.notes

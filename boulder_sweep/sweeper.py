@@ -15,7 +15,7 @@ from .backends import available_cores
 from .collector import COMMIT_EVERY_S
 from .commands import repeat_command
 from .commands import resume_command as default_resume_command
-from .evaluation import Evaluation, Simulate, evaluation_of, simulate_table
+from .evaluation import Evaluation, Simulate, by_kernels, evaluation_of
 from .interruption import Interrupted, Signals
 from .limits import MOST_ROWS, Estimate, estimated, take_sample
 from .running import Report, Run
@@ -46,7 +46,7 @@ def run(
     resume_command: str | None = None,
     rows_per_part: int = ROWS_PER_PART,
     commit_every_s: float = COMMIT_EVERY_S,
-    simulate: Simulate = simulate_table,
+    simulate: Simulate = by_kernels,
 ) -> Summary:
     """Simulate every design of a sweep and store the table.
 
@@ -139,7 +139,7 @@ def estimate(
     jobs: int | None = None,
     backend: str = "threading",
     resume: bool = False,
-    simulate: Simulate = simulate_table,
+    simulate: Simulate = by_kernels,
 ) -> Estimate:
     """Find out what a run will take, from a timed sample of a tenth of a second; nothing is written.
 

@@ -65,9 +65,7 @@ class Limits(NamedTuple):
         return PENETRATION_LIMITS_M[self.rating]
 
 
-def judge(
-    outcomes: OutcomeTable, boulder_length: np.ndarray, bed_offset: np.ndarray, limits: Limits
-) -> Judged:
+def judge(outcomes: OutcomeTable, boulder_length: np.ndarray, bed_offset: np.ndarray, limits: Limits) -> Judged:
     """Apply the rules of this module to n rows.
 
     Parameters

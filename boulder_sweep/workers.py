@@ -110,7 +110,7 @@ class Workers(threading.Thread):
     def stop(self) -> None:
         """Hand out no more blocks; those under way are dropped."""
         self._stopped.set()
-        self._backend.kill_workers()
+        self._backend.abandon()
 
     def run(self) -> None:
         """Compute everything; to be called by `start`."""

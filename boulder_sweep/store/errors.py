@@ -65,9 +65,7 @@ class ForeignFilesError(StoreError):
     def __init__(self, out: Path, names: list[str]):
         self.out, self.names = out, names
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-        super().__init__(
-            f"{out} holds what no sweep wrote ({shown}): choose another folder, or move these away"
-        )
+        super().__init__(f"{out} holds what no sweep wrote ({shown}): choose another folder, or move these away")
 
 
 class NotASweepError(StoreError):

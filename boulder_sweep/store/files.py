@@ -36,7 +36,7 @@ def flush_folder(folder: Path) -> None:
         os.fsync(descriptor)
 
 
-def put_file(folder: Path, name: str, content: memoryview | bytes, passing_name: str | None = None) -> None:
+def put_file(folder: Path, name: str, content: memoryview | bytes) -> None:
     """Put a file into a folder in one step, replacing what has its name, and make it durable.
 
     Parameters
@@ -47,15 +47,13 @@ def put_file(folder: Path, name: str, content: memoryview | bytes, passing_name:
         Its name.
     content
         All of it.
-    passing_name
-        Name it may have for an instant when it replaces a file; by default ``_<name>.writing``.
 
     Raises
     ------
     OSError
         Nothing has changed then: a file of that name is still the old one, and nothing is left behind.
     """
-    passing = passing_name or f"_{name}{WRITING_SUFFIX}"
+    passing = f"_{name}{WRITING_SUFFIX}"
     with opened_folder(folder) as at:
         if not _put_unnamed(at, name, content, passing):
             _put_named(at, name, content, passing)

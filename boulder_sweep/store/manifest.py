@@ -16,10 +16,9 @@ from typing import Any
 
 from .errors import DamagedError, NotASweepError
 from .files import WRITING_SUFFIX, put_file
+from .lock import LOCK_NAME
 
 MANIFEST_NAME = "_manifest.parquet"
-PASSING_NAME = "_manifest-next.parquet"
-"""Name the next manifest has for an instant; also a table of no rows."""
 _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
 _PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
@@ -144,7 +143,7 @@ def is_ours(name: str) -> bool:
         return name.startswith("_") and is_ours(name[1 : -len(WRITING_SUFFIX)])
     middle = name.removeprefix(_PART_PREFIX).removesuffix(_PART_SUFFIX)
     is_part = name == f"{_PART_PREFIX}{middle}{_PART_SUFFIX}" and middle.isdigit() and len(middle) >= _DIGITS
-    return is_part or name in (MANIFEST_NAME, PASSING_NAME, "_lock")
+    return is_part or name in (MANIFEST_NAME, LOCK_NAME)
 
 
 def is_part_name(name: str) -> bool:
@@ -170,7 +169,7 @@ def save(manifest: Manifest, folder: Path) -> None:
     schema = table_schema({_KEY: value.encode()})
     sink = pa.BufferOutputStream()
     pq.write_table(schema.empty_table(), sink)
-    put_file(folder, MANIFEST_NAME, memoryview(sink.getvalue()), passing_name=PASSING_NAME)
+    put_file(folder, MANIFEST_NAME, memoryview(sink.getvalue()))
 
 
 def load(folder: Path) -> Manifest:

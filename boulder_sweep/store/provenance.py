@@ -40,9 +40,7 @@ def sha256_of(content: Any) -> str:
     return hashlib.sha256(canonical(content).encode()).hexdigest()
 
 
-def identity(
-    settings: Mapping[str, Any], readings: Mapping[str, Any], control: Mapping[str, Any]
-) -> dict[str, Any]:
+def identity(settings: Mapping[str, Any], readings: Mapping[str, Any], control: Mapping[str, Any]) -> dict[str, Any]:
     """Collect what rows of one table have in common.
 
     Parameters
@@ -60,15 +58,16 @@ def identity(
         Plain data with the keys ``settings``, ``readings``, ``control``, ``versions``, ``settings_sha256``,
         ``kernels_sha256``, ``rules_sha256``.
     """
-    return {
-        "settings": dict(settings),
-        "readings": dict(readings),
-        "control": dict(control),
+    found = {
+        "settings": settings,
+        "readings": readings,
+        "control": control,
         "versions": versions(),
         "settings_sha256": sha256_of(settings),
         "kernels_sha256": kernels_sha256(),
         "rules_sha256": rules_sha256(),
     }
+    return json.loads(canonical(found))  # as it will come back from a file
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:

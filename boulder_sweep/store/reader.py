@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from boulder_sweep.columns import BY_NAME
 
 from .errors import DamagedError
-from .manifest import load
+from .verify import load_checked
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
 
-def read(out: str | Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
-    """Read the result of a sweep, checking every page it holds.
+def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool = True) -> pd.DataFrame:
+    """Read the result of a sweep.
 
     Parameters
     ----------
@@ -25,6 +25,8 @@ def read(out: str | Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
         Folder that `boulder_sweep.run` or ``sweep run`` wrote, also while it is being written.
     columns
         Names of the columns wanted; all by default.
+    verify
+        Compare every part with its checksum before: a second for some ten million rows.
 
     Returns
     -------
@@ -39,52 +41,52 @@ def read(out: str | Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
     DamagedError
         A part is gone, truncated or changed.
     """
-    folder = Path(out)
-    manifest = load(folder)
+    table, rows = _read(Path(out), columns, verify)
     # Not split into blocks: consolidating columns of one type would copy the whole table once more.
-    frame = read_table(folder, columns).to_pandas(split_blocks=True, self_destruct=True)
+    frame = table.to_pandas(split_blocks=True, self_destruct=True)
     frame.attrs = {
         "units": {name: BY_NAME[name].unit for name in frame.columns},
         "meanings": {name: BY_NAME[name].meaning for name in frame.columns},
-        "rows": manifest.rows,
-        "complete": len(frame) == manifest.rows,
+        "rows": rows,
+        "complete": len(frame) == rows,
     }
     return frame
 
 
-def read_table(folder: Path, columns: Sequence[str] | None = None) -> pa.Table:
-    """Read the finished parts of a folder as one Arrow table, in the order of the designs.
+def read_table(folder: Path, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
+    """Read the finished parts of a folder as one Arrow table; otherwise as `read`."""
+    return _read(folder, columns, verify)[0]
 
-    Parameters
-    ----------
-    folder
-        The output folder.
-    columns
-        Names of the columns wanted; all by default.
 
-    Raises
-    ------
-    NotASweepError, DamagedError
-        As `read`.
-    """
+def _read(folder: Path, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, int]:
+    """Return the finished parts, in the order of the designs, and the rows of the whole table."""
     import pyarrow as pa  # heavy, and only readers need it
     import pyarrow.dataset as ds
 
     from .schema import table_schema
 
-    manifest = load(folder)
+    manifest, damaged = load_checked(folder, read_parts=verify)
+    if damaged:
+        raise DamagedError(_damage_text(folder, damaged))
     files = [str(folder / name) for name in sorted(manifest.parts)]
     wanted = list(columns) if columns is not None else None
     if not files:
         empty = table_schema().empty_table()
-        return empty.select(wanted) if wanted else empty
+        return (empty.select(wanted) if wanted else empty), manifest.rows
     parts = ds.ParquetFileFormat(
         default_fragment_scan_options=ds.ParquetFragmentScanOptions(page_checksum_verification=True)
     )
     try:
-        return ds.dataset(files, format=parts).to_table(columns=wanted)
+        return ds.dataset(files, format=parts).to_table(columns=wanted), manifest.rows
     except (OSError, pa.ArrowException) as problem:
-        raise DamagedError(
-            f"{folder} is damaged: {problem}. `sweep status {folder} --verify` tells which parts, "
-            f"and running again with --resume computes them anew"
-        ) from problem
+        raise DamagedError(_damage_text(folder, {"a part": str(problem)})) from problem
+
+
+def _damage_text(folder: Path, damaged: dict[str, str]) -> str:
+    """Say what is damaged and what to do."""
+    first, what = next(iter(damaged.items()))
+    more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
+    return (
+        f"{folder} is damaged ({first}: {what}{more}). `sweep status {folder} --verify` tells which parts are, "
+        f"and running again with --resume computes them anew"
+    )

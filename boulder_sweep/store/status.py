@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from .lock import is_locked
-from .manifest import Session, load
-from .verify import sized_parts, verified_parts
+from .manifest import Session
+from .verify import load_checked
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,6 @@ class RunStatus:
 
 
 _MISSING_SHOWN = 100
-_ATTEMPTS = 3
 
 
 def status(out: str | Path, *, verify: bool = False) -> RunStatus:
@@ -90,14 +89,8 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         The manifest cannot be trusted.
     """
     folder = Path(out)
-    for _ in range(_ATTEMPTS):
-        running = is_locked(folder)
-        manifest = load(folder)
-        whole, damaged = verified_parts(folder, manifest) if verify else sized_parts(folder, manifest)
-        # A part may have been replaced by a longer one since the manifest was read: then look again.
-        if not (damaged and running):
-            break
-    manifest.parts = whole
+    running = is_locked(folder)
+    manifest, damaged = load_checked(folder, read_parts=verify)
     missing: list[tuple[int, int]] = []
     for start, stop in manifest.missing():
         if missing and missing[-1][1] == start:
@@ -107,8 +100,7 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         else:
             missing.append((start, stop))
     full = sum(
-        part.now.rows == min(manifest.rows_per_part, manifest.rows - part.first)
-        for part in manifest.parts.values()
+        part.now.rows == min(manifest.rows_per_part, manifest.rows - part.first) for part in manifest.parts.values()
     )
     done = manifest.rows_done
     return RunStatus(

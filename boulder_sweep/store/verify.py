@@ -8,12 +8,42 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from .manifest import Manifest, Part, Version
+from .lock import is_locked
+from .manifest import Manifest, Part, Version, load
+
+_ATTEMPTS = 3
 
 
 def sha256_of_bytes(content: memoryview | bytes) -> str:
     """SHA-256 of some bytes, in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
+
+
+def load_checked(folder: Path, *, read_parts: bool) -> tuple[Manifest, dict[str, str]]:
+    """Read the manifest of a folder, and compare the parts with it.
+
+    Parameters
+    ----------
+    folder
+        The output folder; a run may be writing into it.
+    read_parts
+        Whether to compare checksums (`verified_parts`), or only sizes (`sized_parts`).
+
+    Returns
+    -------
+    manifest : Manifest
+        With the undamaged parts only.
+    damaged : dict
+        What is wrong with the others, in words; by file name.
+    """
+    for _ in range(_ATTEMPTS):
+        manifest = load(folder)
+        whole, damaged = verified_parts(folder, manifest) if read_parts else sized_parts(folder, manifest)
+        # A part may have been replaced by a longer one since the manifest was read: then look again.
+        if not (damaged and is_locked(folder)):
+            break
+    manifest.parts = whole
+    return manifest, damaged
 
 
 def verified_parts(folder: Path, manifest: Manifest) -> tuple[dict[str, Part], dict[str, str]]:

@@ -16,7 +16,7 @@ from typing import Any
 
 from . import errors
 from .files import flush_folder, put_file
-from .lock import FolderLock
+from .lock import LOCK_NAME, FolderLock
 from .manifest import (
     MANIFEST_NAME,
     Manifest,
@@ -198,14 +198,14 @@ def open_output(
 
 def _make(out: Path) -> bool:
     """Make the folder if it is not there; True if it was made."""
+    if not out.parent.is_dir():
+        raise errors.StoreError(f"there is no folder {out.parent} to make {out.name} in")
     try:
         out.mkdir()
     except FileExistsError:
         if not out.is_dir():
             raise errors.StoreError(f"{out} is a file; the output of a sweep is a folder") from None
         return False
-    except FileNotFoundError:
-        raise errors.StoreError(f"there is no folder {out.parent} to make {out.name} in") from None
     except OSError as problem:
         raise errors.WriteError(f"cannot make the folder {out}: {problem.strerror}") from problem
     return True
@@ -242,14 +242,12 @@ def _taken(
     if there is not None and not (resume or overwrite):
         raise errors.OutputExistsError(out, there.rows_done, there.rows)
     if there is None or overwrite:
-        _remove(out, [name for name in names if is_ours(name) and name not in ("_lock", MANIFEST_NAME)])
+        _remove(out, [name for name in names if is_ours(name) and name not in (LOCK_NAME, MANIFEST_NAME)])
         return OutputFolder(out, lock, manifest, created)
     return _resumed(out, lock, manifest, there, names)
 
 
-def _resumed(
-    out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, names: list[str]
-) -> OutputFolder:
+def _resumed(out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, names: list[str]) -> OutputFolder:
     """Go on with the run that is there, if it is the same."""
     different = differences(there.identity, manifest.identity)
     if there.rows != manifest.rows:
@@ -258,7 +256,7 @@ def _resumed(
         raise errors.SettingsDifferError(out, different)
     there.parts, damaged = verified_parts(out, there)
     there.resume_command = manifest.resume_command
-    keep = {*there.parts, MANIFEST_NAME, "_lock"}
+    keep = {*there.parts, MANIFEST_NAME, LOCK_NAME}
     _remove(out, [name for name in names if is_ours(name) and name not in keep])
     folder = OutputFolder(out, lock, there, created=False)
     folder.damaged = damaged

@@ -1,0 +1,120 @@
+"""One writer to a folder."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from boulder_sweep.store.errors import FolderInUseError, WriteError
+from boulder_sweep.store.lock import LOCK_NAME, FolderLock, is_locked
+
+_HOLD = """
+import sys, time
+from pathlib import Path
+from boulder_sweep.store.lock import FolderLock
+lock = FolderLock(Path(sys.argv[1]), None, "nobody")
+print("held", flush=True)
+time.sleep(60)
+"""
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """Another process that holds the lock."""
+    process = subprocess.Popen([sys.executable, "-c", _HOLD, tmp_path], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "held\n"
+    yield process
+    process.kill()
+    process.wait()
+    process.stdout.close()
+
+
+def test_a_second_writer_is_refused(holder, tmp_path):
+    assert is_locked(tmp_path)
+    with pytest.raises(FolderInUseError, match="written by process 7 on moon") as refused:
+        FolderLock(tmp_path, None, "process 7 on moon")
+    assert refused.value.exit_code == 4
+
+
+def test_the_lock_of_a_killed_run_is_stale(holder, tmp_path):
+    holder.send_signal(signal.SIGKILL)
+    holder.wait()
+    assert (tmp_path / LOCK_NAME).exists()
+    assert not is_locked(tmp_path)
+    lock = FolderLock(tmp_path, os.uname().nodename, "a dead run")
+    assert lock.stale
+    assert is_locked(tmp_path)
+    lock.release()
+
+
+def test_released_is_free_and_leaves_nothing(tmp_path):
+    lock = FolderLock(tmp_path, None, "nobody")
+    assert not lock.stale
+    lock.release()
+    lock.release()
+    assert names(tmp_path) == []
+    FolderLock(tmp_path, None, "nobody").release()
+
+
+def test_the_lock_file_is_empty(tmp_path):
+    """An empty file is no part of a table to any reader."""
+    lock = FolderLock(tmp_path, None, "nobody")
+    assert (tmp_path / LOCK_NAME).stat().st_size == 0
+    lock.release()
+
+
+def test_who_asks_does_not_lock(tmp_path):
+    lock = FolderLock(tmp_path, None, "nobody")
+    assert all(is_locked(tmp_path) for _ in range(3))
+    lock.release()
+    assert not is_locked(tmp_path)
+
+
+@pytest.fixture
+def no_shared_locks(monkeypatch):
+    """A network folder whose locks do not reach other machines."""
+
+    def unsupported(descriptor, operation):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", unsupported)
+
+
+def test_a_fresh_sign_of_life_on_another_machine_counts(tmp_path, no_shared_locks):
+    FolderLock(tmp_path, None, "nobody")
+    with pytest.raises(FolderInUseError, match=r"sign of life \d+ s ago"):
+        FolderLock(tmp_path, "othermachine", "process 7 on othermachine")
+
+
+def test_an_old_sign_of_life_does_not(tmp_path, no_shared_locks):
+    FolderLock(tmp_path, None, "nobody")
+    os.utime(tmp_path / LOCK_NAME, (time.time() - 1000, time.time() - 1000))
+    FolderLock(tmp_path, "othermachine", "process 7 on othermachine").release()
+
+
+def test_the_holder_gives_signs_of_life(tmp_path, monkeypatch):
+    lock = FolderLock(tmp_path, None, "nobody")
+    os.utime(tmp_path / LOCK_NAME, (1000, 1000))
+    lock.renew()
+    assert (tmp_path / LOCK_NAME).stat().st_mtime == 1000  # not yet due
+    later = time.monotonic() + 60
+    monkeypatch.setattr(time, "monotonic", lambda: later)
+    lock.renew()
+    assert (tmp_path / LOCK_NAME).stat().st_mtime > 1000
+    lock.release()
+
+
+def test_a_folder_that_is_gone_cannot_be_locked(tmp_path):
+    with pytest.raises(WriteError, match="cannot write into"):
+        FolderLock(tmp_path / "gone", None, "nobody")

@@ -1,0 +1,81 @@
+"""What a table was computed from."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+import boulder_kernels
+from boulder_sweep.store import provenance
+from boulder_sweep.store.provenance import canonical, differences, file_metadata, identity, sha256_of
+
+
+def test_the_same_content_has_the_same_hash_whatever_its_order():
+    assert sha256_of({"a": 1, "b": [1.5, "é"]}) == sha256_of({"b": [1.5, "é"], "a": 1})
+    assert sha256_of({"a": 1}) != sha256_of({"a": 2})
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        canonical({"a": float("nan")})
+
+
+def test_an_identity_is_plain_data_and_equal_after_json():
+    found = identity({"x": (1, 2.5)}, {"inertia_box": True}, {"h": 0.004})
+    assert json.loads(json.dumps(found)) == found
+    assert found["settings_sha256"] == sha256_of({"x": [1, 2.5]})
+    assert re.fullmatch("[0-9a-f]{64}", found["kernels_sha256"])
+    assert set(found["versions"]) >= {"python", "numpy", "numba", "llvmlite", "pyarrow", "boulder-sweep"}
+    assert differences(found, json.loads(json.dumps(found))) == []
+
+
+def test_kernels_are_hashed_by_content(tmp_path, monkeypatch):
+    (tmp_path / "__init__.py").write_text("a = 1")
+    monkeypatch.setattr(boulder_kernels, "__file__", str(tmp_path / "__init__.py"))
+    one = provenance.kernels_sha256.__wrapped__()
+    (tmp_path / "__init__.py").write_text("a = 2")
+    two = provenance.kernels_sha256.__wrapped__()
+    (tmp_path / "more.py").write_text("")
+    assert len({one, two, provenance.kernels_sha256.__wrapped__()}) == 3
+
+
+def test_every_module_that_decides_a_row_is_hashed():
+    for name in provenance._DECIDING_SOURCES:
+        assert (provenance._PACKAGE_FOLDER / name).is_file()
+
+
+def test_differences_are_told_once_and_shortly():
+    there = {"settings": {"a": {"b": 1}, "long": list(range(100))}, "settings_sha256": "1" * 64}
+    here = {"settings": {"a": {"b": 2}, "long": list(range(99)), "new": None}, "settings_sha256": "2" * 64}
+    told = differences(there, here)
+    assert told[0] == "settings.a.b: 1 -> 2"
+    assert all(len(line) < 160 for line in told)
+    assert "settings.new: (none) -> null" in told
+    assert not any("sha256" in line for line in told)
+    assert differences({"kernels_sha256": "1" * 64}, {"kernels_sha256": "2" * 64}) == [
+        "kernels_sha256: 111111111111 -> 222222222222"
+    ]
+
+
+def test_file_metadata_has_no_time_and_no_process():
+    one = file_metadata(identity({}, {}, {}), "sweep run x.yaml")
+    assert one == file_metadata(identity({}, {}, {}), "sweep run x.yaml")
+    assert one[b"boulder_sweep.repeat"] == b"sweep run x.yaml"
+    assert not any(re.search(rb"\d\d:\d\d:\d\d", value) for value in one.values())
+
+
+def test_commit_of_a_source_tree(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "_PACKAGE_FOLDER", tmp_path / "boulder_sweep")
+    find = provenance.commit.__wrapped__
+    assert find() is None
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "boulder-sweep"\n')
+    git = tmp_path / ".git"
+    (git / "refs" / "heads").mkdir(parents=True)
+    (git / "HEAD").write_text("ref: refs/heads/main\n")
+    (git / "packed-refs").write_text("# pack-refs\n" + "b" * 40 + " refs/heads/main\n")
+    assert find() == "b" * 40
+    (git / "refs" / "heads" / "main").write_text("a" * 40 + "\n")
+    assert find() == "a" * 40
+    (git / "HEAD").write_text("c" * 40 + "\n")
+    assert find() == "c" * 40
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "other"\n')
+    assert find() is None

@@ -1,0 +1,125 @@
+"""The table on disk."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUT_COLUMNS
+from boulder_sweep.designs import Column, DesignBlock
+from boulder_sweep.evaluation import evaluation_of
+from boulder_sweep.store.schema import encode, judged_rows, part_table, table_schema
+from tests.sweep.grids import partly_impossible, plausible
+
+
+@pytest.fixture(scope="module")
+def block() -> DesignBlock:
+    sweep = partly_impossible()
+    return sweep.block(0, sweep.n_designs)
+
+
+@pytest.fixture(scope="module")
+def judged(block):
+    return evaluation_of(partly_impossible(), plausible)(block)
+
+
+def written(block, judged, metadata=None) -> pa.Table:
+    return pq.read_table(pa.BufferReader(encode(part_table(block, judged, metadata or {}))))
+
+
+def test_columns_and_types_are_those_of_the_register(block, judged):
+    table = written(block, judged)
+    assert table.schema.names == [spec.name for spec in COLUMNS]
+    words = pa.dictionary(pa.int32(), pa.string())
+    expected = {"int64": pa.int64(), "float64": pa.float64(), "dictionary": words}
+    for spec in COLUMNS:
+        assert table.schema.field(spec.name).type == expected[spec.type], spec.name
+
+
+def test_an_empty_table_has_the_same_types(block, judged):
+    empty = pq.read_table(pa.BufferReader(encode(table_schema().empty_table())))
+    assert empty.schema.remove_metadata() == written(block, judged).schema.remove_metadata()
+
+
+def test_inputs_come_back(block, judged):
+    table = written(block, judged)
+    for name in INPUT_COLUMNS:
+        assert np.array_equal(table[name].to_numpy(), block.columns[name].to_numpy())
+
+
+def test_inputs_are_never_written_out_row_by_row(block, judged):
+    table = part_table(block, judged, {})
+    for name in INPUT_COLUMNS:
+        column = table[name].chunk(0)
+        assert isinstance(column, pa.DictionaryArray)
+        assert len(column.dictionary) == len(block.columns[name].values) < 100
+
+
+def test_outcomes_come_back(block, judged):
+    again = judged_rows(written(block, judged))
+    for name in judged._fields:
+        one, other = getattr(judged, name), getattr(again, name)
+        if name == "reasons":
+            assert one == other
+        else:
+            assert one.dtype == other.dtype
+            assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
+
+
+def test_a_missing_value_is_null_never_nan(block, judged):
+    table = written(block, judged)
+    for name in judged._fields[:-1]:
+        values = getattr(judged, name)
+        missing = np.isnan(values) if values.dtype.kind == "f" else values < 0
+        assert table[name].null_count == np.count_nonzero(missing)
+        if values.dtype.kind == "f":
+            assert not np.isnan(table[name].drop_null().to_numpy()).any()
+
+
+@pytest.mark.parametrize("coded", [True, False])
+def test_a_missing_input_is_null(block, judged, coded):
+    values = np.array([np.nan, 0.7])
+    codes = np.arange(len(block), dtype=np.int32) % 2
+    column = Column(codes, values) if coded else Column(None, values[codes])
+    with_gap = DesignBlock(block.start, block.stop, {**block.columns, "impact_height_m": column}, block.reasons)
+    read = written(with_gap, judged)["impact_height_m"]
+    assert read.null_count == np.count_nonzero(codes == 0)
+    assert set(read.drop_null().to_pylist()) == {0.7}
+
+
+def test_encodings(block, judged):
+    plain = Column(None, np.linspace(0.1, 0.9, len(block)))
+    mixed = DesignBlock(block.start, block.stop, {**block.columns, "impact_height_m": plain}, block.reasons)
+    group = pq.read_metadata(pa.BufferReader(encode(part_table(mixed, judged, {})))).row_group(0)
+    for place in range(group.num_columns):
+        column = group.column(place)
+        assert column.compression == "ZSTD"
+        name = column.path_in_schema
+        if name == DESIGN_ID.name:
+            assert "DELTA_BINARY_PACKED" in column.encodings
+        elif name in (*INPUT_COLUMNS, "verdict", "reason", "rating") and name != "impact_height_m":
+            assert "RLE_DICTIONARY" in column.encodings
+        else:
+            assert "BYTE_STREAM_SPLIT" in column.encodings
+
+
+def test_the_same_rows_give_the_same_bytes(block, judged):
+    metadata = {b"a": b"b"}
+    one = encode(part_table(block, judged, metadata))
+    assert bytes(one) == bytes(encode(part_table(block, judged, metadata)))
+
+
+def test_a_flipped_bit_in_any_page_is_noticed(block, judged):
+    content = bytearray(encode(part_table(block, judged, {})))
+    group = pq.read_metadata(pa.BufferReader(content)).row_group(0)
+    for place in range(group.num_columns):
+        column = group.column(place)
+        # The last bytes of a column are always data, not the header of a page.
+        start = column.dictionary_page_offset or column.data_page_offset
+        last = start + column.total_compressed_size - 1
+        flipped = bytearray(content)
+        flipped[last] ^= 1
+        with pytest.raises(OSError, match=r"(?i)crc|corrupt"):
+            pq.read_table(pa.BufferReader(flipped), page_checksum_verification=True)

@@ -1,0 +1,276 @@
+"""Taking an output folder, writing parts, letting go; and what is refused."""
+
+from __future__ import annotations
+
+import errno
+import os
+
+import pytest
+
+from boulder_sweep.store import status, writer
+from boulder_sweep.store.errors import (
+    DamagedError,
+    FolderInUseError,
+    ForeignFilesError,
+    OutputExistsError,
+    SettingsDifferError,
+    StoreError,
+    WriteError,
+)
+from boulder_sweep.store.manifest import MANIFEST_NAME, load
+from boulder_sweep.store.reader import read_table
+from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+PARTS = [f"rows-{first:012d}.parquet" for first in range(0, ROWS, 100)]
+
+
+def test_a_finished_folder_holds_parts_and_manifest_only(tmp_path):
+    out = finished_folder(tmp_path / "out")
+    assert names(out) == [MANIFEST_NAME, *PARTS]
+    assert read_table(out)["design_id"].to_pylist() == list(range(ROWS))
+    manifest = load(out)
+    assert manifest.rows_done == ROWS
+    (session,) = manifest.sessions
+    assert session.how == "finished"
+    assert session.ended >= session.started
+
+
+def test_an_empty_folder_is_taken(tmp_path):
+    (tmp_path / "out").mkdir()
+    finished_folder(tmp_path / "out")
+
+
+def test_a_file_is_refused(tmp_path):
+    (tmp_path / "out").write_text("x")
+    with pytest.raises(StoreError, match="is a file"):
+        open_folder(tmp_path / "out")
+    assert (tmp_path / "out").read_text() == "x"
+
+
+def test_a_folder_in_a_folder_that_does_not_exist_is_refused(tmp_path):
+    with pytest.raises(StoreError, match="there is no folder") as refused:
+        open_folder(tmp_path / "typo" / "out")
+    assert refused.value.exit_code == 2
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("how", [{}, {"resume": True}, {"overwrite": True}])
+@pytest.mark.parametrize("name", ["notes.txt", "data.parquet", "rows-000000000000.parquet/"])
+def test_foreign_files_are_left_alone(tmp_path, how, name):
+    out = tmp_path / "out"
+    out.mkdir()
+    if name.endswith("/"):
+        (out / name).mkdir()
+    else:
+        (out / name).write_text("mine")
+    with pytest.raises((ForeignFilesError, DamagedError)):
+        open_folder(out, **how)
+    assert names(out) == [name.rstrip("/")]
+
+
+def test_a_file_that_is_only_named_like_a_part_is_foreign(tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / PARTS[0]).write_text("mine")
+    with pytest.raises(ForeignFilesError, match="rows-000000000000"):
+        open_folder(out, overwrite=True)
+    assert (out / PARTS[0]).read_text() == "mine"
+
+
+def test_to_overwrite_a_result_with_foreign_files_is_refused(tmp_path):
+    out = finished_folder(tmp_path / "out")
+    (out / "notes.txt").write_text("mine")
+    before = names(out)
+    with pytest.raises(ForeignFilesError, match=r"notes\.txt"):
+        open_folder(out, overwrite=True)
+    assert names(out) == before
+
+
+def test_overwriting_removes_what_a_sweep_wrote_and_follows_no_links(tmp_path):
+    out = finished_folder(tmp_path / "out")
+    elsewhere = tmp_path / "elsewhere.parquet"
+    (out / PARTS[1]).rename(elsewhere)
+    (out / PARTS[1]).symlink_to(elsewhere)
+    folder = open_folder(out, overwrite=True)
+    assert [name for name in names(out) if name.startswith("rows")] == []
+    folder.close("finished")
+    assert elsewhere.exists()
+
+
+def test_what_exists_is_refused_with_how_far_it_got(tmp_path):
+    out = tmp_path / "out"
+    folder = open_folder(out)
+    commit(folder, 0)
+    folder.close("interrupted")
+    with pytest.raises(OutputExistsError, match=r"holds 100 of 441 rows.*--resume"):
+        open_folder(out)
+
+
+def test_two_writers_in_one_process(tmp_path):
+    folder = open_folder(tmp_path / "out")
+    with pytest.raises(FolderInUseError, match=f"process {os.getpid()} on"):
+        open_folder(tmp_path / "out", resume=True)
+    with pytest.raises(FolderInUseError):
+        open_folder(tmp_path / "out", overwrite=True)
+    commit(folder, 0)
+    folder.close("finished")
+    open_folder(tmp_path / "out", resume=True).close("finished")
+
+
+def test_what_differs_is_said(tmp_path):
+    out = finished_folder(tmp_path / "out")
+    other = {**IDENTITY, "settings": {"soil": 2}, "settings_sha256": "b" * 64, "versions": {"numba": "2"}}
+    with pytest.raises(SettingsDifferError) as refused:
+        open_folder(out, identity=other, resume=True)
+    assert refused.value.differences == ["settings.soil: 1 -> 2", 'versions.numba: "1" -> "2"']
+    assert not status(out).running
+    with pytest.raises(SettingsDifferError, match="rows: 441 -> 442"):
+        open_folder(out, rows=442, resume=True)
+
+
+@pytest.mark.parametrize("damage", ["flip", "truncate", "grow", "remove"])
+def test_damaged_parts_are_found_and_missing_again(tmp_path, damage):
+    out = finished_folder(tmp_path / "out")
+    path = out / PARTS[2]
+    content = bytearray(path.read_bytes())
+    if damage == "flip":
+        content[len(content) // 2] ^= 4
+        path.write_bytes(content)
+    elif damage == "truncate":
+        path.write_bytes(content[:-1])
+    elif damage == "grow":
+        path.write_bytes(content + b"x")
+    else:
+        path.unlink()
+    folder = open_folder(out, resume=True)
+    assert list(folder.damaged) == [PARTS[2]]
+    assert list(folder.manifest.missing()) == [(200, 300)]
+    assert not path.exists()
+    commit(folder, 200)
+    folder.close("finished")
+    assert read_table(out)["design_id"].to_pylist() == list(range(ROWS))
+
+
+def test_a_part_that_was_put_but_not_recorded_is_computed_again(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    folder = open_folder(out)
+    commit(folder, 0)
+
+    def killed(manifest, where):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(writer, "save", killed)
+    with pytest.raises(KeyboardInterrupt):
+        commit(folder, 100)
+    monkeypatch.undo()
+    folder._lock.release()
+    assert PARTS[1] in names(out)
+    again = open_folder(out, resume=True)
+    assert again.damaged == {}
+    assert next(again.manifest.missing()) == (100, 200)
+    assert PARTS[1] not in names(out)
+    again.close("finished")
+
+
+@pytest.mark.parametrize("reached", ["announced", "put", "recorded"])
+def test_a_growing_part_is_whole_wherever_the_run_is_killed(tmp_path, monkeypatch, reached):
+    out = tmp_path / "out"
+    folder = open_folder(out)
+    commit(folder, 0, rows=30)
+    put, save = writer.put_file, writer.save
+    saved = []
+
+    def killed_at_put(*arguments):
+        if reached == "announced":
+            raise KeyboardInterrupt
+        put(*arguments)
+
+    def killed_at_save(*arguments):
+        saved.append(1)
+        if len(saved) == 2 and reached == "put":
+            raise KeyboardInterrupt
+        save(*arguments)
+
+    monkeypatch.setattr(writer, "put_file", killed_at_put)
+    monkeypatch.setattr(writer, "save", killed_at_save)
+    if reached == "recorded":
+        commit(folder, 0, rows=70)
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            commit(folder, 0, rows=70)
+    monkeypatch.undo()
+    folder._lock.release()
+    there = 30 if reached == "announced" else 70
+    assert status(out).rows_done == status(out, verify=True).rows_done == there
+    assert status(out, verify=True).damaged == {}
+    assert len(read_table(out)) == there
+    again = open_folder(out, resume=True)
+    assert again.damaged == {}
+    assert next(again.manifest.missing()) == (there, 100)
+    assert sum(again.manifest.verdicts.values()) == there
+    again.close("finished")
+
+
+def test_a_full_disk_says_what_is_safe_and_how_to_go_on(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    folder = open_folder(out)
+    commit(folder, 0)
+    before = names(out)
+
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(writer, "put_file", full)
+    with pytest.raises(WriteError, match=r"No space left.*100 of 441 rows are safe.*--resume"):
+        commit(folder, 100)
+    monkeypatch.undo()
+    folder.close("stopped")
+    assert names(out) == [name for name in before if name != "_lock"]
+    assert status(out, verify=True).rows_done == 100
+
+
+def test_a_run_that_was_refused_leaves_no_trace(tmp_path):
+    folder = open_folder(tmp_path / "out")
+    folder.discard()
+    folder.close("later")
+    assert names(tmp_path) == []
+    (tmp_path / "mine").mkdir()
+    open_folder(tmp_path / "mine").discard()
+    assert names(tmp_path / "mine") == []
+    finished_folder(tmp_path / "done")
+    open_folder(tmp_path / "done", resume=True).discard()
+    assert read_table(tmp_path / "done").num_rows == ROWS
+
+
+def test_what_is_written_after_closing_is_dropped(tmp_path):
+    folder = open_folder(tmp_path / "out")
+    commit(folder, 0)
+    folder.close("interrupted")
+    commit(folder, 100)
+    assert status(tmp_path / "out", verify=True).rows_done == 100
+    assert names(tmp_path / "out") == [MANIFEST_NAME, PARTS[0]]
+
+
+def test_a_lost_manifest_is_named(tmp_path):
+    out = finished_folder(tmp_path / "out")
+    (out / MANIFEST_NAME).unlink()
+    for how in ({}, {"resume": True}):
+        with pytest.raises(DamagedError, match=f"no {MANIFEST_NAME}"):
+            open_folder(out, **how)
+    open_folder(out, overwrite=True).close("finished")
+    assert names(out) == [MANIFEST_NAME]
+
+
+def test_a_damaged_manifest_can_be_overwritten_but_not_resumed(tmp_path):
+    out = finished_folder(tmp_path / "out")
+    content = (out / MANIFEST_NAME).read_bytes()
+    (out / MANIFEST_NAME).write_bytes(content[: len(content) // 2])
+    with pytest.raises(DamagedError):
+        open_folder(out, resume=True)
+    open_folder(out, overwrite=True).close("finished")
+    assert names(out) == [MANIFEST_NAME]
