@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import tempfile
@@ -50,10 +51,8 @@ def _cache_folder() -> str | None:
     named = os.environ.get(CACHE_VARIABLE)
     user_caches = os.environ.get("XDG_CACHE_HOME")
     candidates = [Path(named)] if named else []
-    try:
+    with contextlib.suppress(RuntimeError):  # no home folder, as for some service accounts
         candidates.append((Path(user_caches) if user_caches else Path.home() / ".cache") / "boulder-sweep")
-    except RuntimeError:  # no home folder, as for some service accounts
-        pass
     candidates.append(Path(tempfile.gettempdir()) / f"boulder-sweep-{os.getuid()}")
     for candidate in candidates:
         folder = candidate / f"kernels-{source_hash()[:16]}"
@@ -85,9 +84,7 @@ def _ask_for_wide_vectors() -> None:
 _ask_for_wide_vectors()
 
 
-def _compiled(
-    function: Callable[..., Any], fastmath: set[str], *, inline: bool = False
-) -> Callable[..., Any]:
+def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:
     """Decorate one function, its cache in this package's folder."""
     # Set only while decorating: other users of Numba in this process keep their own cache folder.
     before = numba.config.CACHE_DIR

@@ -18,6 +18,7 @@ from .modes import (
     HELD,
     LIMITED_BACK,
     LIMITED_FORWARD,
+    RESTING,
     SEATED,
     TURNING_BACK,
     TURNING_FORWARD,
@@ -66,7 +67,8 @@ class GapFactors(NamedTuple):
     """Of the compression u."""
     rotation_0: float
     rotation_M: float
-    """Of |M|."""
+    """Of M."""
+    rotation_abs_M: float
     rotation_theta: float
     rotation_omega: float
     couple_0: float
@@ -104,7 +106,7 @@ class Gaps(NamedTuple):
 
 
 @kernel
-def gap_factors(modes: Modes, c: Constants, theta_stop: float) -> GapFactors:
+def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: bool) -> GapFactors:
     """Factors of the gaps in the present modes.
 
     Parameters
@@ -115,14 +117,16 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float) -> GapFactors:
         Constants of the design.
     theta_stop
         Rotation at which the simulation ends [rad].
+    locate_yield
+        Whether a step is cut where the soil at the top or the base reaches its ultimate resistance.
     """
-    rotation_0 = rotation_M = rotation_theta = rotation_omega = 0.0
+    rotation_0 = rotation_M = rotation_abs_M = rotation_theta = rotation_omega = 0.0
     couple_0, couple_M, couple_abs_M, couple_limit = NEVER, 0.0, 0.0, 0.0
     corner_0, corner_theta = NEVER, 0.0
     arm_0, arm = NEVER, 0.0
     turning = modes.turning
     if turning == SEATED:
-        rotation_0, rotation_M = c.C_cos, -1.0
+        rotation_0, rotation_abs_M = c.C_cos, -1.0
     elif turning == TURNING_FORWARD:
         rotation_theta = 1.0
     elif turning == TURNING_BACK:
@@ -132,21 +136,30 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float) -> GapFactors:
         if turning == FREE:
             rotation_omega = -1.0
         else:
-            rotation_omega = 1.0
+            if turning == RESTING:
+                rotation_M = 1.0
+            else:
+                rotation_omega = 1.0
             arm_0, arm = 0.0, modes.arm
             couple_0, couple_limit = 0.0, -1.0
-            if turning == HELD:
+            if turning == HELD or turning == RESTING:
                 couple_abs_M, couple_limit = -1.0, 1.0
             elif turning == LIMITED_FORWARD:
                 couple_M = 1.0
             else:
                 couple_M = -1.0
-    top_0, top_abs = (c.x_yield, -1.0) if modes.yielded_top == 0 else (-c.x_yield, 0.0)
-    base_0, base_abs = (c.x_yield, -1.0) if modes.yielded_base == 0 else (-c.x_yield, 0.0)
+    top_0, top_abs, top = NEVER, 0.0, 0.0
+    base_0, base_abs, base = NEVER, 0.0, 0.0
+    if locate_yield:
+        top = float(modes.yielded_top)
+        top_0, top_abs = (c.x_yield, -1.0) if modes.yielded_top == 0 else (-c.x_yield, 0.0)
+        base = float(modes.yielded_base)
+        base_0, base_abs = (c.x_yield, -1.0) if modes.yielded_base == 0 else (-c.x_yield, 0.0)
     return GapFactors(
         1.0 if modes.touching else -1.0,
         rotation_0,
         rotation_M,
+        rotation_abs_M,
         rotation_theta,
         rotation_omega,
         couple_0,
@@ -159,10 +172,10 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float) -> GapFactors:
         arm,
         top_0,
         top_abs,
-        float(modes.yielded_top),
+        top,
         base_0,
         base_abs,
-        float(modes.yielded_base),
+        base,
         theta_stop,
     )
 
@@ -191,7 +204,11 @@ def gaps_of(
     base = A - slope_x
     return Gaps(
         g.contact * u,
-        g.rotation_0 + g.rotation_M * abs(M) + g.rotation_theta * theta_b + g.rotation_omega * omega_b,
+        g.rotation_0
+        + g.rotation_M * M
+        + g.rotation_abs_M * abs(M)
+        + g.rotation_theta * theta_b
+        + g.rotation_omega * omega_b,
         g.couple_0 + g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm),
         g.corner_0 + g.corner_theta * theta_b,
         g.arm_0 + g.arm * arm,
@@ -211,23 +228,25 @@ def gaps_at(y: State, M: float, g: GapFactors, c: Constants) -> Gaps:
 
 
 @inlined
-def gap_within(
-    event: int, tau: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
-) -> float:
+def needs_moment(g: GapFactors) -> bool:
+    """Whether the gap of the event ROTATION depends on the net moment."""
+    return g.rotation_M != 0.0 or g.rotation_abs_M != 0.0
+
+
+@inlined
+def gap_within(event: int, tau: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants) -> float:
     """Gap of one event at the fraction tau of a step."""
     if event == LIMIT:
         return g.limit - abs(displacement_at(dense.rotation, tau))
     y = state_at(dense, tau)
     M = 0.0
-    if event == COUPLE or (event == ROTATION and g.rotation_M != 0.0):
+    if event == COUPLE or (event == ROTATION and needs_moment(g)):
         M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c).M
     return gaps_at(y, M, g, c)[event]
 
 
 @kernel
-def locate(
-    event: int, gap_end: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
-) -> float:
+def locate(event: int, gap_end: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants) -> float:
     """Fraction of a step at which a gap that is negative at its end passes zero.
 
     Parameters
@@ -255,7 +274,7 @@ def locate(
                 break
         if gap_low <= 0.0:
             return low
-    exact = event == LIMIT or event == CORNER or (event == ROTATION and g.rotation_M == 0.0)
+    exact = event == LIMIT or event == CORNER or (event == ROTATION and not needs_moment(g))
     tolerance = JUMP_TOLERANCE if exact else KINK_TOLERANCE
     bracket = Bracket(low, gap_low, 1.0, gap_end, 0)
     tau = 1.0
@@ -269,9 +288,7 @@ def locate(
 
 
 @inlined
-def first_event(
-    end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
-) -> tuple[int, float]:
+def first_event(end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants) -> tuple[int, float]:
     """Earliest event of a step, and the fraction of the step at which it happens.
 
     Parameters
@@ -296,14 +313,14 @@ def first_event(
 
 
 @kernel
-def forward_mode(M: float, sin: float, versin: float, c: Constants) -> int:
-    """Mode of a boulder that turns forward under the printed restoring moment."""
+def mode_at_rest(M: float, corner: float, sin: float, versin: float, c: Constants) -> int:
+    """Printed reading: mode of a boulder whose angular velocity is zero and about to change (Eqs 37-39)."""
     limit = holding_moment(sin, versin, c)
-    if M > limit:
+    if M < 0.0:
+        return FREE
+    if limit < M:
         return LIMITED_FORWARD
-    if M < -limit:
-        return LIMITED_BACK
-    return HELD
+    return RESTING if corner > 0.0 else HELD
 
 
 @kernel
@@ -316,7 +333,7 @@ def initial_modes(readings: Readings, c: Constants) -> Modes:
     if readings.restoring_gravity:
         turning = SEATED
     else:
-        turning = HELD if c.h >= 0.0 else FREE
+        turning = RESTING if c.h >= 0.0 else FREE
     return Modes(turning, True, 1.0, 1.0, 0, 0)
 
 
@@ -363,14 +380,16 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
                 turning = TURNING_FORWARD if omega_b > 0.0 else TURNING_BACK
         else:
             omega_b = 0.0
-            turning = forward_mode(M, sin, versin, c) if turning == FREE else FREE
+            turning = FREE if turning == RESTING else mode_at_rest(M, corner, sin, versin, c)
     elif event == COUPLE:
-        if turning == HELD:
+        if turning == HELD or turning == RESTING:
             turning = LIMITED_FORWARD if M > 0.0 else LIMITED_BACK
         else:
             turning = HELD
     elif event == CORNER:
         corner = -corner
+        if turning == RESTING:
+            turning = HELD
     elif event == ARM:
         arm = -arm
     elif event == YIELD_TOP or event == YIELD_BASE:
@@ -379,6 +398,4 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
             top = crossed_yield(top, k.A)
         else:
             base = crossed_yield(base, k.A - k.slope_x)
-    return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(
-        turning, touching, corner, arm, top, base
-    )
+    return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(turning, touching, corner, arm, top, base)

@@ -17,6 +17,7 @@ from .events import LIMIT, GapFactors, change_mode, first_event, gap_factors, ga
 from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, Outcome, Status, no_maxima, undefined_maxima, updated_maxima
 from .readings import Readings
+from .settling import NO_PROOF, barrier_energy, boulder_energy, proof_is_possible
 from .stability import shortened_step
 
 FULL_TURN = math.pi
@@ -43,6 +44,9 @@ class Control(NamedTuple):
     """Whether the numerical error of each design is estimated."""
     stop_at_limit: bool = True
     """Whether the simulation ends where the rotation reaches its limit."""
+    locate_yield: bool = False
+    """Whether steps are also cut where the soil reaches its ultimate resistance. The force has a mere kink there, spread
+    over the depth once the boulder has turned, and locating it has not been found to pay."""
 
 
 class Record(NamedTuple):
@@ -178,12 +182,19 @@ def cross_event(
     switches: Switches,
     readings: Readings,
     theta_stop: float,
+    locate_yield: bool,
     c: Constants,
 ) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
     """Go over into the modes that follow an event: state, modes, their factors, and the acceleration to start with."""
     y, modes = change_mode(event, y, rate_of(y, switches, c).M, modes, c)
     switches = switches_of(modes, readings, c)
-    return y, modes, switches, gap_factors(modes, c, theta_stop), rate_of(y, switches, c)
+    return y, modes, switches, gap_factors(modes, c, theta_stop, locate_yield), rate_of(y, switches, c)
+
+
+@inlined
+def turned_back(y: State, y_end: State) -> bool:
+    """Whether a motion that is reported changed its direction in a step, so that its maximum may now be final."""
+    return y.omega_b * y_end.omega_b < 0.0 or y.v_b > 0.0 >= y_end.v_b or y.v_v > 0.0 >= y_end.v_v
 
 
 @kernel
@@ -226,7 +237,7 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
     modes = initial_modes(readings, c)
     switches = switches_of(modes, readings, c)
-    factors = gap_factors(modes, c, theta_stop)
+    factors = gap_factors(modes, c, theta_stop, control.locate_yield)
     k1 = rate_of(y, switches, c)
     m = no_maxima()
     exchanged = nothing_exchanged()
@@ -234,6 +245,8 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     written = 0
     t, t_limit = 0.0, np.nan
     attempts = 0
+    barrier = NO_PROOF
+    seeking_proof = control.stop_at_limit and control.elements == 0 and proof_is_possible(readings)
     while t < control.horizon:
         attempts += 1
         if attempts > budget:
@@ -246,7 +259,7 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
         dense = dense_output(y, k1, y_end, k_end, h)
         event, tau, y_end, m = keep_up_to_event(t, h, y_end, k_end.M, dense, factors, switches, m, c)
         if np.isnan(t_limit) and abs(y_end.theta_b) >= control.theta_limit and not control.stop_at_limit:
-            at_limit = gap_factors(modes, c, control.theta_limit)
+            at_limit = gap_factors(modes, c, control.theta_limit, False)
             gap = control.theta_limit - abs(y_end.theta_b)
             t_limit = t + h * min(tau, locate(LIMIT, gap, dense, at_limit, switches, c))
         if recording:
@@ -258,9 +271,16 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
                 t_limit = t
             m = Maxima(theta_stop, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v)
             return Outcome(Status.LIMIT.value, m, t_limit, t, attempts)
+        if seeking_proof and y_end.v_v <= 0.0 and t < control.horizon:
+            if turned_back(y, y_end):
+                barrier = barrier_energy(m, c)
+            if boulder_energy(y_end, c) < barrier:
+                return Outcome(Status.SETTLED.value, m, t_limit, t, attempts)
         y = y_end
         if event >= 0:
-            y, modes, switches, factors, k1 = cross_event(event, y, modes, switches, readings, theta_stop, c)
+            y, modes, switches, factors, k1 = cross_event(
+                event, y, modes, switches, readings, theta_stop, control.locate_yield, c
+            )
         else:
             k1 = k_end
     return Outcome(horizon_status(y, m), m, t_limit, t, attempts)

@@ -1,9 +1,9 @@
 """Many designs side by side, one in each lane of the vector registers.
 
-Every lane has its own clock. One attempt advances all of them by a step (`attempt_steps`), and a second loop looks
-at what came out (`take_over_steps`): most steps meet no event and set no peak, and are taken over at once. The few that need more are
-attended to one by one with the functions of the single impact, and a lane whose design has come to its end gets the next
-one. No lane waits for another, and each gives the bits that the single impact gives.
+Every lane has its own clock. One attempt advances all of them by a step (`attempt_steps`), and a second loop looks at
+what came out (`take_over_steps`): most steps meet no event and set no peak, and are taken over at once. The few that
+need more are attended to one by one with the functions of the single impact, and a lane whose design has come to its
+end gets the next one. No lane waits for another.
 """
 
 from __future__ import annotations
@@ -25,11 +25,13 @@ from .impact import (
     is_finite,
     keep_up_to_event,
     rate_of,
+    turned_back,
 )
 from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, OutcomeTable, Status, compression_rate, no_maxima
 from .readings import Readings
 from .restoring import signed_arm
+from .settling import NO_PROOF, barrier_energy, boulder_energy, proof_is_possible
 from .soil import soil_kinematics
 from .stability import shortened_step
 from .trigonometry import sine_versine
@@ -37,6 +39,7 @@ from .vehicle import contact_displacement, contact_lever, spring_compression
 from .workspace import (
     ATTEMPTS,
     ATTENTION,
+    BARRIER,
     LANES,
     MAXIMA,
     RATE,
@@ -125,6 +128,7 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
             & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
             & ((field(ws, RATE, 0, lane) <= 0.0) | (rate >= 0.0))
             & (h < horizon - t)
+            & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, 0, lane)))
         )
         F_v = s.k_contact * u
         t_next = t + h
@@ -143,9 +147,7 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
 
 
 @kernel
-def start_lane(
-    ws: np.ndarray, lane: int, table: DesignTable, row: int, readings: Readings, control: Control
-) -> int:
+def start_lane(ws: np.ndarray, lane: int, table: DesignTable, row: int, readings: Readings, control: Control) -> int:
     """Put a design into a lane.
 
     Returns
@@ -169,7 +171,8 @@ def start_lane(
     store_maxima(ws, lane, no_maxima())
     put(ws, STEP_FULL, 0, lane, h_full)
     put(ws, ATTEMPTS, 0, lane, 0.0)
-    factors = gap_factors(modes, c, control.theta_limit)
+    put(ws, BARRIER, 0, lane, NO_PROOF)
+    factors = gap_factors(modes, c, control.theta_limit, control.locate_yield)
     set_lane(ws, lane, 0.0, y, rate_of(y, switches, c), modes, switches, factors, control.horizon)
     return RUNNING
 
@@ -218,9 +221,7 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
         return Status.STEP_BUDGET.value
     k_end = load_end(ws, lane)
     dense = dense_output(load_state(ws, lane), load_start(ws, lane), y_end, k_end, h)
-    event, tau, y, m = keep_up_to_event(
-        t, h, y_end, k_end.M, dense, factors, switches, load_maxima(ws, lane), c
-    )
+    event, tau, y, m = keep_up_to_event(t, h, y_end, k_end.M, dense, factors, switches, load_maxima(ws, lane), c)
     last = h >= control.horizon - t
     t = control.horizon if last and event < 0 else t + tau * h
     put(ws, TIME, 0, lane, t)
@@ -231,10 +232,15 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
         return Status.LIMIT.value
     if t >= control.horizon:
         return horizon_status(y, m)
+    if proof_is_possible(readings) and y.v_v <= 0.0:
+        if turned_back(load_state(ws, lane), y):
+            put(ws, BARRIER, 0, lane, barrier_energy(m, c))
+        if boulder_energy(y, c) < field(ws, BARRIER, 0, lane):
+            return Status.SETTLED.value
     k1 = k_end
     if event >= 0:
         y, modes, switches, factors, k1 = cross_event(
-            event, y, modes, switches, readings, control.theta_limit, c
+            event, y, modes, switches, readings, control.theta_limit, control.locate_yield, c
         )
     set_lane(ws, lane, t, y, k1, modes, switches, factors, control.horizon)
     return RUNNING

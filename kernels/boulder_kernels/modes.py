@@ -36,6 +36,10 @@ LIMITED_BACK = 5
 FREE = 6
 """Printed reading, omega <= 0: no restoring moment (Eq 38)."""
 
+RESTING = 7
+"""Printed reading, omega = 0 and pushed forward by less than the limit: the restoring moment balances the net moment,
+and omega stays 0. As soon as the net moment points back, Eq 38 lets the boulder go."""
+
 
 class Modes(NamedTuple):
     """The switches of one step."""
@@ -74,7 +78,7 @@ def switches_of(modes: Modes, readings: Readings, c: Constants) -> Switches:
     """Factors of the right-hand side for the modes of a step (Eqs 37-39, 47)."""
     net, couple, couple_sin = 1.0, 0.0, 0.0
     turning = modes.turning
-    if turning == SEATED:
+    if turning == SEATED or turning == RESTING:
         net = 0.0
     elif turning == TURNING_FORWARD:
         couple, couple_sin = -1.0, c.C_sin

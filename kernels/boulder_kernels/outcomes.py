@@ -137,9 +137,7 @@ def force_at(y: State, s: Switches, c: Constants) -> float:
 
 
 @kernel
-def force_peak(
-    dense: DenseOutput, tau_end: float, r: float, r_end: float, s: Switches, c: Constants
-) -> float:
+def force_peak(dense: DenseOutput, tau_end: float, r: float, r_end: float, s: Switches, c: Constants) -> float:
     """Fraction of a step at which the contact force peaks.
 
     Parameters

@@ -55,9 +55,7 @@ class Kinematics(NamedTuple):
 
 
 @inlined
-def soil_kinematics(
-    x_b: float, v_b: float, omega_b: float, sin: float, versin: float, c: Constants
-) -> Kinematics:
+def soil_kinematics(x_b: float, v_b: float, omega_b: float, sin: float, versin: float, c: Constants) -> Kinematics:
     """Lines of displacement (Eq 22), velocity (Eq 35) and lever (Eqs 7, 8, 20) along the depth.
 
     Parameters
@@ -72,9 +70,7 @@ def soil_kinematics(
     cos = 1.0 - versin
     lever_d = c.d * cos
     q = c.l_n * sin - c.z_0 * cos
-    return Kinematics(
-        x_b - c.l_n * versin + c.z_0 * sin, c.d * sin, v_b - omega_b * q, omega_b * lever_d, q, lever_d
-    )
+    return Kinematics(x_b - c.l_n * versin + c.z_0 * sin, c.d * sin, v_b - omega_b * q, omega_b * lever_d, q, lever_d)
 
 
 @inlined
@@ -107,8 +103,7 @@ def element_sums(k: Kinematics, c: Constants) -> Reaction:
     for n in range(c.elements):
         ratio = (n + 0.5) * per_element
         F_n = -(
-            spring_force(k.A - k.slope_x * ratio, ratio * c.d, h_e, c)
-            + drag_force(k.B - k.slope_v * ratio, h_e, c)
+            spring_force(k.A - k.slope_x * ratio, ratio * c.d, h_e, c) + drag_force(k.B - k.slope_v * ratio, h_e, c)
         )
         F += F_n
         M -= F_n * (k.lever_d * ratio + k.q)
@@ -153,11 +148,7 @@ def closed_form(k: Kinematics, c: Constants) -> Reaction:
     b_0 = a_0 * r_0
     BB, Bp, pp = B * B, B * p, p * p
     drag = BB * (2.0 * r_0 - 1.0) - Bp * (2.0 * a_0 - 1.0) + (1.0 / 3.0) * pp * (2.0 * b_0 - 1.0)
-    drag_r = (
-        0.5 * BB * (2.0 * a_0 - 1.0)
-        - (2.0 / 3.0) * Bp * (2.0 * b_0 - 1.0)
-        + 0.25 * pp * (2.0 * a_0 * a_0 - 1.0)
-    )
+    drag_r = 0.5 * BB * (2.0 * a_0 - 1.0) - (2.0 / 3.0) * Bp * (2.0 * b_0 - 1.0) + 0.25 * pp * (2.0 * a_0 * a_0 - 1.0)
     R = math.copysign(c.R_soil, p)
     pressed = c.K_soil * spring + R * drag
     pressed_r = c.K_soil * spring_r + R * drag_r
@@ -172,30 +163,57 @@ def soil_reaction(k: Kinematics, c: Constants) -> Reaction:
     return closed_form(k, c)
 
 
+class Potential(NamedTuple):
+    """Elastic energy of the soil and its slopes."""
+
+    V: float
+    """Energy stored in the springs [J]."""
+    V_A: float
+    """Its derivative by the displacement at the soil line [N]."""
+    V_X: float
+    """Its derivative by the decrease of displacement over the depth [N]."""
+
+
+@inlined
+def soil_potential(A: float, slope_x: float, c: Constants) -> Potential:
+    """Elastic energy of the soil for N -> infinity, a convex function of the two numbers that fix its displacement.
+
+    The springs are elastic also beyond their limit: a spring holds u^2/2 up to the yield displacement y and
+    y |u| - y^2/2 beyond, times its stiffness.
+
+    Parameters
+    ----------
+    A, slope_x
+        Displacement at the soil line, and its decrease over the whole depth [m].
+    c
+        Constants of the design.
+    """
+    s = math.copysign(max(abs(slope_x), TINY), slope_x)
+    y = math.copysign(c.x_yield, s)
+    inverse_s = 1.0 / s
+    below, above = y - A, y + A
+    r_1 = min(max(-below * inverse_s, 0.0), 1.0)
+    r_2 = min(max(above * inverse_s, 0.0), 1.0)
+    a_1, a_2 = r_1 * r_1, r_2 * r_2
+    b_1, b_2 = a_1 * r_1, a_2 * r_2
+    spring = 0.5 * (below * a_1 + above * a_2 - y) + (1.0 / 3.0) * s * (b_1 - b_2)
+    spring_r = (1.0 / 3.0) * (below * b_1 + above * b_2 - y) + 0.25 * s * (a_1 * a_1 - a_2 * a_2)
+    # u^2/2 on r_1 ... r_2; before and after it the tangents +-y u - y^2/2.
+    middle = 0.25 * A * A * (a_2 - a_1) - (1.0 / 3.0) * A * s * (b_2 - b_1) + 0.125 * s * s * (a_2 * a_2 - a_1 * a_1)
+    before = y * (0.5 * A * a_1 - (1.0 / 3.0) * s * b_1) - 0.25 * y * y * a_1
+    after = -y * (0.5 * A * (1.0 - a_2) - (1.0 / 3.0) * s * (1.0 - b_2)) - 0.25 * y * y * (1.0 - a_2)
+    return Potential(c.K_soil * (before + middle + after), c.K_soil * spring, -c.K_soil * spring_r)
+
+
 @kernel
 def soil_energy(k: Kinematics, c: Constants) -> float:
-    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces.
-
-    The springs are elastic also beyond their limit, so an element holds u^2/2 up to the yield displacement y
-    and y |u| - y^2/2 beyond, times its stiffness.
-    """
-    if c.elements > 0:
-        total = 0.0
-        for n in range(c.elements):
-            ratio = (n + 0.5) / c.elements
-            u = abs(k.A - k.slope_x * ratio)
-            over = max(u - c.x_yield, 0.0)
-            total += ratio * 0.5 * (u * u - over * over)
-        return c.K_soil * total / c.elements
-    s = math.copysign(max(abs(k.slope_x), TINY), k.slope_x)
-    y = math.copysign(c.x_yield, s)
-    A = k.A
-    r_1 = min(max((A - y) / s, 0.0), 1.0)
-    r_2 = min(max((A + y) / s, 0.0), 1.0)
-    # u^2/2 on r_1 ... r_2; before and after it the tangents +-y u - y^2/2.
-    middle = (
-        0.25 * A * A * (r_2**2 - r_1**2) - A * s / 3.0 * (r_2**3 - r_1**3) + 0.125 * s * s * (r_2**4 - r_1**4)
-    )
-    before = y * (0.5 * A * r_1**2 - s / 3.0 * r_1**3) - 0.25 * y * y * r_1**2
-    after = -y * (0.5 * A * (1.0 - r_2**2) - s / 3.0 * (1.0 - r_2**3)) - 0.25 * y * y * (1.0 - r_2**2)
-    return c.K_soil * (before + middle + after)
+    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces."""
+    if c.elements == 0:
+        return soil_potential(k.A, k.slope_x, c).V
+    total = 0.0
+    for n in range(c.elements):
+        ratio = (n + 0.5) / c.elements
+        u = abs(k.A - k.slope_x * ratio)
+        over = max(u - c.x_yield, 0.0)
+        total += ratio * 0.5 * (u * u - over * over)
+    return c.K_soil * total / c.elements

@@ -107,6 +107,7 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
         control.elements,
         control.error_estimate,
         control.stop_at_limit,
+        control.locate_yield,
     )
     fine = simulate_once(table, readings, half)
     estimate_errors(out, fine)

@@ -31,6 +31,7 @@ _FIELDS = {
     "step_full": 1,
     "time": 1,
     "rate": 1,
+    "barrier": 1,
     "maxima": 4,
     "attention": 1,
     "modes": len(Modes._fields),
@@ -58,6 +59,8 @@ STEP_FULL = _offset("step_full")
 TIME = _offset("time")
 RATE = _offset("rate")
 """Rate of the compression of the vehicle's spring at the start of the step [m/s]."""
+BARRIER = _offset("barrier")
+"""Energy below which the motion has settled [J], see `boulder_kernels.settling`."""
 MAXIMA = _offset("maxima")
 """Largest |theta_b|, x_b, x_v, F_v."""
 ATTENTION = _offset("attention")
@@ -181,6 +184,7 @@ def load_factors(ws: np.ndarray, lane: int) -> GapFactors:
         field(ws, FACTORS, 17, lane),
         field(ws, FACTORS, 18, lane),
         field(ws, FACTORS, 19, lane),
+        field(ws, FACTORS, 20, lane),
     )
 
 
@@ -190,23 +194,24 @@ def store_factors(ws: np.ndarray, lane: int, g: GapFactors) -> None:
     put(ws, FACTORS, 0, lane, g.contact)
     put(ws, FACTORS, 1, lane, g.rotation_0)
     put(ws, FACTORS, 2, lane, g.rotation_M)
-    put(ws, FACTORS, 3, lane, g.rotation_theta)
-    put(ws, FACTORS, 4, lane, g.rotation_omega)
-    put(ws, FACTORS, 5, lane, g.couple_0)
-    put(ws, FACTORS, 6, lane, g.couple_M)
-    put(ws, FACTORS, 7, lane, g.couple_abs_M)
-    put(ws, FACTORS, 8, lane, g.couple_limit)
-    put(ws, FACTORS, 9, lane, g.corner_0)
-    put(ws, FACTORS, 10, lane, g.corner_theta)
-    put(ws, FACTORS, 11, lane, g.arm_0)
-    put(ws, FACTORS, 12, lane, g.arm)
-    put(ws, FACTORS, 13, lane, g.top_0)
-    put(ws, FACTORS, 14, lane, g.top_abs)
-    put(ws, FACTORS, 15, lane, g.top)
-    put(ws, FACTORS, 16, lane, g.base_0)
-    put(ws, FACTORS, 17, lane, g.base_abs)
-    put(ws, FACTORS, 18, lane, g.base)
-    put(ws, FACTORS, 19, lane, g.limit)
+    put(ws, FACTORS, 3, lane, g.rotation_abs_M)
+    put(ws, FACTORS, 4, lane, g.rotation_theta)
+    put(ws, FACTORS, 5, lane, g.rotation_omega)
+    put(ws, FACTORS, 6, lane, g.couple_0)
+    put(ws, FACTORS, 7, lane, g.couple_M)
+    put(ws, FACTORS, 8, lane, g.couple_abs_M)
+    put(ws, FACTORS, 9, lane, g.couple_limit)
+    put(ws, FACTORS, 10, lane, g.corner_0)
+    put(ws, FACTORS, 11, lane, g.corner_theta)
+    put(ws, FACTORS, 12, lane, g.arm_0)
+    put(ws, FACTORS, 13, lane, g.arm)
+    put(ws, FACTORS, 14, lane, g.top_0)
+    put(ws, FACTORS, 15, lane, g.top_abs)
+    put(ws, FACTORS, 16, lane, g.top)
+    put(ws, FACTORS, 17, lane, g.base_0)
+    put(ws, FACTORS, 18, lane, g.base_abs)
+    put(ws, FACTORS, 19, lane, g.base)
+    put(ws, FACTORS, 20, lane, g.limit)
 
 
 @inlined

@@ -1,0 +1,162 @@
+"""Proof that nothing a simulation reports can still grow.
+
+Under the gravity couple and released contact every force is either conservative or dissipative, and once the truck no
+longer moves forward it can only be pushed back: the force of contact takes energy from the boulder and gives it to
+the truck. So from then on
+
+    E = kinetic energy of the boulder + elastic energy of the soil + lift of the weight + compression of the truck
+
+never grows. To turn further than it has, the boulder would have to pass theta = +-theta_max, and to move further
+x_b = x_max. If E is below the least potential energy on these lines, it cannot. The elastic energy of the soil is
+convex, so a tangent plane bounds it from below wherever it is taken, and a few steps of a root finder place the
+tangent well; the bound is a proof wherever they end.
+"""
+
+from __future__ import annotations
+
+from ._jit import inlined, kernel
+from .design import Constants
+from .dynamics import State
+from .outcomes import Maxima
+from .readings import Readings
+from .roots import Bracket, narrowed, next_guess
+from .soil import Potential, soil_kinematics, soil_potential
+from .trigonometry import sine_versine
+from .vehicle import contact_displacement, spring_compression
+
+NO_PROOF = -1.0
+"""Barrier of a motion that nothing has been proved of: no energy is below it."""
+PLACING_STEPS = 6
+"""Steps of the root finder that places a tangent."""
+CAUTION = 1.0 - 1e-6
+"""The energy must be below the barrier by the integrator's own error, and more."""
+
+
+@kernel
+def proof_is_possible(readings: Readings) -> bool:
+    """Whether the energy argument holds: no force that is read as printed drives the motion."""
+    return readings.restoring_gravity and readings.separation_released
+
+
+@kernel
+def least_soil_energy(slope_x: float, c: Constants) -> float:
+    """Lower bound of the elastic energy at a rotation, wherever the boulder stands [J].
+
+    Parameters
+    ----------
+    slope_x
+        Decrease of displacement over the depth, sin|theta| d [m]; not negative.
+    c
+        Constants of the design.
+
+    Notes
+    -----
+    The least energy has its displacement between none at the soil line and none at the base, A = 0 ... slope_x.
+    """
+    if slope_x == 0.0:
+        return 0.0
+    bracket = Bracket(0.0, soil_potential(0.0, slope_x, c).V_A, slope_x, soil_potential(slope_x, slope_x, c).V_A, 0)
+    A = 0.0
+    for _ in range(PLACING_STEPS):
+        A = next_guess(bracket)
+        bracket = narrowed(bracket, A, soil_potential(A, slope_x, c).V_A)
+    p = soil_potential(A, slope_x, c)
+    return p.V - abs(p.V_A) * slope_x
+
+
+@kernel
+def energy_to_turn(theta_max: float, c: Constants) -> float:
+    """Lower bound of the potential energy at theta = +-theta_max [J].
+
+    Parameters
+    ----------
+    theta_max
+        Rotation [rad].
+    c
+        Constants of a design whose restoring moment is the couple of the weight.
+    """
+    sin, versin = sine_versine(theta_max)
+    return c.C_cos * sin + c.C_sin * versin + least_soil_energy(c.d * sin, c)
+
+
+@inlined
+def bound_at(
+    p: Potential, A: float, X: float, sin: float, versin: float, x_max: float, lift: float, c: Constants
+) -> float:
+    """Tangent plane p of the elastic energy at (A, X), plus lift |sin|, on x_b = x_max at a sine and a versine."""
+    return p.V + p.V_A * (x_max - c.l_n * versin + c.z_0 * sin - A) + p.V_X * (c.d * sin - X) + lift * abs(sin)
+
+
+@kernel
+def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
+    """Lower bound of the potential energy on x_b = x_max for |theta| <= theta_max [J].
+
+    Notes
+    -----
+    With t = tan(theta_max/2), 1 - cos(theta) lies between 0 and t sin|theta|, so the lift of the weight is at least
+    sin|theta| (C_cos + C_sin t). What bounds the energy is then linear on either side of theta = 0, and least at one
+    of the corners.
+    """
+    sin_max, versin_max = sine_versine(theta_max)
+    t = versin_max / sin_max if sin_max > 0.0 else 0.0
+    lift = c.C_cos + c.C_sin * t
+    # Place the tangent where, along the line of the largest versine, the energy is least.
+    direction_A, direction_X = c.z_0 - c.l_n * t, c.d
+    start, end = soil_potential(x_max, 0.0, c), soil_potential(x_max + direction_A * sin_max, direction_X * sin_max, c)
+    slope = start.V_A * direction_A + start.V_X * direction_X + lift
+    slope_end = end.V_A * direction_A + end.V_X * direction_X + lift
+    s = 0.0 if slope >= 0.0 else sin_max
+    if slope < 0.0 < slope_end:
+        bracket = Bracket(0.0, slope, sin_max, slope_end, 0)
+        for _ in range(PLACING_STEPS):
+            s = next_guess(bracket)
+            p = soil_potential(x_max + direction_A * s, direction_X * s, c)
+            bracket = narrowed(bracket, s, p.V_A * direction_A + p.V_X * direction_X + lift)
+    A, X = x_max + direction_A * s, direction_X * s
+    p = soil_potential(A, X, c)
+    least = bound_at(p, A, X, 0.0, 0.0, x_max, lift, c)
+    for side in (-1.0, 1.0):
+        for versin in (0.0, t * sin_max):
+            least = min(least, bound_at(p, A, X, side * sin_max, versin, x_max, lift, c))
+    return least
+
+
+@kernel
+def barrier_energy(m: Maxima, c: Constants) -> float:
+    """Energy below which a motion can exceed none of its maxima so far [J].
+
+    Parameters
+    ----------
+    m
+        Maxima so far.
+    c
+        Constants of a design whose restoring moment is the couple of the weight.
+
+    Notes
+    -----
+    A force of contact F takes the energy F^2/(2 k_v) in the truck's spring.
+    """
+    to_press = 0.5 * m.F_v * m.F_v / c.k_v
+    to_turn = energy_to_turn(m.theta, c)
+    if to_turn <= 0.0:
+        return NO_PROOF
+    return CAUTION * min(to_turn, energy_to_move(m.x_b, m.theta, c), to_press)
+
+
+@inlined
+def boulder_energy(y: State, c: Constants) -> float:
+    """Energy E that can only fall once the truck has stopped moving forward [J].
+
+    Parameters
+    ----------
+    y
+        The state.
+    c
+        Constants of a design whose restoring moment is the couple of the weight; closed form of the soil.
+    """
+    sin, versin = sine_versine(y.theta_b)
+    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+    u = max(spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c), 0.0)
+    kinetic = 0.5 * (c.m_eff * y.v_b * y.v_b + c.J_eff * y.omega_b * y.omega_b)
+    lift = c.C_cos * abs(sin) + c.C_sin * versin
+    return kinetic + lift + soil_potential(k.A, k.slope_x, c).V + 0.5 * c.k_v * u * u
