@@ -40,9 +40,7 @@ ADMITTED: dict[str, Bound] = {
     "embedment_depth_m": Bound(1e-6, 20.0, "a boulder that is not embedded is outside the model"),
     "impact_height_m": Bound(0.0, 20.0, "counted upwards from the soil line"),
     "soil_density_kg_m3": Bound(1e-3, 1e10, _DENSITY),
-    "friction_angle_deg": Bound(
-        1.0, 60.0, "no soil has less or more, and the passive coefficient diverges at 90"
-    ),
+    "friction_angle_deg": Bound(1.0, 60.0, "no soil has less or more, and the passive coefficient diverges at 90"),
     "subgrade_reaction_MN_m3": Bound(1e-6, 1e9, _CONSTANT),
     "strain_rate_factor": Bound(0.1, 10.0, "1.0 means no gain of strength under rapid loading"),
     "vehicle_mass_kg": Bound(1e-3, 1e10, "a million times lighter or heavier than a truck"),
@@ -68,9 +66,7 @@ REALISTIC: dict[str, Realistic] = {
     "boulder_density_kg_m3": Realistic(2400.0, 3074.0, "rock"),
     "embedment_ratio": Realistic(0.35, 0.75, "usual embedments"),
     "soil_density_kg_m3": Realistic(1520.0, 2240.0, "sand and gravel"),
-    "friction_angle_deg": Realistic(
-        27.0, 49.0, "loose sand to very dense gravel; a bare number is in degrees"
-    ),
+    "friction_angle_deg": Realistic(27.0, 49.0, "loose sand to very dense gravel; a bare number is in degrees"),
     "subgrade_reaction_MN_m3": Realistic(2.0, 110.0, "loose to very dense sand; a bare number is in MN/m^3"),
     "strain_rate_factor": Realistic(1.0, 1.2, "rapid loading of sand"),
     "vehicle_mass_kg": Realistic(1000.0, 30000.0, "car to heavy truck; a bare number is in kg, not in lb"),
@@ -82,7 +78,5 @@ REALISTIC: dict[str, Realistic] = {
     "bed_offset_m": Realistic(
         2.5, 3.2, "front bumper to leading edge of the cargo bed; penetration is counted from that edge"
     ),
-    "max_rotation_deg": Realistic(
-        1.0, 20.0, "beyond 20 deg the model no longer holds and a truck may ramp up"
-    ),
+    "max_rotation_deg": Realistic(1.0, 20.0, "beyond 20 deg the model no longer holds and a truck may ramp up"),
 }

@@ -58,9 +58,7 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
         return
     exposed = height - depth
     if exposed > bumper and impact > exposed * (1 + 1e-12):
-        message = (
-            f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
-        )
+        message = f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
         entries.problems.add(entries.leaves["impact_height_m"].place, "site.impact_height", message)
 
 

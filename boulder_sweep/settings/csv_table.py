@@ -138,9 +138,7 @@ class _Reader:
             try:
                 number, unit = split_number(cell, field.unit)
                 if unit:
-                    raise NumberError(
-                        f"'{shorten(cell)}' has a unit; the column is in {field.unit} by its name"
-                    )
+                    raise NumberError(f"'{shorten(cell)}' has a unit; the column is in {field.unit} by its name")
                 values[row] = float(number)
             except (NumberError, OverflowError) as error:
                 self.problems.add(self.place(*self.origins[row], index), field.name, str(error))

@@ -168,9 +168,7 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
 def _checked(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
     """Return the values; every one of them must be admitted."""
     values = [_to_float(quantity.value) for quantity in quantities]
-    problems = (
-        (node, outside(value, field.name, field.unit)) for node, value in zip(nodes, values, strict=True)
-    )
+    problems = ((node, outside(value, field.name, field.unit)) for node, value in zip(nodes, values, strict=True))
     mistakes = [Mistake(node.place, problem) for node, problem in problems if problem]
     if mistakes:
         raise LeafError(mistakes)
@@ -184,9 +182,7 @@ def _read_range(node: Mapping, field: Field) -> list[float]:
     quantities = _read_all([entry.value for entry in ends], field, node.unit)
     exact = {entry.key: quantity.value for entry, quantity in zip(ends, quantities, strict=True)}
     bounding = [
-        (quantity, entry.value)
-        for entry, quantity in zip(ends, quantities, strict=True)
-        if entry.key != "step"
+        (quantity, entry.value) for entry, quantity in zip(ends, quantities, strict=True) if entry.key != "step"
     ]
     _checked([quantity for quantity, _ in bounding], [value for _, value in bounding], field)
     try:
@@ -215,7 +211,7 @@ def _check_range_keys(node: Mapping) -> None:
         missing = [key for key in ("from", "to") if key not in node.entries]
         if missing:
             mistakes.append(Mistake(node.place, f"the range lacks {' and '.join(missing)}"))
-        if "count" in node.entries and "step" in node.entries:
+        elif "count" in node.entries and "step" in node.entries:
             mistakes.append(Mistake(node.entries["step"].place, "give count or step, not both"))
         elif "count" not in node.entries and "step" not in node.entries:
             mistakes.append(Mistake(node.place, "the range lacks count or step"))
@@ -226,9 +222,7 @@ def _check_range_keys(node: Mapping) -> None:
 def _count_of_count(first: Fraction, last: Fraction, node: Node) -> int:
     count = read_count(node, "count", MAX_AXIS)
     if count == 1 and first != last:
-        raise NumberError(
-            "count 1 cannot hold both ends of the range; give a count of 2 or more, or one value"
-        )
+        raise NumberError("count 1 cannot hold both ends of the range; give a count of 2 or more, or one value")
     return count
 
 
@@ -240,13 +234,10 @@ def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str) -
     if steps < 0:
         way = "downwards" if last < first else "upwards"
         raise NumberError(
-            f"the range goes {way} and the step does not; "
-            "exchange from and to, or change the sign of the step"
+            f"the range goes {way} and the step does not; exchange from and to, or change the sign of the step"
         )
     if steps >= MAX_AXIS:
-        raise NumberError(
-            f"this makes more than {MAX_AXIS} values, the most for one axis; take a larger step"
-        )
+        raise NumberError(f"this makes more than {MAX_AXIS} values, the most for one axis; take a larger step")
     if steps.denominator != 1:
         below = first + math.floor(steps) * step
         above = below + step

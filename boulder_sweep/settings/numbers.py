@@ -13,7 +13,7 @@ from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.tree import Node, Scalar, Sequence
 from boulder_sweep.settings.units import EXPECTED, UnitError, factor
 
-_NUMBER = re.compile(r"([+-]?)(\d*)(?:\.(\d*))?(?:[eE]([+-]?\d{1,9}))?", re.ASCII)
+_NUMBER = re.compile(r"([+-]?)(\d*)(?:\.(\d*))?(?:[eE]([+-]?\d+))?", re.ASCII)
 _YES_NO = frozenset({"true", "false", "yes", "no", "on", "off", "y", "n"})
 _NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)\b.*", re.IGNORECASE)
 _MAX_DIGITS = 40
@@ -89,21 +89,18 @@ def split_number(text: str, unit: str) -> tuple[Fraction, str]:
     rest = stripped[match.end() :] if match else stripped
     if not (whole or decimals):
         raise NumberError(f"{quoted} is not a number; {needed}")
+    if whole == "0" and rest[:1].lower() in ("x", "o", "b"):
+        raise NumberError(f"{quoted} is not a decimal number; {needed}")
     if len(whole) > 1 and whole.startswith("0"):
-        raise NumberError(
-            f"{quoted} begins with a zero, which some programs read as an octal number; write it without"
-        )
+        raise NumberError(f"{quoted} begins with a zero, which some programs read as an octal number; write it without")
     if rest[:1] in (",", "_", "'", ".") or re.match(r"\s+\d", rest):
         raise NumberError(
-            f"{quoted} is not a plain number; "
-            "write a decimal point and no signs between the thousands, as in 6800.5"
+            f"{quoted} is not a plain number; write a decimal point and no signs between the thousands, as in 6800.5"
         )
     if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
-        raise NumberError(
-            f"{quoted} is not one number; {needed}, or a range {{from: ..., to: ..., count: ...}}"
-        )
+        raise NumberError(f"{quoted} is not one number; {needed}, or a range {{from: ..., to: ..., count: ...}}")
     digits = whole + (decimals or "")
-    power = int(exponent or 0)
+    power = _MAX_EXPONENT + 1 if len(exponent or "") > 9 else int(exponent or 0)
     if len(digits) > _MAX_DIGITS or abs(power) > _MAX_EXPONENT:
         raise NumberError(f"{quoted} has too many digits or too large an exponent for a number of this world")
     value = Fraction(int(digits)) * Fraction(10) ** (power - len(decimals or ""))

@@ -90,9 +90,7 @@ def _read_readings(node: Node) -> ReadingChoice:
             if entry.key == "preset":
                 preset = _one_of(entry.value, PRESETS, "a reading of the paper")
             elif entry.key in SWITCHES:
-                value = _one_of(
-                    entry.value, (PRINTED, SWITCHES[entry.key], "corrected"), f"a value of {entry.key}"
-                )
+                value = _one_of(entry.value, (PRINTED, SWITCHES[entry.key], "corrected"), f"a value of {entry.key}")
                 switches[entry.key] = SWITCHES[entry.key] if value == "corrected" else value
             else:
                 known = ("preset", *SWITCHES)
@@ -116,9 +114,7 @@ def _read_soil(node: Node) -> int:
             raise _wrong(count, str(error)) from None
     if isinstance(node, Scalar) and node.text.strip() == CLOSED_FORM:
         return 0
-    raise _wrong(
-        node, f"{_shown(node)} is not a representation of the soil: closed_form, or {{elements: 5000}}"
-    )
+    raise _wrong(node, f"{_shown(node)} is not a representation of the soil: closed_form, or {{elements: 5000}}")
 
 
 def _read_accuracy(node: Node) -> str | float:
@@ -132,9 +128,7 @@ def _read_accuracy(node: Node) -> str | float:
         except NumberError:
             choices = ", ".join(ACCURACIES)
             hint = did_you_mean(word, ACCURACIES)
-            raise _wrong(
-                node, f"{_shown(node)} is not {choices}, nor an angle such as 0.01 deg{hint}"
-            ) from None
+            raise _wrong(node, f"{_shown(node)} is not {choices}, nor an angle such as 0.01 deg{hint}") from None
     return read_single(node, "accuracy_deg", "deg")
 
 

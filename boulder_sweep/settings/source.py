@@ -52,9 +52,7 @@ def check_regular_file(path: Path, max_bytes: int, what: str) -> None:
     if not stat.S_ISREG(status.st_mode):
         raise refuse(label, "is not a regular file (pipes and devices are not read)")
     if status.st_size > max_bytes:
-        raise refuse(
-            label, f"has {status.st_size / 1e6:.1f} MB; at most {max_bytes / 1e6:g} MB is read. {what}"
-        )
+        raise refuse(label, f"has {status.st_size / 1e6:.1f} MB; at most {max_bytes / 1e6:g} MB is read. {what}")
 
 
 def read_settings_text(path: Path) -> str:
@@ -65,9 +63,7 @@ def read_settings_text(path: Path) -> str:
     SettingsError
         The file cannot be read, is too large, or is not UTF-8 text.
     """
-    check_regular_file(
-        path, MAX_BYTES, "Put a long list of designs into a file of its own: table: designs.csv"
-    )
+    check_regular_file(path, MAX_BYTES, "Put a long list of designs into a file of its own: table: designs.csv")
     try:
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)  # a file may grow between the check and the reading

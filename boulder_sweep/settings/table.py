@@ -71,9 +71,7 @@ def check_header(names: list[str], places: list[Place], problems: ProblemList) -
         elif name == "design_id":
             message = "designs are numbered by their order; remove this column or rename the table's columns"
         elif name in OUTCOME_COLUMNS:
-            message = (
-                f"is an outcome of a run ({TABLE_COLUMNS[name].meaning}), not an input; remove this column"
-            )
+            message = f"is an outcome of a run ({TABLE_COLUMNS[name].meaning}), not an input; remove this column"
         elif field is None:
             message = f"is not an input column (known: {', '.join(_KNOWN)}){did_you_mean(name, _KNOWN)}"
         if message:
@@ -91,9 +89,7 @@ def check_values(values: np.ndarray, field: Field, limit: int = 20) -> list[tupl
     found = []
     for row in wrong:
         value = float(values[row])
-        message = (
-            "is not a finite number" if not np.isfinite(value) else outside(value, field.name, field.unit)
-        )
+        message = "is not a finite number" if not np.isfinite(value) else outside(value, field.name, field.unit)
         found.append((int(row), message))
     return found
 
@@ -122,9 +118,7 @@ def _read_parquet(path: Path, problems: ProblemList) -> dict[str, np.ndarray]:
                 problems.add(Place(label), name, f"holds {column.type}, not numbers")
                 continue
             if column.null_count:
-                problems.add(
-                    Place(label), name, f"has {column.null_count} empty cells; every design needs a value"
-                )
+                problems.add(Place(label), name, f"has {column.null_count} empty cells; every design needs a value")
                 continue
             values = column.cast(pa.float64()).to_numpy()
             for row, message in check_values(values, field):

@@ -1,26 +1,22 @@
 """Units at the edge: every unit a user may write, its conversion, and what does not fit.
 
-The vocabulary is closed: pint knows exactly the units below and nothing else, so that a slip of the pen is
-an error and not some exotic unit of the same name. Conversions are exact decimal fractions.
+The vocabulary is closed, so that a slip of the pen is an error and not some exotic unit of the same name, and
+conversions are exact fractions, so that 30 mph is 13.4112 m/s to the bit. (A units library would bring half
+of the scientific stack along at import; checking a file has to answer at once.)
 """
 
 from __future__ import annotations
 
 import re
-from decimal import Decimal
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from boulder_sweep.settings.problems import did_you_mean, shorten
 
-if TYPE_CHECKING:
-    from pint import UnitRegistry
-    from pint.util import UnitsContainer
-
 STANDARD_GRAVITY = Fraction("9.80665")
 
-# Name = value = alias = alias ...; compound units follow from these (kN*s/m, lb/ft^3).
+# Name = value = alias = alias ...; each line may use the lines above. Compound units follow from these.
 _DEFINITIONS = """
 metre = [length] = m = meter = metres = meters
 millimetre = 0.001 metre = mm = millimeter
@@ -99,7 +95,6 @@ _KINDS = (
     ("1/s", "a frequency"),
     ("N*m", "a moment"),
 )
-_POUNDS = frozenset({"pound"})
 _TRANSLATION = str.maketrans(
     {
         "·": "*",
@@ -117,6 +112,7 @@ _TRANSLATION = str.maketrans(
 )
 _TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-zµ_]+|[%°])\.?|(?P<power>(?:\^|\*\*)?\s*-?\d)|(?P<sign>[*/()\-]))")
 MAX_LENGTH = 60
+MAX_POWER = 9
 
 
 class UnitError(ValueError):
@@ -149,59 +145,75 @@ def factor(text: str, target: str) -> Fraction:
     Weights stand for masses where a mass or a density is asked (116 pcf, 18.2 kN/m^3, 15 kip), and a pound
     is a force where a force is asked (350 lb/in^3), with standard gravity in between.
     """
-    units = _read(text)
-    scale, dimension = _base(units)
-    target_scale, target_dimension = _base(_read(target))
-    ratio = scale / target_scale
-    if dimension == target_dimension:
+    names = _read(text)
+    unit, wanted = _product(names), _product(_read(target))
+    ratio = unit.scale / wanted.scale
+    if unit.dimension == wanted.dimension:
         return ratio
-    acceleration = _base(_read("m/s^2"))[1]
-    if target in ("kg", "kg/m^3") and dimension == target_dimension * acceleration:
+    if target in ("kg", "kg/m^3") and unit.dimension == _times(wanted.dimension, _ACCELERATION):
         return ratio / STANDARD_GRAVITY
-    if _POUNDS & set(units) and dimension * acceleration == target_dimension:
+    if "pound" in names and _times(unit.dimension, _ACCELERATION) == wanted.dimension:
         return ratio * STANDARD_GRAVITY
-    kind = _kind(dimension)
     expected = EXPECTED[target]
-    raise UnitError(f"'{shorten(text)}' is {kind}; {expected.words} is needed ({expected.examples})")
+    raise UnitError(f"'{shorten(text)}' is {_kind(unit.dimension)}; {expected.words} is needed ({expected.examples})")
+
+
+Dimension = tuple[int, ...]
+
+
+class Unit(NamedTuple):
+    """A unit: its value in m, kg, s and degrees, and its powers of these."""
+
+    scale: Fraction
+    dimension: Dimension
+
+
+_BASE = ("[length]", "[mass]", "[time]", "[angle]")
+_ACCELERATION: Dimension = (1, 0, -2, 0)
 
 
 @cache
-def _registry() -> UnitRegistry[Decimal]:
-    # pint takes as long to import as everything else of `sweep check`: only files with units pay for it.
-    from pint import UnitRegistry
-
-    registry: UnitRegistry[Decimal] = UnitRegistry(None, non_int_type=Decimal)
-    registry.load_definitions(_DEFINITIONS.strip().splitlines())
-    return registry
-
-
-def _base(units: dict[str, int]) -> tuple[Fraction, UnitsContainer]:
-    """Return the value of one such unit in m, kg, s and degrees, and its dimension."""
-    registry = _registry()
-    scale = Fraction(1)
-    dimension = registry.UnitsContainer()
-    for name, power in units.items():
-        magnitude, _ = registry.get_base_units(name)
-        scale *= Fraction(str(magnitude)) ** power
-        dimension = dimension * registry.get_dimensionality(name) ** power
-    return scale, dimension
+def _vocabulary() -> dict[str, tuple[str, Unit]]:
+    """Return every accepted spelling with the full name of its unit and the unit."""
+    known: dict[str, tuple[str, Unit]] = {}
+    for line in _DEFINITIONS.strip().splitlines():
+        full, value, *aliases = (part.strip() for part in line.split(" = "))
+        if value in _BASE:
+            unit = Unit(Fraction(1), tuple(int(value == base) for base in _BASE))
+        else:
+            number, _, rest = value.partition(" ") if value[0].isdigit() else ("1", "", value)
+            unit = _product(_read(rest, known), known)
+            unit = Unit(Fraction(number) * unit.scale, unit.dimension)
+        known |= dict.fromkeys([full, *aliases], (full, unit))
+    return known
 
 
-def _kind(dimension: UnitsContainer) -> str:
+def _product(powers: dict[str, int], known: dict[str, tuple[str, Unit]] | None = None) -> Unit:
+    """Return the unit that a product of units makes."""
+    known = _vocabulary() if known is None else known
+    scale, dimension = Fraction(1), (0,) * len(_BASE)
+    for name, power in powers.items():
+        unit = known[name][1]
+        scale *= unit.scale**power
+        dimension = _times(dimension, tuple(power * exponent for exponent in unit.dimension))
+    return Unit(scale, dimension)
+
+
+def _times(one: Dimension, other: Dimension) -> Dimension:
+    return tuple(a + b for a, b in zip(one, other, strict=True))
+
+
+def _kind(dimension: Dimension) -> str:
     """Return the kind of quantity in words, for a message."""
-    for unit, expected in EXPECTED.items():
-        if _base(_read(unit))[1] == dimension:
-            return expected.words
-    for unit, words in _KINDS:
-        if _base(_read(unit))[1] == dimension:
-            return words
-    return "another kind of quantity"
+    kinds = (*((unit, expected.words) for unit, expected in EXPECTED.items()), *_KINDS)
+    return next((words for unit, words in kinds if _product(_read(unit)).dimension == dimension), "another kind of quantity")
 
 
-def _read(text: str) -> dict[str, int]:
+def _read(text: str, known: dict[str, tuple[str, Unit]] | None = None) -> dict[str, int]:
     """Return the powers of the units in a product such as ``kN*s/m``, ``lb/ft3`` or ``kN-s/m``."""
-    if text == "1":
+    if text in ("1", ""):
         return {}
+    known = _vocabulary() if known is None else known
     if len(text) > MAX_LENGTH:
         raise UnitError(f"'{shorten(text)}' is too long for a unit")
     plain = re.sub(r"\bper\b", "/", text.translate(_TRANSLATION))
@@ -217,63 +229,65 @@ def _read(text: str) -> dict[str, int]:
         tokens.append((kind, match[kind]))
         position = match.end()
     powers: dict[str, int] = {}
-    if _product(tokens, 0, 1, powers, text) != len(tokens):
+    reader = _Reader(tokens, known)
+    if not reader.product(powers, 1) or reader.index != len(tokens):
         raise UnitError(f"'{shorten(text)}' is not a unit")
-    if any(abs(power) > 9 for power in powers.values()):
+    if any(abs(power) > MAX_POWER for power in powers.values()):
         raise UnitError(f"'{shorten(text)}' is not a unit")
     return {name: power for name, power in powers.items() if power}
 
 
-def _product(tokens: list[tuple[str, str]], start: int, sign: int, powers: dict[str, int], text: str) -> int:
-    """Read a product of units from token `start` on into `powers`; return the token it ended at."""
-    index, side, wants_unit = start, sign, True
-    if index < len(tokens) and tokens[index][1] == "/":
-        index, side = index + 1, -sign
-    while index < len(tokens) and tokens[index][1] != ")":
-        kind, value = tokens[index]
-        if kind == "sign" and value != "(":
-            if wants_unit:
-                break
-            side = -sign if value == "/" else sign
-            index, wants_unit = index + 1, True
-            continue
-        factor_powers: dict[str, int] = {}
-        if value == "(":
-            index = _product(tokens, index + 1, 1, factor_powers, text)
-            if index >= len(tokens):
-                break
-        elif kind == "name":
-            factor_powers[_known(value)] = 1
+class _Reader:
+    """Reads a product of units, in parentheses or not, from its tokens."""
+
+    def __init__(self, tokens: list[tuple[str, str]], known: dict[str, tuple[str, Unit]]) -> None:
+        self.tokens = tokens
+        self.known = known
+        self.index = 0
+
+    def next_is(self, *signs: str) -> bool:
+        return self.index < len(self.tokens) and self.tokens[self.index][1] in signs
+
+    def product(self, powers: dict[str, int], sign: int) -> bool:
+        """Read ``a * b / c ...`` into `powers`; return whether it is well formed."""
+        side = sign
+        if self.next_is("/"):  # 1/s
+            self.index, side = self.index + 1, -sign
+        if not self.factor(powers, side):
+            return False
+        while self.index < len(self.tokens) and not self.next_is(")"):
+            side = sign
+            if self.next_is("*", "-", "/"):
+                side = -sign if self.next_is("/") else sign
+                self.index += 1
+            if not self.factor(powers, side):
+                return False
+        return True
+
+    def factor(self, powers: dict[str, int], side: int) -> bool:
+        """Read one unit or a product in parentheses, with its power; return whether it is well formed."""
+        inner: dict[str, int] = {}
+        if self.next_is("("):
+            self.index += 1
+            if not self.product(inner, 1) or not self.next_is(")"):
+                return False
+        elif self.index < len(self.tokens) and self.tokens[self.index][0] == "name":
+            inner[_full_name(self.tokens[self.index][1], self.known)] = 1
         else:
-            break
-        index += 1
+            return False
+        self.index += 1
         power = 1
-        if index < len(tokens) and tokens[index][0] == "power":
-            power = int(tokens[index][1].lstrip("^* "))
-            index += 1
-        for name, inner in factor_powers.items():
-            powers[name] = powers.get(name, 0) + side * power * inner
-        side, wants_unit = sign, False
-    if wants_unit or (index < len(tokens) and tokens[index][1] != ")"):
-        raise UnitError(f"'{shorten(text)}' is not a unit")
-    return index
+        if self.index < len(self.tokens) and self.tokens[self.index][0] == "power":
+            power = int(self.tokens[self.index][1].lstrip("^* "))
+            self.index += 1
+        for name, exponent in inner.items():
+            powers[name] = powers.get(name, 0) + side * power * exponent
+        return True
 
 
-def _known(name: str) -> str:
-    """Return the full name of a unit."""
+def _full_name(name: str, known: dict[str, tuple[str, Unit]]) -> str:
     if name.lower() in ("ton", "tons"):
         raise UnitError(f"'{name}' may be one of three; say short_ton, long_ton or tonne")
-    names = _names()
-    if name not in names:
-        raise UnitError(f"'{shorten(name)}' is not a known unit{did_you_mean(name, names)}")
-    return names[name]
-
-
-@cache
-def _names() -> dict[str, str]:
-    """Return every accepted spelling with the full name of its unit."""
-    names = {}
-    for line in _DEFINITIONS.strip().splitlines():
-        full, _, *aliases = (part.strip() for part in line.split(" = "))
-        names.update(dict.fromkeys([full, *aliases], full))
-    return names
+    if name not in known:
+        raise UnitError(f"'{shorten(name)}' is not a known unit{did_you_mean(name, known)}")
+    return known[name][0]

@@ -120,13 +120,9 @@ def parse(text: str, label: str, problems: ProblemList) -> Mapping | None:
     if isinstance(root, Mapping):
         return root
     if root is None:
-        problems.add(
-            Place(label), "", "is empty; it needs at least the blocks boulder, site, soil and vehicle"
-        )
+        problems.add(Place(label), "", "is empty; it needs at least the blocks boulder, site, soil and vehicle")
     else:
-        problems.add(
-            root.place, "", "a file of settings is made of blocks such as 'boulder: {length: 1.65 m}'"
-        )
+        problems.add(root.place, "", "a file of settings is made of blocks such as 'boulder: {length: 1.65 m}'")
     return None
 
 
@@ -175,9 +171,7 @@ class _Builder:
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
             if self.documents == 2:
-                self.problems.add(
-                    self.place(event), "", "a second document begins here; one per file is read"
-                )
+                self.problems.add(self.place(event), "", "a second document begins here; one per file is read")
         elif self.documents > 1:
             return
         elif isinstance(event, ScalarEvent):

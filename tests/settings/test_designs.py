@@ -1,0 +1,235 @@
+"""Blocks of designs against a plain product of the axes, at any size, without ever making the grid."""
+
+import itertools
+import pickle
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.designs import MAX_DICTIONARY, DesignPlan, Source
+
+KEYS = {
+    "boulder_length_m": "boulder.length",
+    "boulder_height_m": "boulder.height",
+    "embedment_ratio": "site.embedment_ratio",
+    "embedment_depth_m": "site.embedment_depth",
+    "impact_height_m": "site.impact_height",
+    "friction_angle_deg": "soil.friction_angle",
+    "impact_speed_m_s": "vehicle.speed",
+    "bumper_height_m": "vehicle.bumper_height",
+    "hood_height_m": "vehicle.hood_height",
+}
+
+
+def _reason(row):
+    """Say plainly, for one row, why it cannot be computed."""
+    exposed = row["boulder_height_m"] - row["embedment_depth_m"]
+    if exposed <= 0:
+        return "embedment depth is not less than the boulder's height"
+    if row["hood_height_m"] < row["bumper_height_m"]:
+        return "hood is lower than the bumper"
+    given = row.get("given_impact_height", 0.0)
+    if given > exposed * (1 + 1e-12) and exposed > row["bumper_height_m"]:
+        return "impact height is above the top of the boulder"
+    return ""
+
+
+def _rows(sweep):
+    """Write the grid out with itertools.product, row by row."""
+    for values in itertools.product(*(axis.values.tolist() for axis in sweep.axes)):
+        row = dict(sweep.constants) | dict(zip((axis.name for axis in sweep.axes), values, strict=True))
+        if "embedment_ratio" in row:
+            row["embedment_depth_m"] = row.pop("embedment_ratio") * row["boulder_height_m"]
+        if "impact_height_m" in row:
+            row["given_impact_height"] = row["impact_height_m"]
+        else:
+            face = min(row["boulder_height_m"] - row["embedment_depth_m"], row["hood_height_m"])
+            row["impact_height_m"] = 0.5 * (face + row["bumper_height_m"])
+        yield row
+
+
+def _check(sweep, start, stop):
+    rows = list(itertools.islice(_rows(sweep), start, stop))
+    block = sweep.block(start, stop)
+    assert (block.start, block.stop, len(block)) == (start, stop, stop - start)
+    assert block.design_id().tolist() == list(range(start, stop))
+    assert tuple(block.columns) == INPUT_COLUMNS
+    for name, column in block.columns.items():
+        assert column.to_numpy().tolist() == [row[name] for row in rows], name
+        assert len(column) == stop - start
+        if column.codes is not None:
+            assert column.codes.dtype == np.int32
+            assert len(np.unique(column.values)) == len(column.values)
+    assert block.reasons.to_list() == [_reason(row) for row in rows]
+    assert block.reasons.any == any(_reason(row) for row in rows)
+
+
+@st.composite
+def grids(draw):
+    """Axes in any order, embedment in either way, possible and impossible combinations mixed."""
+    names = draw(st.permutations(sorted(KEYS)))
+    way = draw(st.sampled_from(["embedment_ratio", "embedment_depth_m"]))
+    other = "embedment_depth_m" if way == "embedment_ratio" else "embedment_ratio"
+    chosen = [name for name in names if name != other and (name == way or draw(st.booleans()))]
+    within = {"embedment_ratio": (0.1, 1.0), "friction_angle_deg": (20, 45), "impact_speed_m_s": (0, 30)}
+    overrides = []
+    for name in chosen:
+        low, high = within.get(name, (0.2, 3.0))
+        numbers = st.floats(low, high).map(lambda value: round(value, 2))
+        values = draw(st.lists(numbers, min_size=1, max_size=4))
+        overrides.append((KEYS[name], values))
+    return overrides
+
+
+@settings(max_examples=150, deadline=None)
+@given(grid=grids(), data=st.data())
+def test_any_block_of_any_grid_equals_the_product(load_of_axes, grid, data):
+    sweep = load_of_axes(grid)
+    start = data.draw(st.integers(0, sweep.n_designs))
+    stop = data.draw(st.integers(start, min(sweep.n_designs, start + 200)))
+    _check(sweep, start, stop)
+
+
+@pytest.fixture(scope="module")
+def load_of_axes():
+    from pathlib import Path
+
+    from boulder_sweep.settings import load_text
+
+    def load_of_axes(overrides):
+        blocks: dict[str, dict[str, str]] = {
+            "boulder": {"length": "1.65", "width": "1.68", "height": "3.44", "density": "2596"},
+            "site": {},
+            "soil": {"density": "1860", "friction_angle": "43", "subgrade_reaction": "95"},
+            "vehicle": {"mass": "6722", "speed": "14.5", "spring": "3103300", "damper": "138910"},
+        }
+        for key, values in overrides:
+            section, name = key.split(".")
+            blocks[section][name] = str(values)
+        # Axes that can never be valid as single values stay lists, so that the rows tell of them.
+        text = "\n".join(
+            f"{section}: {{{', '.join(f'{key}: {value}' for key, value in keys.items())}}}"
+            for section, keys in blocks.items()
+        )
+        return load_text(text, Path("grid.yaml"))
+
+    return load_of_axes
+
+
+def test_the_whole_example(load_it, example):
+    sweep = load_it(example)
+    _check(sweep, 0, sweep.n_designs)
+
+
+def test_blocks_join_without_gap(load_it, example):
+    sweep = load_it(example)
+    whole = sweep.block(0, 1000).columns["impact_height_m"].to_numpy()
+    parts = [sweep.block(start, min(start + 37, 1000)) for start in range(0, 1000, 37)]
+    assert np.concatenate([part.columns["impact_height_m"].to_numpy() for part in parts]).tolist() == whole.tolist()
+
+
+@pytest.mark.parametrize(("start", "stop"), [(-1, 3), (3, 2), (0, 2737), (2737, 2737)])
+def test_rows_outside_of_the_grid(load_it, example, start, stop):
+    with pytest.raises(IndexError, match="2736 designs"):
+        load_it(example).block(start, stop)
+
+
+def test_an_empty_block(load_it, example):
+    block = load_it(example).block(7, 7)
+    assert len(block) == 0
+    assert block.reasons.to_list() == []
+    assert not block.reasons.any
+
+
+HUGE = (
+    "boulder.height={from: 1.5, to: 4, count: 1000}",
+    "boulder.width={from: 1, to: 2, count: 1000}",
+    "soil.friction_angle={from: 30, to: 45, count: 1000}",
+    "vehicle.speed={from: 10, to: 20, count: 1000}",
+)
+
+
+def test_ten_to_the_twelve_designs_load_and_stream(load_with):
+    tracemalloc.start()
+    sweep = load_with(*HUGE)
+    assert sweep.n_designs == 10**12
+    block = sweep.block(10**12 - 3, 10**12)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 20_000_000
+    assert block.columns["impact_speed_m_s"].to_numpy()[-1] == 20.0
+    assert block.columns["boulder_height_m"].to_numpy().tolist() == [4.0] * 3
+    digits = 123_456_789_012
+    row = sweep.block(digits, digits + 1).columns
+    assert row["impact_speed_m_s"].to_numpy()[0] == sweep.axes[3].values[12]
+    assert row["friction_angle_deg"].to_numpy()[0] == sweep.axes[2].values[789]
+    assert row["boulder_height_m"].to_numpy()[0] == sweep.axes[1].values[456]
+    assert row["boulder_width_m"].to_numpy()[0] == sweep.axes[0].values[123]
+
+
+def test_more_designs_than_can_be_numbered_are_refused(problems_of, minimal):
+    (problem,) = problems_of(
+        minimal, *HUGE, *(f"vehicle.{key}={{from: 1e6, to: 2e6, count: 1000}}" for key in ("spring", "damper", "mass"))
+    )
+    assert f"{10**21} designs" in problem.message
+
+
+def test_combinations_too_many_for_a_dictionary_are_worked_out_per_row(load_with):
+    count = 300
+    sweep = load_with(
+        f"boulder.height={{from: 2, to: 4, count: {count}}}",
+        f"site.embedment_ratio={{from: 0.4, to: 1.0, count: {count}}}",
+    )
+    assert count**2 > MAX_DICTIONARY
+    block = sweep.block(count - 2, count + 1)
+    assert block.columns["embedment_depth_m"].codes is None
+    assert block.columns["boulder_height_m"].codes is not None
+    _check(sweep, count - 2, count + 1)
+    _check(sweep, count**2 - 50, count**2)
+
+
+def test_few_values_stay_a_dictionary(load_it, example):
+    block = load_it(example).block(0, 2736)
+    assert {name: len(column.values) for name, column in block.columns.items() if column.codes is not None}[
+        "embedment_depth_m"
+    ] <= 19 * 16
+    assert all(column.codes is not None for column in block.columns.values())
+    assert len(block.columns["boulder_width_m"].values) == 1
+
+
+def test_a_long_list_of_ever_different_values_is_no_dictionary():
+    values = np.random.default_rng(1).random(3 * MAX_DICTIONARY)
+    lookup, dictionary = Source(values, (0,)).dictionary
+    assert lookup is None
+    assert dictionary is not None
+    assert len(dictionary) == len(values)
+
+
+def test_parts_of_a_grid_without_possible_rows(load_with):
+    sweep = load_with("boulder.height=[1.5, 2.5]", "site.embedment_depth=[1, 1.5, 2]")
+    deep = "embedment depth is not less than the boulder's height"
+    assert sweep.block(0, 6).reasons.to_list() == ["", deep, deep, "", "", ""]
+
+
+def test_a_truck_that_passes_over_the_boulder_is_no_mistake(load_with):
+    sweep = load_with("site.embedment_depth=[2.03, 3.0]", "site.impact_height=0.9")
+    assert sweep.block(0, 2).reasons.to_list() == ["", ""]
+    sweep = load_with("boulder.height=[2.6, 2.7, 3.44]", "site.impact_height=0.9")
+    assert sweep.block(0, 3).reasons.to_list() == ["impact height is above the top of the boulder"] * 2 + [""]
+
+
+def test_sweeps_travel_to_other_processes(load_it, example):
+    sweep = load_it(example)
+    again = pickle.loads(pickle.dumps(sweep))
+    assert again.resolved() == sweep.resolved()
+    for one, other in zip(sweep.block(5, 9).columns.values(), again.block(5, 9).columns.values(), strict=True):
+        assert one.to_numpy().tolist() == other.to_numpy().tolist()
+
+
+def test_a_plan_without_axes_has_one_row():
+    given = {name: Source(np.array([1.0])) for name in INPUT_COLUMNS}
+    assert DesignPlan([], given).n_designs == 1

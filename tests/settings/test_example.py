@@ -1,0 +1,185 @@
+"""The file as users are shown it loads as written and means what it says."""
+
+import json
+
+import numpy as np
+import pytest
+
+from boulder_sweep.columns import BY_NAME, COLUMNS, INPUT_COLUMNS, OUTCOME_COLUMNS
+
+
+def test_axes_in_the_order_of_the_file(load_it, example):
+    sweep = load_it(example)
+    assert sweep.name == "m30-sizing"
+    assert [axis.name for axis in sweep.axes] == [
+        "boulder_height_m",
+        "embedment_ratio",
+        "friction_angle_deg",
+        "subgrade_reaction_MN_m3",
+    ]
+    assert [len(axis) for axis in sweep.axes] == [19, 16, 3, 3]
+    assert sweep.n_designs == 19 * 16 * 3 * 3
+    assert isinstance(sweep.n_designs, int)
+    assert sweep.axes[2].values.tolist() == [36.0, 40.0, 43.2]
+    assert sweep.axes[3].values.tolist() == [25.0, 60.0, 95.0]
+
+
+def test_values_are_converted_once_and_exactly(load_it, example):
+    values = {name: column.to_numpy()[0] for name, column in load_it(example).block(0, 1).columns.items()}
+    assert values["vehicle_mass_kg"] == 6803.88555
+    assert values["impact_speed_m_s"] == 13.4112
+    assert values["vehicle_spring_N_m"] == 3103300.0
+    assert values["vehicle_damper_N_s_m"] == 138910.0
+    assert values["embedment_depth_m"] == 0.4 * 1.6
+    assert values["impact_height_m"] == 0.5 * ((1.6 - 0.4 * 1.6) + 0.5)
+
+
+def test_the_order_of_axes_follows_the_order_of_blocks_and_keys(load_it, example):
+    lines = example.splitlines()
+    swapped = "\n".join([lines[0], lines[3], lines[2], lines[1], *lines[4:]])
+    assert [axis.name for axis in load_it(swapped).axes] == [
+        "friction_angle_deg",
+        "subgrade_reaction_MN_m3",
+        "embedment_ratio",
+        "boulder_height_m",
+    ]
+
+
+def test_defaults(load_it, minimal):
+    sweep = load_it(minimal)
+    assert sweep.name == "grid"
+    assert sweep.n_designs == 1
+    assert sweep.axes == ()
+    assert sweep.constants["strain_rate_factor"] == 1.0
+    assert sweep.constants["bumper_height_m"] == 0.5
+    assert sweep.constants["hood_height_m"] == 1.4
+    assert sweep.constants["bed_offset_m"] == 2.9
+    assert (sweep.criterion.max_rotation_deg, sweep.criterion.rating) == (20.0, "P1")
+    assert sweep.model.preset == "corrected"
+    assert sweep.model.soil_elements == 0
+    assert (sweep.solver.accuracy, sweep.solver.step_s, sweep.solver.horizon_s) == ("balanced", None, 1.0)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "boulder.width",
+        "boulder.density",
+        "soil.density",
+        "soil.friction_angle",
+        "soil.subgrade_reaction",
+        "vehicle.mass",
+        "vehicle.speed",
+        "vehicle.spring",
+        "vehicle.damper",
+        "boulder.length",
+        "boulder.height",
+    ],
+)
+def test_required_keys(problems_of, minimal, key):
+    section, name = key.split(".")
+    lines, inside = [], False
+    for line in minimal.splitlines():
+        inside = line == f"{section}:" if not line.startswith(" ") else inside
+        if not (inside and line.strip().startswith(f"{name}:")):
+            lines.append(line)
+    (problem,) = problems_of("\n".join(lines))
+    assert problem.key == key
+    assert "required and missing" in problem.message
+    assert problem.line == next(i for i, line in enumerate(lines, 1) if line == f"{section}:")
+
+
+def test_resolved_says_the_same_for_other_units_and_layout(load_it, load_with, minimal):
+    plain = load_it(minimal)
+    other = load_with(
+        "boulder.length=165 cm",
+        "boulder.height=3440 mm",
+        "vehicle.spring=3103.3 kN/m",
+        "soil.density=1.8599 t/m^3",
+        "vehicle.speed=52.2 km/h",
+        "solver.horizon=1000 ms",
+    )
+    assert plain.resolved() == other.resolved()
+    assert load_with("vehicle.speed=13").resolved() != plain.resolved()
+
+
+def test_resolved_is_plain_data_with_units_in_its_names(load_it, example):
+    resolved = load_it(example).resolved()
+    assert json.loads(json.dumps(resolved)) == resolved
+    assert resolved["n_designs"] == 2736
+    assert resolved["inputs"]["embedment_ratio"] == [round(0.40 + 0.02 * i, 2) for i in range(16)]
+    assert resolved["inputs"]["impact_height_m"].startswith("Eq 9")
+    assert resolved["criterion"] == {"max_rotation_deg": 20.0, "rating": "P1"}
+    assert resolved["model"]["readings"]["inertia"] == "box"
+    assert resolved["model"]["soil"] == "closed_form"
+    assert resolved["solver"] == {"accuracy": "balanced", "accuracy_deg": None, "step_s": None, "horizon_s": 1.0}
+
+
+def test_resolved_stands_for_long_axes_by_their_hash(load_with):
+    one, same, other = (
+        load_with(f"boulder.width={{from: 1, to: {end}, count: 5000}}").resolved()["inputs"]["boulder_width_m"]
+        for end in ("2", "2.0", "2.1")
+    )
+    assert one == same
+    assert one["count"] == 5000
+    assert one["sha256"] != other["sha256"]
+
+
+@pytest.mark.parametrize(
+    ("text", "preset", "corrected"),
+    [
+        ("as_printed", "as_printed", (False,) * 5),
+        ("corrected", "corrected", (True,) * 5),
+        ("{preset: corrected, inertia: printed}", "mixed", (False, True, True, True, True)),
+        ("{preset: as_printed, impact_arm: geometric}", "mixed", (False, True, False, False, False)),
+        ("{contact: printed}", "mixed", (True, True, False, True, True)),
+        ("{preset: as_printed, restoring: corrected}", "mixed", (False, False, False, True, False)),
+        ("{preset: corrected, separation: released}", "corrected", (True,) * 5),
+    ],
+)
+def test_readings(load_with, text, preset, corrected):
+    model = load_with(f"model.readings={text}").model
+    assert model.preset == preset
+    assert model.readings.corrected == corrected
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("solver.accuracy=fine", ("fine", None, 1.0)),
+        ("solver.accuracy=0.01 deg", (0.01, None, 1.0)),
+        ("solver.accuracy=1e-4", (1e-4, None, 1.0)),
+        ("solver.step=4 ms", (None, 0.004, 1.0)),
+        ("solver.horizon=250 ms", ("balanced", None, 0.25)),
+    ],
+)
+def test_solver(load_with, override, expected):
+    solver = load_with(override).solver
+    assert (solver.accuracy, solver.step_s, solver.horizon_s) == expected
+
+
+@pytest.mark.parametrize("count", [1, 50, 1_000_000])
+def test_soil_elements(load_with, count):
+    assert load_with(f"model.soil={{elements: {count}}}").model.soil_elements == count
+
+
+def test_a_given_impact_height_takes_the_place_of_equation_9(load_with):
+    sweep = load_with("site.impact_height=0.938 m")
+    assert sweep.block(0, 1).columns["impact_height_m"].to_numpy().tolist() == [0.938]
+
+
+def test_register_of_columns():
+    assert [spec.name for spec in COLUMNS] == ["design_id", *INPUT_COLUMNS, *OUTCOME_COLUMNS]
+    assert len(BY_NAME) == len(COLUMNS) == 1 + 17 + 13
+    assert all(spec.meaning for spec in COLUMNS)
+    endings = {"m": "_m", "kg": "_kg", "deg": "_deg", "s": "_s", "kN": "_kN", "m/s": "_m_s"}
+    for spec in COLUMNS:
+        if spec.unit in endings:
+            assert spec.name.endswith(endings[spec.unit])
+
+
+def test_block_has_every_input_column_in_order(load_it, example):
+    block = load_it(example).block(5, 15)
+    assert tuple(block.columns) == INPUT_COLUMNS
+    assert all(len(column) == 10 for column in block.columns.values())
+    assert all(column.to_numpy().dtype == np.float64 for column in block.columns.values())

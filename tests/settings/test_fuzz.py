@@ -1,0 +1,179 @@
+"""Whatever the bytes, loading ends in a sweep or in problems with their places: never in a traceback."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from boulder_sweep.settings import SettingsError, Sweep, load_text
+from boulder_sweep.settings.source import decode
+from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+
+ROOT = Path(__file__).parents[2]
+FILES = [path.read_text() for path in sorted((ROOT / "configs").glob("*.yaml")) if "crash" not in path.name]
+FLOW = (
+    "boulder: {length: 1.65 m, width: 1.68 m, height: {from: 1.6 m, to: 3.4 m, count: 19}, density: 2596}\n"
+    "site: {embedment_ratio: {from: 0.40, to: 0.70, step: 0.02}, impact_height: 0.9}\n"
+    "soil: {density: &d 1859.9 kg/m^3, friction_angle: [36, 43.2] deg, subgrade_reaction: '[25, 95] MN/m^3'}\n"
+    "vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}\n"
+    "model: {readings: {preset: corrected, inertia: printed}, soil: {elements: 50}}\n"
+    "solver: {step: 4 ms, horizon: 1 s}\n"
+)
+SCRAPS = [
+    *"[]{}:,#&*!|>'\"%@`-?~\t\n \\", "[" * 30, "{a: ", "]", "}", ": ", "- ", "<<: *d", "*d", "&d", "!!python/name:x ", "!x ",
+    "no", "1:30", "010", ".nan", "-.inf", "1e999", "1e-999", "-1", "0", "1e308", "null", "~", "true", "''", '""', "---\n",
+    "...\n", "%YAML 1.1\n", "\ufeff", "\x00", "\x85", "\u2028", "\U0001f4a9", "é", "°", "³", "·", "−", "１", "m^9^9", "ton",
+    " deg", " m", "kN*s/m", "from: 1", "to: 2", "count: 0", "step: 0", "count: 1000000", "from:", "{from: 1, to: 2, count: 3}",
+    "table: x.csv\n", "table: /dev/zero\n", "name: ../x\n", "\\ud800", '"\\ud800"', '"\\UFFFFFFFF"', "9" * 50, "a" * 200,
+]  # fmt: skip
+
+
+def loads_or_says_why(text: str, *overrides: str) -> None:
+    """Load a text; it must end in a sweep that gives blocks, or in problems that name file and reason."""
+    try:
+        sweep = load_text(text, Path("grid.yaml"), overrides)
+    except SettingsError as error:
+        assert error.problems
+        for problem in error.problems:
+            assert problem.message
+            assert "\n" not in str(problem)
+            assert len(problem.message) < 700
+            str(problem).encode()  # fit to be printed
+    else:
+        assert isinstance(sweep, Sweep)
+        assert sweep.n_designs >= 1
+        last = sweep.block(sweep.n_designs - 1, sweep.n_designs)
+        assert all(column.to_numpy().shape == (1,) for column in last.columns.values())
+
+
+@st.composite
+def mutated(draw: st.DrawFn) -> str:
+    """Return a good file with some places overwritten, removed or repeated."""
+    text = draw(st.sampled_from([*FILES, FLOW]))
+    for _ in range(draw(st.integers(1, 6))):
+        start = draw(st.integers(0, len(text)))
+        stop = min(len(text), start + draw(st.sampled_from([0, 0, 1, 1, 2, 5, 20, 100])))
+        filling = draw(
+            st.one_of(
+                st.sampled_from(SCRAPS),
+                st.text(max_size=5),
+                st.just(text[start:stop] * 2),
+                st.just(""),
+            )
+        )
+        text = text[:start] + filling + text[stop:]
+    return text
+
+
+QUICK = settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+LONG = settings(QUICK, max_examples=40_000)
+
+
+def _any_bytes(data: bytes) -> None:
+    try:
+        text = decode(data, "grid.yaml")
+    except SettingsError:
+        return
+    loads_or_says_why(text)
+
+
+@QUICK
+@given(data=st.binary(max_size=300))
+@example(data=b"\xff\xfea\x00")
+@example(data=b"\xef\xbb\xbf")
+@example(data=b"a: \xed\xa0\x80")
+def test_any_bytes(data: bytes) -> None:
+    _any_bytes(data)
+
+
+@QUICK
+@given(text=mutated())
+@example(text="? ")
+@example(text="a: |\n  [1] deg")
+@example(text="boulder: {height: [1] m ] m}")
+@example(text='boulder: {height: "\\ud800"}')
+def test_mutated_files(text: str) -> None:
+    loads_or_says_why(text)
+
+
+@QUICK
+@given(parts=st.lists(st.sampled_from([*SCRAPS, "boulder", "height", "site", "soil", "a"]), max_size=30))
+def test_scraps_in_any_order(parts: list[str]) -> None:
+    loads_or_says_why("".join(parts))
+
+
+@QUICK
+@given(
+    key=st.sampled_from(
+        ["boulder.height", "model.readings", "soil", "table", "name", "solver.step.x", "criterion.rating"]
+    ),
+    value=st.one_of(st.text(max_size=20), st.lists(st.sampled_from(SCRAPS), max_size=8).map("".join)),
+)
+def test_any_override(key: str, value: str) -> None:
+    loads_or_says_why(FLOW, f"{key}={value}")
+
+
+@QUICK
+@given(
+    text=st.one_of(
+        st.text(max_size=20),
+        st.lists(
+            st.sampled_from(
+                [
+                    "m",
+                    "kN",
+                    "s",
+                    "lb",
+                    "/",
+                    "*",
+                    "^",
+                    "**",
+                    "-",
+                    "(",
+                    ")",
+                    "3",
+                    "-2",
+                    " ",
+                    "per",
+                    "ft",
+                    "°",
+                    "%",
+                    "ton",
+                    "99",
+                    "1/",
+                ]
+            ),
+            max_size=12,
+        ).map("".join),
+    ),
+    target=st.sampled_from(sorted(EXPECTED)),
+)
+def test_any_unit(text: str, target: str) -> None:
+    try:
+        assert factor(text, target) > 0
+    except UnitError as error:
+        assert str(error)
+
+
+@pytest.mark.slow
+@settings(LONG)
+@given(text=mutated())
+def test_mutated_files_at_length(text: str) -> None:
+    loads_or_says_why(text)
+
+
+@pytest.mark.slow
+@settings(LONG)
+@given(
+    data=st.one_of(st.binary(max_size=400), st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass")))
+)
+def test_any_bytes_at_length(data: bytes) -> None:
+    _any_bytes(data)
+
+
+@pytest.mark.slow
+@settings(LONG)
+@given(parts=st.lists(st.sampled_from([*SCRAPS, "boulder", "height", "site", "soil", "a"]), max_size=40))
+def test_scraps_in_any_order_at_length(parts: list[str]) -> None:
+    loads_or_says_why("".join(parts))

@@ -1,0 +1,59 @@
+"""Remarks on what is valid and unusual."""
+
+import pytest
+
+
+def _notes(sweep):
+    return [str(note) for note in sweep.notes]
+
+
+def test_usual_values_have_no_remarks(load_with, load_it, minimal):
+    assert _notes(load_it(minimal)) == []
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        (
+            "vehicle.speed=30",
+            "30 m/s is outside the usual range of 4 to 25 m/s (15 to 90 km/h; a bare number is in m/s, not in mph",
+        ),
+        ("vehicle.mass=150000", "not in lb"),
+        ("vehicle.spring=3103.3", "a bare number is in N/m, not in kN/m"),
+        ("vehicle.damper=138.91", "not in kN*s/m"),
+        ("soil.friction_angle=1.5", "a bare number is in degrees"),
+        ("soil.friction_angle=[20, 30]", "20 to 30 deg is outside"),
+        ("soil.subgrade_reaction=350", "a bare number is in MN/m^3"),
+        ("soil.density=1000", "sand and gravel"),
+        ("boulder.height={from: 1, to: 5, count: 3}", "1 to 5 m is outside"),
+        ("boulder.density=1800", "rock"),
+        ("vehicle.bed_offset=1", "leading edge of the cargo bed; penetration is counted from that edge"),
+        ("vehicle.hood_height=1.7", "medium-duty trucks"),
+        ("criterion.max_rotation=45", "the model no longer holds"),
+        ("site.embedment_ratio=0.9", "usual embedments"),
+        ("boulder.width=[1, 1.5, 1]", "a value more than once"),
+    ],
+)
+def test_unusual_values(load_with, override, words):
+    notes = _notes(load_with(override))
+    assert any(words in note for note in notes)
+
+
+def test_a_remark_has_its_place(load_it, minimal):
+    (note,) = _notes(load_it(minimal.replace("speed: 14.5", "speed: 30")))
+    assert note.startswith("grid.yaml:14:3: vehicle.speed: 30 m/s")
+
+
+@pytest.mark.parametrize(
+    ("angle", "reaction", "mixed"),
+    [
+        ("43.2", "95", False),
+        ("[36, 40]", "[45, 90]", False),
+        ("[30, 35, 40]", "[2.2, 4]", False),
+        ("[36, 40, 43.2]", "[25, 60, 95]", True),
+        ("40", "[17.6, 64]", True),
+    ],
+)
+def test_soil_data_of_two_families(load_with, angle, reaction, mixed):
+    notes = _notes(load_with(f"soil.friction_angle={angle}", f"soil.subgrade_reaction={reaction}"))
+    assert any("two families of data" in note for note in notes) == mixed

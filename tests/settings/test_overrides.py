@@ -1,0 +1,87 @@
+"""``--set KEY=VALUE``: the same rules as in the file, and an error that points at the option."""
+
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("override", "column", "expected"),
+    [
+        ("vehicle.speed=20 m/s", "impact_speed_m_s", [20.0]),
+        ("vehicle.speed = 20 m/s", "impact_speed_m_s", [20.0]),
+        ("vehicle.speed=[30, 40] mph", "impact_speed_m_s", [13.4112, 17.8816]),
+        ("vehicle.speed={from: 10, to: 12, step: 1}", "impact_speed_m_s", [10.0, 11.0, 12.0]),
+        ("vehicle.bumper_height=0.6", "bumper_height_m", [0.6]),
+    ],
+)
+def test_values(load_with, override, column, expected):
+    sweep = load_with(override)
+    assert sweep.block(0, sweep.n_designs).columns[column].to_numpy().tolist() == expected
+
+
+def test_the_last_of_two_holds(load_with):
+    assert load_with("vehicle.speed=10", "vehicle.speed=11").constants["impact_speed_m_s"] == 11.0
+
+
+def test_a_replaced_axis_keeps_its_place_and_a_new_one_comes_last_in_its_block(load_it, example):
+    sweep = load_it(example, "boulder.height=[2, 3]", "vehicle.bumper_height=[0.5, 0.6]", "boulder.length=[1, 2]")
+    assert [axis.name for axis in sweep.axes][:3] == ["boulder_length_m", "boulder_height_m", "embedment_ratio"]
+    assert sweep.axes[-1].name == "bumper_height_m"
+
+
+def test_one_way_of_embedment_takes_the_place_of_the_other(load_with, load_it, example):
+    assert load_with("site.embedment_ratio=0.5").constants["embedment_ratio"] == 0.5
+    assert load_it(example, "site.embedment_depth=1 m").block(0, 1).columns["embedment_depth_m"].values.tolist() == [
+        1.0
+    ]
+
+
+def test_step_and_accuracy_take_the_place_of_each_other(load_it, example):
+    solver = load_it(example, "solver.step=2 ms").solver
+    assert (solver.accuracy, solver.step_s) == (None, 0.002)
+    solver = load_it(example, "solver.step=2 ms", "solver.accuracy=fast").solver
+    assert (solver.accuracy, solver.step_s) == ("fast", None)
+
+
+def test_single_readings_on_top_of_a_preset(load_it, minimal, load_with):
+    text = minimal + "model: {readings: as_printed}\n"
+    readings = load_it(text, "model.readings.impact_arm=geometric", "model.readings.inertia=box").model.readings
+    assert readings.corrected == (True, True, False, False, False)
+    assert load_with("model.readings.contact=printed").model.readings.corrected == (True, True, False, True, True)
+    assert load_with("model.soil.elements=500").model.soil_elements == 500
+
+
+def test_blocks_that_the_file_lacks_are_opened(load_with):
+    assert load_with("criterion.rating=P2").criterion.rating == "P2"
+    assert load_with("name=other").name == "other"
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("speed", "is not KEY=VALUE"),
+        ("", "is not KEY=VALUE"),
+        ("=3", "is not KEY=VALUE"),
+        ("vehicle..speed=3", "is not KEY=VALUE"),
+        ("a.b.c.d.e=3", "is not KEY=VALUE"),
+        ("vehicle.speed=[1, 2", "a list is not closed"),
+        ("vehicle.speed=!!int 3", "the tag !!int is not accepted"),
+        ("vehicle.speed=3\n---\n4", "second document"),
+        ("vehicle.speed=" + "1" * 30_000, "longer than"),
+        ("vehicle.speed=" + "[" * 3000, "nested more than 20 deep"),
+        ("vehicle.sped=3", "did you mean speed?"),
+        ("boulder=3", "must be a block of keys"),
+    ],
+)
+def test_mistakes_point_at_the_option(problems_of, minimal, override, words):
+    problems = problems_of(minimal, override)
+    assert any(words in problem.message for problem in problems)
+    assert all(problem.file == "--set" and problem.line is None for problem in problems if words in problem.message)
+
+
+def test_mistakes_of_file_and_options_come_together(problems_of, minimal):
+    problems = problems_of(minimal.replace("1.65", "x"), "vehicle.speed=x", "vehicle.mass=y")
+    assert [(problem.file, problem.key) for problem in problems] == [
+        ("grid.yaml", "boulder.length"),
+        ("--set", "vehicle.mass"),
+        ("--set", "vehicle.speed"),
+    ]

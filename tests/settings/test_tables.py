@@ -1,0 +1,245 @@
+"""Explicit lists of designs from CSV and Parquet files."""
+
+import numpy as np
+import pytest
+
+from boulder_sweep.settings import SettingsError, load
+
+HEADER = "boulder_length_m,boulder_width_m,boulder_height_m,embedment_depth_m\n"
+ROWS = "0.762,1.016,2.2,1.2\n1.65,1.68,3.44,2.03\n"
+GRID = """\
+table: {table}
+boulder: {{density: 2600}}
+soil: {{density: 1859.9, friction_angle: 43.2, subgrade_reaction: 95}}
+vehicle: {{mass: 6800, speed: 13.4, spring: 3103.3e3, damper: 138.91e3}}
+"""
+
+
+@pytest.fixture
+def load_table(tmp_path):
+    def load_table(content, name="designs.csv", grid=GRID):
+        data = content.encode() if isinstance(content, str) else content
+        if data is not None:
+            (tmp_path / name).write_bytes(data)
+        (tmp_path / "grid.yaml").write_text(grid.format(table=name))
+        return load(tmp_path / "grid.yaml")
+
+    return load_table
+
+
+@pytest.fixture
+def messages_of(load_table, tmp_path):
+    def messages_of(*args, **kwargs):
+        with pytest.raises(SettingsError) as caught:
+            load_table(*args, **kwargs)
+        return [str(problem).replace(f"{tmp_path}/", "") for problem in caught.value.problems]
+
+    return messages_of
+
+
+def _column(sweep, name):
+    return sweep.block(0, sweep.n_designs).columns[name].to_numpy().tolist()
+
+
+def test_rows_in_the_order_of_the_table_with_the_rest_from_the_file(load_table):
+    sweep = load_table(HEADER + ROWS)
+    assert sweep.n_designs == 2
+    assert sweep.axes == ()
+    assert _column(sweep, "boulder_height_m") == [2.2, 3.44]
+    assert _column(sweep, "embedment_depth_m") == [1.2, 2.03]
+    assert _column(sweep, "boulder_density_kg_m3") == [2600.0, 2600.0]
+    assert _column(sweep, "hood_height_m") == [1.4, 1.4]
+    assert _column(sweep, "impact_height_m") == [0.5 * ((2.2 - 1.2) + 0.5), 0.5 * (min(3.44 - 2.03, 1.4) + 0.5)]
+    assert sweep.resolved()["order"] == "table"
+    assert sweep.resolved()["inputs"]["boulder_width_m"] == [1.016, 1.68]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: "# who, when\n" + text + "\n\n# end\n",
+        lambda text: "\n" + text.replace("\n", "\r\n"),
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", "\t"),
+        lambda text: text.replace(",", " , "),
+        lambda text: text.replace("0.762", '"0.762"'),
+        lambda text: text.replace("0.762", "7.62e-1"),
+        lambda text: "\ufeff" + text,
+        lambda text: text.rstrip("\n"),
+    ],
+)
+def test_csv_in_the_forms_that_programs_write(load_table, change):
+    assert _column(load_table(change(HEADER + ROWS)), "boulder_length_m") == [0.762, 1.65]
+
+
+def test_embedment_ratio_and_impact_height_may_be_columns(load_table):
+    sweep = load_table(
+        "boulder_length_m,boulder_width_m,boulder_height_m,embedment_ratio,impact_height_m\n1,1,2,0.5,0.7\n"
+    )
+    assert _column(sweep, "embedment_depth_m") == [1.0]
+    assert _column(sweep, "impact_height_m") == [0.7]
+
+
+def test_impossible_rows_stay_with_their_reason(load_table):
+    sweep = load_table(HEADER + "1,1,2,1\n1,1,2,2\n1,1,2,3\n")
+    assert sweep.block(0, 3).reasons.to_list() == ["", *["embedment depth is not less than the boulder's height"] * 2]
+
+
+def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
+    text = HEADER + '0.762,x,2.2,1.2\n1.65,1.68,nan,\n1.65,-1,3.44,2.03\n1,2\n1.65 m,1,"3,44",1\n1_0,1,1,010\n'
+    messages = messages_of(text)
+    starts = [
+        "designs.csv:2:7: boulder_width_m: 'x' is not a number",
+        "designs.csv:3:11: boulder_height_m: 'nan' is not a finite number",
+        "designs.csv:3:15: embedment_depth_m: is empty",
+        "designs.csv:4:6: boulder_width_m: -1 m is outside the admitted range of 0.01 to 20 m",
+        "designs.csv:5:1: has 2 cells; the first line has 4",
+        "designs.csv:6: boulder_height_m: '3,44' is not a plain number",
+        "designs.csv:6: boulder_length_m: '1.65 m' has a unit; the column is in m by its name",
+        "designs.csv:7:1: boulder_length_m: '1_0' is not a plain number",
+        "designs.csv:7:9: embedment_depth_m: '010' begins with a zero",
+    ]
+    assert len(messages) == len(starts)
+    for start in starts:
+        assert any(message.startswith(start) for message in messages), start
+
+
+def test_the_header_is_checked(messages_of):
+    text = "design_id,boulder_lenght_m,boulder_width_m,boulder_width_m,verdict,boulder_height_m,embedment_depth_m,\n"
+    messages = messages_of(text + "0,1,1,1,pass,2,1,\n")
+    assert [message.split(" ")[0] for message in messages] == [
+        "designs.csv:1:1:",
+        "designs.csv:1:11:",
+        "designs.csv:1:44:",
+        "designs.csv:1:60:",
+        "designs.csv:1:103:",
+    ]
+    assert "numbered by their order" in messages[0]
+    assert "did you mean boulder_length_m?" in messages[1]
+    assert "second column of this name" in messages[2]
+    assert "outcome of a run" in messages[3]
+
+
+def test_semicolons_with_decimal_commas_are_told(messages_of):
+    (message, *_) = messages_of((HEADER + ROWS).replace(",", ";").replace(".", ","))
+    assert message.startswith("designs.csv:2:1: boulder_length_m: '0,762' is not a plain number; write a decimal point")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", "is empty"),
+        ("# only\n", "is empty"),
+        (HEADER, "no rows below the column names"),
+        (HEADER.encode("utf-16"), "not UTF-8"),
+        (HEADER + "1,\x00,1,1\n", "designs.csv:2"),
+        (b"\xff\xd8\xff\xe0", "not UTF-8"),
+        (HEADER + "1,1,1,1\n" * 3 + '1,"' + "1" * 200_000, "CSV"),
+    ],
+)
+def test_files_that_are_no_tables(messages_of, content, words):
+    assert any(words in message for message in messages_of(content))
+
+
+@pytest.mark.parametrize("name", ["designs.xlsx", "designs", ".csv.txt"])
+def test_other_formats(messages_of, name):
+    (message,) = messages_of(HEADER + ROWS, name)
+    assert message.startswith("grid.yaml:1:8: table: ")
+    assert "neither a .csv nor a .parquet file" in message
+
+
+def test_missing_table(messages_of):
+    (message,) = messages_of(None, "no.csv")
+    assert message == "grid.yaml:1:8: table: no.csv: there is no such file"
+
+
+def test_a_large_table_is_refused_before_it_is_read(messages_of, tmp_path):
+    with (tmp_path / "large.csv").open("wb") as stream:
+        stream.truncate(3_000_000_000)
+    (message,) = messages_of(None, "large.csv")
+    assert "has 3000.0 MB" in message
+
+
+def test_table_and_file_must_not_give_the_same(messages_of):
+    grid = GRID.replace("{{density: 2600}}", "{{density: 2600, height: 3}}") + "site: {{embedment_ratio: 0.5}}\n"
+    messages = messages_of(HEADER + ROWS, grid=grid)
+    assert len(messages) == 2
+    assert messages[0].startswith(
+        "grid.yaml:2:26: boulder.height: is given here and as column boulder_height_m of the table"
+    )
+    assert "not both" in messages[1]
+
+
+def test_axes_beside_a_table_are_refused(messages_of):
+    (message,) = messages_of(HEADER + ROWS, grid=GRID.replace("speed: 13.4", "speed: [13.4, 20]"))
+    assert message.startswith("grid.yaml:4:30: vehicle.speed: takes one value beside a table")
+
+
+def test_what_neither_table_nor_file_gives_is_missing(messages_of):
+    (message,) = messages_of("boulder_length_m,boulder_width_m,embedment_depth_m\n1,1,1\n")
+    assert message == "grid.yaml:2:1: boulder.height: is required and missing"
+
+
+def test_a_relative_name_begins_at_the_file_and_behind_set_at_the_working_directory(tmp_path, monkeypatch, load_table):
+    load_table(HEADER + ROWS)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    assert load(tmp_path / "grid.yaml").n_designs == 2
+    (elsewhere / "one.csv").write_text(HEADER + "1,1,2,1\n")
+    assert load(tmp_path / "grid.yaml", ["table=one.csv"]).n_designs == 1
+
+
+@pytest.fixture
+def write_parquet(tmp_path):
+    def write_parquet(**columns):
+        pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+        pq.write_table(pa.table(columns), tmp_path / "designs.parquet")
+
+    return write_parquet
+
+
+def test_parquet(write_parquet, load_table):
+    write_parquet(
+        boulder_length_m=[1.0, 2.0], boulder_width_m=[1, 2], boulder_height_m=[3.0, 4.0], embedment_depth_m=[1.5, 2.0]
+    )
+    sweep = load_table(None, "designs.parquet")
+    assert _column(sweep, "boulder_width_m") == [1.0, 2.0]
+    assert sweep.n_designs == 2
+
+
+def test_mistakes_in_parquet(write_parquet, messages_of):
+    write_parquet(
+        boulder_length_m=[1.0, -2.0],
+        boulder_width_m=["1", "2"],
+        boulder_height_m=[3.0, None],
+        embedment_depth_m=[1.5, float("nan")],
+        margin=[1.0, 1.0],
+    )
+    messages = messages_of(None, "designs.parquet")
+    assert len(messages) == 5
+    for start in (
+        "designs.parquet: margin: is an outcome of a run",
+        "designs.parquet: boulder_length_m: row 2: -2 m is outside",
+        "designs.parquet: boulder_width_m: holds string, not numbers",
+        "designs.parquet: boulder_height_m: has 1 empty cells",
+        "designs.parquet: embedment_depth_m: row 2: is not a finite number",
+    ):
+        assert any(message.startswith(start) for message in messages), start
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" + bytes(100) + b"PAR1", b"x" * 1000])
+def test_files_that_are_no_parquet(messages_of, content):
+    (message,) = messages_of(content, "designs.parquet")
+    assert "cannot be read as Parquet" in message
+
+
+def test_a_long_table_stays_columns(load_table):
+    rows = 30_000
+    rng = np.random.default_rng(5)
+    heights = rng.uniform(1.5, 4, rows)
+    lines = "".join(f"1.5,{1 + k % 3},{height!r},1\n" for k, height in enumerate(heights.tolist()))
+    sweep = load_table(HEADER + lines)
+    block = sweep.block(20_000, 20_100)
+    assert block.columns["boulder_height_m"].to_numpy().tolist() == heights[20_000:20_100].tolist()
+    assert len(block.columns["boulder_width_m"].values) == 3
