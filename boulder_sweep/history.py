@@ -1,0 +1,179 @@
+"""Forces and energies along a recorded motion, from the same kernels that integrated it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from boulder_kernels import Constants, Design, Readings, Record
+from boulder_kernels.dynamics import Acceleration, State, acceleration
+from boulder_kernels.energy import stored_energies
+from boulder_kernels.modes import (
+    FREE,
+    HELD,
+    LIMITED_BACK,
+    LIMITED_FORWARD,
+    RESTING,
+    SEATED,
+    TURNING_BACK,
+    TURNING_FORWARD,
+    Modes,
+    Switches,
+    switches_of,
+)
+
+MODE_NAMES = {
+    SEATED: "seated",
+    TURNING_FORWARD: "turning",
+    TURNING_BACK: "turning",
+    HELD: "held",
+    LIMITED_FORWARD: "limited",
+    LIMITED_BACK: "limited",
+    FREE: "free",
+    RESTING: "resting",
+}
+"""Mode of rotation in words: gravity reading ``seated`` or ``turning``; printed reading ``held`` (the restoring
+moment equals the net moment), ``limited`` (it is at its limit), ``free`` (there is none), ``resting``."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyLedger:
+    """Where the vehicle's energy is at every sample [J], arrays of shape (n,).
+
+    Attributes
+    ----------
+    time_s : ndarray
+        Times of the samples [s].
+    vehicle_kinetic_J : ndarray
+        Kinetic energy of the vehicle.
+    crush_spring_J, crush_damper_J : ndarray
+        Stored in the spring of its front, and dissipated in the damper.
+    boulder_linear_J, boulder_angular_J : ndarray
+        Kinetic energy of boulder and lumped soil.
+    soil_elastic_J, soil_drag_J : ndarray
+        Stored in the springs of the soil, and dissipated by its drag.
+    gravity_J : ndarray
+        Done against the weight. Under the gravity reading a potential energy; as printed the work done against
+        the restoring moment, which has no potential (and is negative where it drives the boulder on).
+    pull_J : ndarray
+        Printed separation only: minus the work of the pull on the vehicle that nothing on the boulder answers.
+    residual_J : ndarray
+        What the ledger fails to account for: the sum of all parts minus the energy at first touch.
+    """
+
+    time_s: np.ndarray
+    vehicle_kinetic_J: np.ndarray
+    crush_spring_J: np.ndarray
+    crush_damper_J: np.ndarray
+    boulder_linear_J: np.ndarray
+    boulder_angular_J: np.ndarray
+    soil_elastic_J: np.ndarray
+    soil_drag_J: np.ndarray
+    gravity_J: np.ndarray
+    pull_J: np.ndarray
+    residual_J: np.ndarray
+
+    @property
+    def initial(self) -> float:
+        """Energy of the vehicle at first touch [J]; NaN without samples."""
+        return float(self.vehicle_kinetic_J[0]) if len(self.time_s) else float("nan")
+
+    @property
+    def largest_residual(self) -> float:
+        """Largest residual as a fraction of the energy at first touch; NaN without samples."""
+        return float(np.abs(self.residual_J).max() / self.initial) if len(self.time_s) else float("nan")
+
+
+def forces_along(record: Record, design: Design, readings: Readings, c: Constants) -> dict[str, np.ndarray]:
+    """Evaluate the forces at the samples of a record.
+
+    Parameters
+    ----------
+    record
+        The recorded motion, n samples.
+    design, readings, c
+        The design, its readings and the constants of its motion.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Arrays of shape (n,) by the names of the trajectory's columns.
+    """
+    rates = [acceleration(*y, switches, c) for y, switches in _samples(record, readings, c)]
+    a_b, alpha_b, a_v, M = np.array(rates).reshape(-1, len(Acceleration._fields)).T
+    theta = record.states[:, 2]
+    # As printed the truck is pulled back by a force that the boulder does not feel: only contact counts here.
+    F_v = np.where(record.touching, -design.m_v * a_v, 0.0)
+    M_v = F_v * (c.h * np.cos(theta) + c.g_x * np.sin(theta))
+    return {
+        "vehicle_acceleration_m_s2": a_v,
+        "contact_force_N": F_v,
+        "contact_moment_N_m": M_v,
+        "soil_force_N": c.m_eff * a_b - F_v,
+        "soil_moment_N_m": M - M_v,
+        "restoring_moment_N_m": c.J_eff * alpha_b - M,
+    }
+
+
+def ledger_of(record: Record, design: Design, readings: Readings, c: Constants) -> EnergyLedger:
+    """Draw up the energy ledger at the samples of a record.
+
+    Parameters
+    ----------
+    record
+        The recorded motion, n samples, with the energies exchanged.
+    design, readings, c
+        The design, its readings and the constants of its motion.
+
+    Returns
+    -------
+    EnergyLedger
+        Arrays of shape (n,).
+    """
+    stored = [
+        # Printed separation: the spring goes on pulling the truck after release, so it holds energy all along.
+        stored_energies(
+            State(*y),
+            design.m_v,
+            bool(touching) or not readings.separation_released,
+            readings.restoring_gravity,
+            c,
+        )
+        for y, touching in zip(record.states, record.touching, strict=True)
+    ]
+    truck, linear, angular, elastic, spring, potential = np.array(stored).reshape(-1, 6).T
+    drag, damper, restoring, pull = record.exchanged.T
+    parts = {
+        "vehicle_kinetic_J": truck,
+        "crush_spring_J": spring,
+        "crush_damper_J": damper.copy(),
+        "boulder_linear_J": linear,
+        "boulder_angular_J": angular,
+        "soil_elastic_J": elastic,
+        "soil_drag_J": drag.copy(),
+        "gravity_J": potential if readings.restoring_gravity else restoring.copy(),
+        "pull_J": -pull,
+    }
+    at_first_touch = truck[0] if len(truck) else 0.0
+    residual = np.sum(list(parts.values()), axis=0) - at_first_touch
+    return EnergyLedger(time_s=record.times, **parts, residual_J=residual)
+
+
+def _samples(record: Record, readings: Readings, c: Constants) -> list[tuple[np.ndarray, Switches]]:
+    """State of every sample and the factors of its modes; the signs of Eq 37 follow from the rotation itself."""
+    theta = record.states[:, 2]
+    corner = np.copysign(1.0, c.theta_corner - theta)
+    arm = np.copysign(1.0, c.C_cos * np.cos(theta) + c.C_sin * np.sin(theta))
+    samples = []
+    for row in range(len(theta)):
+        modes = Modes(
+            turning=int(record.turning[row]),
+            touching=bool(record.touching[row]),
+            corner=float(corner[row]),
+            arm=float(arm[row]),
+            yielded_top=0,
+            yielded_base=0,
+        )
+        samples.append((record.states[row], switches_of(modes, readings, c)))
+    return samples

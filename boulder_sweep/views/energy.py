@@ -1,0 +1,87 @@
+"""Where the energy of the vehicle goes, stacked over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import figures
+from .figures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, YELLOW
+from .trajectory import require_samples, shade_beyond_limit
+from .wording import design_line, verdict_line
+
+if TYPE_CHECKING:
+    from boulder_sweep.trajectory import Trajectory
+
+LAYERS = (
+    ("crush_damper_J", "crush of the vehicle (lasting)", ORANGE),
+    ("crush_spring_J", "crush of the vehicle (springs back)", AMBER),
+    ("soil_drag_J", "soil: drag (lost)", GREEN),
+    ("soil_elastic_J", "soil: springs", YELLOW),
+    ("gravity_J", "weight of the boulder lifted", PURPLE),
+    ("boulder_angular_J", "boulder turning", SKY),
+    ("boulder_linear_J", "boulder moving", BLUE),
+    ("vehicle_kinetic_J", "vehicle moving", LIGHT_GREY),
+)
+"""What is stacked, from below: first what is lost for good, last what the vehicle still has."""
+
+
+def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
+    """Draw the energy ledger of one impact, stacked over time.
+
+    Parameters
+    ----------
+    trajectory
+        The impact.
+    path
+        Picture to write (.png, .svg, .pdf).
+
+    Raises
+    ------
+    PictureError
+        There is nothing to draw, or the picture cannot be written.
+
+    Notes
+    -----
+    Under printed readings the work against the restoring moment can be negative, and the pull on the vehicle
+    without a partner takes energy out of nothing. Negative parts are stacked below zero, so that the bands above
+    zero rise over the line of the energy at first touch by as much.
+    """
+    require_samples(trajectory)
+    ledger = trajectory.energy()
+    time = ledger.time_s
+    with figures.figure(path, 8.0, 4.9) as fig:
+        axes = fig.subplots()
+        above, below = np.zeros_like(time), np.zeros_like(time)
+        layers = [(getattr(ledger, name) / 1e3, label, colour) for name, label, colour in LAYERS]
+        if np.abs(ledger.pull_J).max() > 0.0:
+            layers.append((ledger.pull_J / 1e3, "out of nothing (printed separation)", BLACK))
+        handles = []
+        for values, label, colour in layers:
+            up, down = np.maximum(values, 0.0), np.minimum(values, 0.0)
+            style: dict[str, Any] = {"color": colour, "linewidth": 0.4, "edgecolor": "white"}
+            handles.append(axes.fill_between(time, above, above + up, label=label, **style))
+            axes.fill_between(time, below, below + down, **style)
+            above, below = above + up, below + down
+        axes.axhline(ledger.initial / 1e3, color=BLACK, linestyle="--", linewidth=1.0)
+        axes.annotate(
+            f"at first touch {ledger.initial / 1e3:.0f} kJ",
+            (0.01, ledger.initial / 1e3),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            fontsize=8.5,
+        )
+        axes.set_xlim(0.0, float(time[-1]))
+        axes.set_ylim(1.05 * float(below.min()), 1.09 * max(float(above.max()), ledger.initial / 1e3))
+        axes.grid(visible=False)
+        shade_beyond_limit(axes, trajectory)
+        axes.set_xlabel("time since first touch [s]")
+        axes.set_ylabel("energy [kJ]")
+        axes.set_title(f"largest residual {ledger.largest_residual:.1e} of the energy at first touch", fontsize=8.5)
+        axes.title.set_fontweight("normal")
+        axes.legend(handles=handles[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5))
+        fig.suptitle(verdict_line(trajectory), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+        fig.supxlabel(design_line(trajectory), x=0.01, ha="left", fontsize=8.0, color=GREY)

@@ -1,0 +1,130 @@
+"""What all pictures share: how a figure is made and saved, colours, fonts, and what to say when it cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito: told apart with every kind of colour vision, and in grey.
+BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+SKY, YELLOW, AMBER, BLACK = "#56B4E9", "#F0E442", "#E69F00", "#222222"
+GREY, LIGHT_GREY = "#6E6E6E", "#D9D9D9"
+VERDICT_COLOURS = {"pass": BLUE, "fail": ORANGE, "undecided": YELLOW, "error": BLACK}
+
+STYLE: Any = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.7,
+    "lines.linewidth": 1.8,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.dpi": 110,
+    "savefig.dpi": 110,
+    "savefig.facecolor": "white",
+    "svg.hashsalt": "boulder-sweep",
+}
+KINDS = (".png", ".svg", ".pdf")
+
+
+class PictureError(Exception):
+    """A picture cannot be made; the message says why and what would help."""
+
+    exit_code = 2
+
+
+def require_matplotlib() -> None:
+    """Make sure that pictures can be drawn.
+
+    Raises
+    ------
+    PictureError
+        matplotlib is not installed.
+    """
+    from importlib.util import find_spec  # matplotlib is an extra: tables and verdicts do not need it
+
+    if find_spec("matplotlib") is None:
+        raise PictureError("pictures need matplotlib, which is not installed: pip install 'boulder-sweep[plot]'")
+
+
+def checked_kind(path: str | Path, kinds: tuple[str, ...] = KINDS) -> Path:
+    """Return the path of a picture if its ending names a kind that can be written.
+
+    Raises
+    ------
+    PictureError
+        It does not, or its folder does not exist.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in kinds:
+        raise PictureError(f"{path}: the name of a picture must end in {', '.join(kinds)}")
+    if not target.absolute().parent.is_dir():
+        raise PictureError(f"{path}: the folder {target.absolute().parent} does not exist")
+    return target
+
+
+@contextmanager
+def figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
+    """Give an empty figure, and save it at the end.
+
+    Parameters
+    ----------
+    path
+        Picture to write.
+    width, height
+        Size in inches.
+
+    Raises
+    ------
+    PictureError
+        The kind is unknown, the folder is missing or cannot be written, or matplotlib is not installed.
+    """
+    target = checked_kind(path)
+    require_matplotlib()
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    # A figure of its own, not pyplot's: no window, no global state, safe beside a user's own plots.
+    with matplotlib.rc_context(STYLE):
+        fig = Figure(figsize=(width, height), layout="constrained")
+        yield fig
+        save(fig, target)
+
+
+def save(fig: Figure, target: Path) -> None:
+    """Write a figure; the same figure gives the same file."""
+    undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    try:
+        fig.savefig(target, metadata=undated[target.suffix.lower()])
+    except OSError as problem:
+        raise PictureError(f"{target} cannot be written: {problem.strerror or problem}") from problem
+
+
+def mark_peak(axes: Axes, time: float, value: float, text: str, colour: str, *, below: bool = False) -> None:
+    """Mark a peak with a dot and its value: above or below it, on the side where there is room."""
+    axes.plot([time], [value], "o", color=colour, markersize=4.5, zorder=5, clip_on=False)
+    left, right = axes.get_xlim()
+    beyond_middle = time > left + 0.62 * (right - left)
+    axes.annotate(
+        text,
+        (time, value),
+        xytext=(-6 if beyond_middle else 0 if below else 6, -9 if below else 5),
+        textcoords="offset points",
+        ha="right" if beyond_middle else "center" if below else "left",
+        va="top" if below else "bottom",
+        fontsize=8.5,
+        color=colour,
+    )

@@ -1,0 +1,136 @@
+"""One impact over time: rotation, force, displacements."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import figures
+from .figures import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, PictureError
+from .wording import design_line, verdict_line
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from boulder_sweep.trajectory import Trajectory
+
+
+def draw_trajectory(trajectory: Trajectory, path: str | Path) -> None:
+    """Draw rotation, forces and displacements of one impact.
+
+    Parameters
+    ----------
+    trajectory
+        The impact.
+    path
+        Picture to write (.png, .svg, .pdf).
+
+    Raises
+    ------
+    PictureError
+        There is nothing to draw, or the picture cannot be written.
+    """
+    require_samples(trajectory)
+    with figures.figure(path, 9.0, 6.2) as fig:
+        (rotation, force), (boulder, vehicle) = fig.subplots(2, 2, sharex=True)
+        _rotation(rotation, trajectory)
+        _force(force, trajectory)
+        _boulder(boulder, trajectory)
+        _vehicle(vehicle, trajectory)
+        for axes in (rotation, force, boulder, vehicle):
+            axes.set_xlim(0.0, float(trajectory.time_s[-1]))
+            shade_beyond_limit(axes, trajectory)
+        for axes in (boulder, vehicle):
+            axes.set_xlabel("time since first touch [s]")
+        _peaks(rotation, force, boulder, vehicle, trajectory)
+        fig.suptitle(verdict_line(trajectory), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+        fig.supxlabel(design_line(trajectory), x=0.01, ha="left", fontsize=8.5, color=GREY)
+
+
+def require_samples(trajectory: Trajectory) -> None:
+    """Refuse a trajectory without samples, with the reason."""
+    if len(trajectory) == 0:
+        why = "the truck passes over the boulder" if trajectory.reason == "no_contact" else trajectory.reason
+        raise PictureError(f"there is no motion to draw: {why}")
+
+
+def shade_beyond_limit(axes: Axes, trajectory: Trajectory) -> None:
+    """Shade the time after the rotation limit, where the model no longer holds."""
+    limit = trajectory.motion.outcome.t_limit
+    if math.isfinite(limit):
+        axes.axvspan(limit, float(trajectory.time_s[-1]), color="#F3E7DF", zorder=-2, linewidth=0)
+
+
+def _rotation(axes: Axes, trajectory: Trajectory) -> None:
+    limit = math.degrees(trajectory.motion.control.theta_limit)
+    degrees = np.degrees(trajectory.rotation_rad)
+    axes.plot(trajectory.time_s, degrees, color=BLUE)
+    axes.axhline(limit, color=ORANGE, linestyle="--", linewidth=1.3)
+    if degrees.min() < -0.5 * limit:
+        axes.axhline(-limit, color=ORANGE, linestyle="--", linewidth=1.3)
+    axes.set_ylim(min(1.1 * degrees.min(), -0.04 * limit), 1.18 * max(limit, degrees.max()))
+    axes.annotate(
+        f"limit {limit:g}°",
+        (0.99, limit),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=8.5,
+        color=ORANGE,
+    )
+    axes.set_title("Rotation of the boulder")
+    axes.set_ylabel("rotation [deg]")
+
+
+def _force(axes: Axes, trajectory: Trajectory) -> None:
+    axes.plot(trajectory.time_s, trajectory.contact_force_N / 1e3, color=ORANGE, label="vehicle on boulder")
+    soil = -trajectory.soil_force_N / 1e3
+    axes.plot(trajectory.time_s, soil, color=GREEN, linestyle="--", label="soil against boulder")
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    top = max(float(soil.max()), float(trajectory.contact_force_N.max() / 1e3))
+    axes.set_ylim(min(1.15 * float(soil.min()), -0.05 * top), 1.36 * top)
+    axes.set_title("Horizontal forces")
+    axes.set_ylabel("force [kN]")
+    axes.legend(loc="upper left", ncols=2)
+
+
+def _boulder(axes: Axes, trajectory: Trajectory) -> None:
+    axes.plot(trajectory.time_s, trajectory.boulder_displacement_m, color=BLUE, label="boulder and soil wedge")
+    centre = trajectory.boulder_centre_displacement_m
+    axes.plot(trajectory.time_s, centre, color=PURPLE, linestyle="--", label="boulder alone (as filmed)")
+    _room_above(axes)
+    axes.set_title("Displacement of the centre of mass")
+    axes.set_ylabel("displacement [m]")
+    axes.legend(loc="lower right")
+
+
+def _vehicle(axes: Axes, trajectory: Trajectory) -> None:
+    axes.plot(trajectory.time_s, trajectory.vehicle_displacement_m, color=ORANGE)
+    _room_above(axes)
+    axes.set_title("Displacement of the vehicle")
+    axes.set_ylabel("displacement [m]")
+    if math.isfinite(trajectory.motion.outcome.t_limit):
+        limit = math.degrees(trajectory.motion.control.theta_limit)
+        note = f"shaded: beyond {limit:g}° the model no longer holds"
+        axes.annotate(note, (0.98, 0.05), xycoords="axes fraction", ha="right", fontsize=8.5, color=GREY)
+
+
+def _room_above(axes: Axes) -> None:
+    """Leave room for the label of a peak."""
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(bottom, top + 0.12 * (top - bottom))
+
+
+def _peaks(rotation: Axes, force: Axes, boulder: Axes, vehicle: Axes, trajectory: Trajectory) -> None:
+    m = trajectory.motion.outcome.maxima
+    # The largest |rotation| may be a backward one.
+    at = np.interp(m.t_theta, trajectory.time_s, trajectory.rotation_rad)
+    theta = math.copysign(math.degrees(m.theta), float(at))
+    figures.mark_peak(rotation, m.t_theta, theta, f"{abs(theta):.2f}°", BLUE)
+    figures.mark_peak(force, m.t_F_v, m.F_v / 1e3, f"{m.F_v / 1e3:.0f} kN", ORANGE)
+    figures.mark_peak(boulder, m.t_x_b, m.x_b, f"{m.x_b:.3f} m", BLUE, below=True)
+    figures.mark_peak(vehicle, m.t_x_v, m.x_v, f"{m.x_v:.3f} m", ORANGE)
