@@ -56,7 +56,7 @@ SEATING_ANGLE = 1e-9
 """A boulder that would swing through less than this [rad] about its base is taken to have come to rest."""
 JUMP_TOLERANCE = 1e-11
 """Precision of a located jump of the forces, or of the limit, as a fraction of the step."""
-KINK_TOLERANCE = 1e-4
+KINK_TOLERANCE = 1e-3
 """The same for a kink: forces are continuous there, so the error goes with its square."""
 
 
@@ -239,6 +239,9 @@ def gap_within(event: int, tau: float, dense: DenseOutput, g: GapFactors, switch
     if event == LIMIT:
         return g.limit - abs(displacement_at(dense.rotation, tau))
     y = state_at(dense, tau)
+    if event == CONTACT:
+        sin, versin = sine_versine(y.theta_b)
+        return g.contact * spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
     M = 0.0
     if event == COUPLE or (event == ROTATION and needs_moment(g)):
         M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c).M
@@ -246,15 +249,23 @@ def gap_within(event: int, tau: float, dense: DenseOutput, g: GapFactors, switch
 
 
 @kernel
-def locate(event: int, gap_end: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants) -> float:
+def locate(
+    event: int,
+    gap_start: float,
+    gap_end: float,
+    dense: DenseOutput,
+    g: GapFactors,
+    switches: Switches,
+    c: Constants,
+) -> float:
     """Fraction of a step at which a gap that is negative at its end passes zero.
 
     Parameters
     ----------
     event
         Which gap.
-    gap_end
-        Its value at the end of the step, negative.
+    gap_start, gap_end
+        Its values at the start of the step and at the end, where it is negative.
     dense, g, switches, c
         The step.
 
@@ -264,8 +275,7 @@ def locate(event: int, gap_end: float, dense: DenseOutput, g: GapFactors, switch
         tau in (0, 1]. A gap that starts at zero and opens only by rounding counts as crossed at once: the step still
         moves on, and the mode that follows settles it.
     """
-    low = 0.0
-    gap_low = gap_within(event, low, dense, g, switches, c)
+    low, gap_low = 0.0, gap_start
     if gap_low <= 0.0:
         for start in (1e-3, 1e-6):
             low = start
@@ -288,13 +298,15 @@ def locate(event: int, gap_end: float, dense: DenseOutput, g: GapFactors, switch
 
 
 @inlined
-def first_event(end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants) -> tuple[int, float]:
+def first_event(
+    start: Gaps, end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
+) -> tuple[int, float]:
     """Earliest event of a step, and the fraction of the step at which it happens.
 
     Parameters
     ----------
-    end
-        Gaps at the end of the step.
+    start, end
+        Gaps at the start and at the end of the step.
     dense, g, switches, c
         The step.
 
@@ -306,7 +318,7 @@ def first_event(end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches
     first, earliest = -1, 1.0
     for event in range(EVENTS):
         if end[event] < 0.0:
-            tau = locate(event, end[event], dense, g, switches, c)
+            tau = locate(event, start[event], end[event], dense, g, switches, c)
             if first < 0 or tau < earliest:
                 first, earliest = event, tau
     return first, earliest
@@ -356,7 +368,7 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
     y
         State there.
     M
-        Net moment of soil and truck there [N m].
+        Net moment of soil and truck there [N m]; asked for by the events ROTATION and COUPLE only.
     modes
         Modes before.
     c

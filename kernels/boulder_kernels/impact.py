@@ -13,7 +13,18 @@ from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
 from .dynamics import Acceleration, State, acceleration
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import LIMIT, GapFactors, change_mode, first_event, gap_factors, gaps_at, initial_modes, locate
+from .events import (
+    COUPLE,
+    LIMIT,
+    ROTATION,
+    GapFactors,
+    change_mode,
+    first_event,
+    gap_factors,
+    gaps_at,
+    initial_modes,
+    locate,
+)
 from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, Outcome, Status, no_maxima, undefined_maxima, updated_maxima
 from .readings import Readings
@@ -45,8 +56,8 @@ class Control(NamedTuple):
     stop_at_limit: bool = True
     """Whether the simulation ends where the rotation reaches its limit."""
     locate_yield: bool = False
-    """Whether steps are also cut where the soil reaches its ultimate resistance. The force has a mere kink there, spread
-    over the depth once the boulder has turned, and locating it has not been found to pay."""
+    """Whether steps are also cut where the soil reaches its ultimate resistance. The force has a mere kink there,
+    spread over the depth once the boulder has turned, and locating it has not been found to pay."""
 
 
 class Record(NamedTuple):
@@ -142,6 +153,8 @@ def attempt_budget(h: float, horizon: float) -> float:
 def keep_up_to_event(
     t: float,
     h: float,
+    y: State,
+    M: float,
     y_end: State,
     M_end: float,
     dense: DenseOutput,
@@ -156,8 +169,10 @@ def keep_up_to_event(
     ----------
     t, h
         Start [s] and length [s] of the step.
+    y, M
+        State and net moment [N m] at its start.
     y_end, M_end
-        State and net moment [N m] at its end.
+        The same at its end.
     dense, factors, switches, c
         The step.
     m
@@ -168,7 +183,8 @@ def keep_up_to_event(
     event, tau, y, m
         The event or -1, the fraction of the step that is kept, the state there, and the maxima up to there.
     """
-    event, tau = first_event(gaps_at(y_end, M_end, factors, c), dense, factors, switches, c)
+    start, end = gaps_at(y, M, factors, c), gaps_at(y_end, M_end, factors, c)
+    event, tau = first_event(start, end, dense, factors, switches, c)
     if event >= 0:
         y_end = state_at(dense, tau)
     return event, tau, y_end, updated_maxima(m, t, h, tau, y_end, dense, switches, c)
@@ -186,7 +202,8 @@ def cross_event(
     c: Constants,
 ) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
     """Go over into the modes that follow an event: state, modes, their factors, and the acceleration to start with."""
-    y, modes = change_mode(event, y, rate_of(y, switches, c).M, modes, c)
+    M = rate_of(y, switches, c).M if event in (ROTATION, COUPLE) else np.nan
+    y, modes = change_mode(event, y, M, modes, c)
     switches = switches_of(modes, readings, c)
     return y, modes, switches, gap_factors(modes, c, theta_stop, locate_yield), rate_of(y, switches, c)
 
@@ -257,11 +274,12 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
         if not is_finite(y_end):
             return failed(Status.UNSTABLE.value)
         dense = dense_output(y, k1, y_end, k_end, h)
-        event, tau, y_end, m = keep_up_to_event(t, h, y_end, k_end.M, dense, factors, switches, m, c)
+        event, tau, y_end, m = keep_up_to_event(t, h, y, k1.M, y_end, k_end.M, dense, factors, switches, m, c)
         if np.isnan(t_limit) and abs(y_end.theta_b) >= control.theta_limit and not control.stop_at_limit:
             at_limit = gap_factors(modes, c, control.theta_limit, False)
             gap = control.theta_limit - abs(y_end.theta_b)
-            t_limit = t + h * min(tau, locate(LIMIT, gap, dense, at_limit, switches, c))
+            gap_start = control.theta_limit - abs(y.theta_b)
+            t_limit = t + h * min(tau, locate(LIMIT, gap_start, gap, dense, at_limit, switches, c))
         if recording:
             written = write_samples(record, written, t, h, tau, dense, modes, switches, c, exchanged)
             exchanged = add_exchanged(exchanged, dense, h, tau, modes, switches, c)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ._jit import inlined, kernel
 from .dense_output import dense_output
-from .design import DesignTable, constants_of, design_at, is_computable
+from .design import Constants, DesignTable, constants_of, design_at, is_computable
 from .dormand_prince import step
 from .dynamics import Acceleration, State
 from .events import LIMIT, GapFactors, gap_factors, gaps_of, initial_modes
@@ -37,7 +37,7 @@ from .stability import shortened_step
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, contact_lever, spring_compression
 from .workspace import (
-    ATTEMPTS,
+    ATTEMPTS_LEFT,
     ATTENTION,
     BARRIER,
     LANES,
@@ -133,7 +133,7 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
         F_v = s.k_contact * u
         t_next = t + h
         put(ws, ATTENTION, 0, lane, 0.0 if plain else 1.0)
-        put(ws, ATTEMPTS, 0, lane, field(ws, ATTEMPTS, 0, lane) + 1.0)
+        put(ws, ATTEMPTS_LEFT, 0, lane, field(ws, ATTEMPTS_LEFT, 0, lane) - 1.0)
         if plain:
             store_state(ws, lane, y_end)
             store_start(ws, lane, k_end)
@@ -170,34 +170,32 @@ def start_lane(ws: np.ndarray, lane: int, table: DesignTable, row: int, readings
     store_constants(ws, lane, c)
     store_maxima(ws, lane, no_maxima())
     put(ws, STEP_FULL, 0, lane, h_full)
-    put(ws, ATTEMPTS, 0, lane, 0.0)
+    put(ws, ATTEMPTS_LEFT, 0, lane, attempt_budget(h_full, control.horizon))
     put(ws, BARRIER, 0, lane, NO_PROOF)
     factors = gap_factors(modes, c, control.theta_limit, control.locate_yield)
-    set_lane(ws, lane, 0.0, y, rate_of(y, switches, c), modes, switches, factors, control.horizon)
+    set_modes(ws, lane, modes, switches, factors)
+    set_motion(ws, lane, 0.0, y, rate_of(y, switches, c), switches, c, control.horizon)
     return RUNNING
 
 
 @inlined
-def set_lane(
-    ws: np.ndarray,
-    lane: int,
-    t: float,
-    y: State,
-    k1: Acceleration,
-    modes: Modes,
-    switches: Switches,
-    factors: GapFactors,
-    horizon: float,
+def set_motion(
+    ws: np.ndarray, lane: int, t: float, y: State, k1: Acceleration, switches: Switches, c: Constants, horizon: float
 ) -> None:
     """Put the start of the next step into a lane."""
     store_state(ws, lane, y)
     store_start(ws, lane, k1)
+    put(ws, TIME, 0, lane, t)
+    put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t))
+    put(ws, RATE, 0, lane, compression_rate(y, switches, c))
+
+
+@inlined
+def set_modes(ws: np.ndarray, lane: int, modes: Modes, switches: Switches, factors: GapFactors) -> None:
+    """Put the modes of the next step into a lane, and what follows from them."""
     store_modes(ws, lane, modes)
     store_switches(ws, lane, switches)
     store_factors(ws, lane, factors)
-    put(ws, TIME, 0, lane, t)
-    put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t))
-    put(ws, RATE, 0, lane, compression_rate(y, switches, load_constants(ws, lane)))
 
 
 @kernel
@@ -213,15 +211,16 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
     c = load_constants(ws, lane)
     switches = load_switches(ws, lane)
     factors = load_factors(ws, lane)
-    modes = load_modes(ws, lane)
     y_end = load_end_state(ws, lane)
     if not is_finite(y_end):
         return Status.UNSTABLE.value
-    if field(ws, ATTEMPTS, 0, lane) > attempt_budget(field(ws, STEP_FULL, 0, lane), control.horizon):
+    if field(ws, ATTEMPTS_LEFT, 0, lane) < 0.0:
         return Status.STEP_BUDGET.value
-    k_end = load_end(ws, lane)
-    dense = dense_output(load_state(ws, lane), load_start(ws, lane), y_end, k_end, h)
-    event, tau, y, m = keep_up_to_event(t, h, y_end, k_end.M, dense, factors, switches, load_maxima(ws, lane), c)
+    y_start, k_start, k_end = load_state(ws, lane), load_start(ws, lane), load_end(ws, lane)
+    dense = dense_output(y_start, k_start, y_end, k_end, h)
+    event, tau, y, m = keep_up_to_event(
+        t, h, y_start, k_start.M, y_end, k_end.M, dense, factors, switches, load_maxima(ws, lane), c
+    )
     last = h >= control.horizon - t
     t = control.horizon if last and event < 0 else t + tau * h
     put(ws, TIME, 0, lane, t)
@@ -233,16 +232,17 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
     if t >= control.horizon:
         return horizon_status(y, m)
     if proof_is_possible(readings) and y.v_v <= 0.0:
-        if turned_back(load_state(ws, lane), y):
+        if turned_back(y_start, y):
             put(ws, BARRIER, 0, lane, barrier_energy(m, c))
         if boulder_energy(y, c) < field(ws, BARRIER, 0, lane):
             return Status.SETTLED.value
     k1 = k_end
     if event >= 0:
         y, modes, switches, factors, k1 = cross_event(
-            event, y, modes, switches, readings, control.theta_limit, control.locate_yield, c
+            event, y, load_modes(ws, lane), switches, readings, control.theta_limit, control.locate_yield, c
         )
-    set_lane(ws, lane, t, y, k1, modes, switches, factors, control.horizon)
+        set_modes(ws, lane, modes, switches, factors)
+    set_motion(ws, lane, t, y, k1, switches, c, control.horizon)
     return RUNNING
 
 

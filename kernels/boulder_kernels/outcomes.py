@@ -103,7 +103,7 @@ def undefined_maxima() -> Maxima:
     return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
-PEAK_TOLERANCE = 1e-5
+PEAK_TOLERANCE = 1e-4
 """Precision of a located peak as a fraction of the step; its value is off by the square of that only."""
 
 

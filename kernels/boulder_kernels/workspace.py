@@ -35,7 +35,7 @@ _FIELDS = {
     "maxima": 4,
     "attention": 1,
     "modes": len(Modes._fields),
-    "attempts": 1,
+    "attempts_left": 1,
 }
 
 
@@ -66,7 +66,7 @@ MAXIMA = _offset("maxima")
 ATTENTION = _offset("attention")
 """1.0 where a step needs more than to be taken over."""
 MODES = _offset("modes")
-ATTEMPTS = _offset("attempts")
+ATTEMPTS_LEFT = _offset("attempts_left")
 
 
 @inlined
