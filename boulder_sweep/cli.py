@@ -161,13 +161,9 @@ def simulate(
     sweep = _load(case, overrides, quiet)
     number = design or 0
     if number >= sweep.n_designs:
-        raise click.UsageError(
-            f"{case} holds {sweep.n_designs:,} designs, numbered from 0; there is no {number}"
-        )
+        raise click.UsageError(f"{case} holds {sweep.n_designs:,} designs, numbered from 0; there is no {number}")
     if design is None and sweep.n_designs > 1 and not quiet:
-        console.say(
-            f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)"
-        )
+        console.say(f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)")
     reason = sweep.block(number, number + 1).reasons[0]
     if reason:
         console.say(f"design {number} cannot be computed: {reason}")
@@ -233,14 +229,16 @@ def execute(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        result = cli.main(args=words, prog_name="sweep", standalone_mode=False)
+        # Not cli.main(): it would turn an interruption into an exception without signal and words.
+        with cli.make_context("sweep", words) as context:
+            code = cli.invoke(context)
         sys.stdout.flush()
-        return result if isinstance(result, int) else 0
+        return int(code)
+    except click.exceptions.Exit as end:  # after --help or --version
+        return end.exit_code
     except click.ClickException as error:
         error.show()
         return EXIT_WRONG_USE
-    except click.exceptions.Abort:
-        return EXIT_INTERRUPTED
     except BrokenPipeError:
         # Who read our output has gone (sweep status ... | head); Python must not complain of it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -267,5 +265,8 @@ def _report(error: Exception, verbose: bool) -> int:
         import traceback
 
         traceback.print_exception(error)
+    if isinstance(error, OSError):  # a place that cannot be read or written
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_WRONG_USE
     print(f"internal error: {type(error).__name__}: {error}; {REPORT}", file=sys.stderr)
     return EXIT_INTERNAL

@@ -93,9 +93,7 @@ def _bar() -> Iterator[Callable[[Progress], None]]:
         def show(now: Progress) -> None:
             left = "" if now.seconds_left is None else f", {duration(now.seconds_left)} left"
             numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
-            bars.update(
-                task, description="simulating", total=now.rows, completed=now.rows_done, numbers=numbers
-            )
+            bars.update(task, description="simulating", total=now.rows, completed=now.rows_done, numbers=numbers)
 
         yield show
 
@@ -151,9 +149,7 @@ def verdict_lines(reasons: Mapping[str, int], rows: int) -> list[str]:
         own = {key: count for key, count in reasons.items() if key.split("/")[0] == verdict}
         total = sum(own.values())
         named = {key.partition("/")[2]: count for key, count in own.items() if "/" in key and count}
-        detail = ", ".join(
-            f"{reason} {count:,}" for reason, count in sorted(named.items(), key=lambda i: -i[1])
-        )
+        detail = ", ".join(f"{reason} {count:,}" for reason, count in sorted(named.items(), key=lambda i: -i[1]))
         lines.append(f"  {verdict:<10}{total:>13,}{total / max(rows, 1):>8.1%}   {detail}".rstrip())
     return lines
 
@@ -178,14 +174,14 @@ def status_lines(status: RunStatus) -> list[str]:
 
 
 def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:
-    """Return names and values below each other, with the unit where the name belongs to a column."""
+    """Return names and values below each other; the names carry the units."""
     lines = []
+    width = max((len(name) for name in values), default=0) + 2
     for name, value in values.items():
         if isinstance(value, Mapping):
             lines += [f"{indent}{name}", *value_lines(value, indent + "  ")]
-            continue
-        unit = BY_NAME[name].unit if name in BY_NAME else ""
-        lines.append(f"{indent}{name:<28}{_shown(value)}{' ' + unit if unit not in ('', '1') else ''}")
+        else:
+            lines.append(f"{indent}{name:<{width}}{_shown(value)}".rstrip())
     return lines
 
 

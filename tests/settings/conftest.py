@@ -6,16 +6,21 @@ import pytest
 from boulder_sweep.settings import Problem, SettingsError, Sweep, load_text
 
 # The form in which the format is described to users.
-EXAMPLE = """\
-name: m30-sizing
-boulder:  {length: 1.65 m, width: 1.68 m, height: {from: 1.6 m, to: 3.4 m, count: 19}, density: 2596 kg/m^3}
-site:     {embedment_ratio: {from: 0.40, to: 0.70, step: 0.02}}      # or embedment_depth: 2.03 m
-soil:     {density: 1859.9 kg/m^3, friction_angle: [36, 40, 43.2] deg, subgrade_reaction: [25, 60, 95] MN/m^3, strain_rate_factor: 1.0}
-vehicle:  {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m, bumper_height: 0.5 m, hood_height: 1.4 m, bed_offset: 2.9 m}
-criterion: {max_rotation: 20 deg, rating: P1}
-model:    {readings: corrected, soil: closed_form}    # as_printed | {preset: corrected, inertia: printed}
-solver:   {accuracy: balanced, horizon: 1 s}           # or step: 4 ms
-"""
+EXAMPLE = "\n".join(
+    (
+        "name: m30-sizing",
+        "boulder:  {length: 1.65 m, width: 1.68 m, height: {from: 1.6 m, to: 3.4 m, count: 19}, density: 2596 kg/m^3}",
+        "site:     {embedment_ratio: {from: 0.40, to: 0.70, step: 0.02}}      # or embedment_depth: 2.03 m",
+        "soil:     {density: 1859.9 kg/m^3, friction_angle: [36, 40, 43.2] deg, "
+        "subgrade_reaction: [25, 60, 95] MN/m^3, strain_rate_factor: 1.0}",
+        "vehicle:  {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m, "
+        "bumper_height: 0.5 m, hood_height: 1.4 m, bed_offset: 2.9 m}",
+        "criterion: {max_rotation: 20 deg, rating: P1}",
+        "model:    {readings: corrected, soil: closed_form}    # as_printed | {preset: corrected, inertia: printed}",
+        "solver:   {accuracy: balanced, horizon: 1 s}           # or step: 4 ms",
+        "",
+    )
+)
 
 # One design, nothing optional, one entry a line.
 MINIMAL = """\

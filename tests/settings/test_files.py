@@ -234,7 +234,12 @@ def test_nothing_of_the_file_is_executed_or_followed(tmp_path):
 def test_reading_needs_no_recursion(tmp_path):
     path = tmp_path / "deep.yaml"
     path.write_text("a: " + "[" * 100_000)
-    code = "import sys; sys.setrecursionlimit(150)\nfrom boulder_sweep.cli import execute\nsys.exit(execute(['check', sys.argv[1]]))"
+    code = (
+        "import sys\n"
+        "from boulder_sweep.cli import execute\n"
+        "sys.setrecursionlimit(250)\n"
+        "sys.exit(execute(['check', sys.argv[1]]))\n"
+    )
     done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr

@@ -1,0 +1,38 @@
+"""``sweep check``: what is in a file, and what is wrong with it."""
+
+
+def test_a_valid_file(sweep, grid):
+    code, out, err = sweep("check", grid)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "grid.yaml: valid"
+    assert lines[1] == "small grid: 18 designs"
+    assert [line.split()[0] for line in lines[2:]] == [
+        "boulder_height_m",
+        "embedment_depth_m",
+        "subgrade_reaction_MN_m3",
+    ]
+    assert "1.6 to 3.4 m" in lines[2]
+
+
+def test_remarks_go_to_stderr(sweep, grid):
+    code, out, err = sweep("check", grid, "--set", "vehicle.speed=30")
+    assert code == 0
+    assert err.startswith("note: --set: vehicle.speed: 30 m/s is outside the usual range")
+    assert "note" not in out
+
+
+def test_mistakes(sweep, grid):
+    grid.write_text(grid.read_text().replace("1.65 m", "1.65 kg").replace("43.2 deg", "no"))
+    code, out, err = sweep("check", grid, "--set", "vehicle.speed=fast")
+    assert (code, out) == (2, "")
+    lines = err.splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith("grid.yaml:2:19: boulder.length: ")
+    assert lines[1].startswith("grid.yaml:4:48: soil.friction_angle: ")
+    assert lines[2].startswith("--set: vehicle.speed: ")
+
+
+def test_a_missing_file(sweep, grid):
+    assert sweep("check", "no.yaml") == (2, "", "no.yaml: there is no such file\n")
+    assert sweep("check", ".") == (2, "", ".: is a directory; a file is needed\n")

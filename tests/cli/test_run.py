@@ -1,0 +1,219 @@
+"""``sweep run`` from the command line: what it writes, prints and returns."""
+
+import json
+import re
+import shlex
+
+import pytest
+
+from boulder_sweep import console
+from boulder_sweep.summary import progress_of
+
+
+def _counts(out):
+    return {word: int(count.replace(",", "")) for word, count in re.findall(r"^  (\w+) +([\d,]+) ", out, re.MULTILINE)}
+
+
+def test_a_run_and_its_table(sweep, grid):
+    code, out, err = sweep("run", grid)
+    assert code == 3  # the designs as deep as the boulder is high cannot be computed
+    counts = _counts(out)
+    assert sum(counts.values()) == 18
+    assert counts["error"] == 6
+    assert counts["fail"] > 0
+    assert "small-grid.sweep" in out
+    assert "embedment depth is not less than the boulder's height 6" in out
+    assert err.startswith("small grid: 18 designs into small-grid.sweep\n")
+
+    import pandas as pd
+
+    table = pd.read_parquet("small-grid.sweep")
+    assert table["design_id"].tolist() == list(range(18))
+    assert table["verdict"].value_counts().to_dict() == counts
+
+
+def test_designs_that_are_not_touched_are_counted(sweep, possible_grid):
+    code, out, _ = sweep("run", possible_grid)
+    assert code == 0
+    assert "no_contact 4" in out
+    assert _counts(out)["error"] == 0
+
+
+def test_json_is_one_object_on_stdout(sweep, possible_grid):
+    code, out, _ = sweep("run", possible_grid, "-o", "out", "--json", "--quiet")
+    assert code == 0
+    found = json.loads(out)
+    assert out.count("\n") == 1
+    assert found["name"] == "small grid"
+    assert found["rows"] == 18
+    assert sum(found["verdicts"].values()) == 18
+    assert found["out"] == "out"
+
+
+def test_quiet_says_nothing_on_stderr(sweep, possible_grid):
+    _, _, err = sweep("run", possible_grid, "-q", "--set", "vehicle.speed=30")
+    assert err == ""
+
+
+def test_verbose_shows_the_settings(sweep, possible_grid):
+    _, _, err = sweep("run", possible_grid, "-v")
+    assert "friction_angle_deg" in err
+    assert "corrected" in err
+
+
+def test_an_output_that_exists(sweep, possible_grid):
+    assert sweep("run", possible_grid)[0] == 0
+    code, out, err = sweep("run", possible_grid)
+    assert (code, out) == (4, "")
+    assert "--resume" in err
+    assert "--overwrite" in err
+    assert sweep("run", possible_grid, "--resume")[0] == 0
+    assert sweep("run", possible_grid, "--overwrite")[0] == 0
+    code, _, err = sweep("run", possible_grid, "--resume", "--set", "vehicle.speed=20 mph")
+    assert code == 4
+    assert "impact_speed_m_s" in err
+
+
+def test_set_and_accuracy_reach_the_table(sweep, possible_grid):
+    from boulder_sweep import read
+
+    words = ["--set", "vehicle.speed=20 mph", "--set", "boulder.height=3 m", "--accuracy", "fast"]
+    assert sweep("run", possible_grid, "-o", "out", *words)[0] == 0
+    table = read("out")
+    assert len(table) == 6
+    assert set(table["impact_speed_m_s"]) == {8.9408}
+    assert table["rotation_error_deg"].isna().all()  # none is estimated then
+
+
+def test_a_dry_run_writes_nothing(sweep, grid):
+    before = sorted(grid.parent.iterdir())
+    code, out, _ = sweep("run", grid, "--dry-run")
+    assert code == 0
+    assert "small grid: 18 designs" in out
+    assert "would simulate 18 of 18 designs into small-grid.sweep" in out
+    assert "impact_height_m" in out
+    assert sorted(grid.parent.iterdir()) == before
+    code, out, _ = sweep("run", grid, "--dry-run", "--json")
+    found = json.loads(out)
+    assert found["settings"]["n_designs"] == 18
+    assert found["estimate"]["rows"] == 18
+
+
+def test_a_dry_run_of_a_grid_of_ten_to_the_twelve(sweep, grid):
+    words = [f"--set={key}={{from: 1, to: 2, count: 1000000}}" for key in ("boulder.length", "boulder.width")]
+    code, out, _ = sweep("run", grid, "--dry-run", "--json", *words)
+    assert code == 0
+    found = json.loads(out)
+    assert found["settings"]["n_designs"] == 18 * 10**12
+    assert found["objections"]
+
+
+@pytest.mark.parametrize(
+    ("words", "words_of_error"),
+    [
+        ([], "Missing argument 'GRID'"),
+        (["grid.yaml", "--jobs", "0"], "--jobs"),
+        (["grid.yaml", "--jobs", "many"], "--jobs"),
+        (["grid.yaml", "--backend", "spark"], "--backend"),
+        (["grid.yaml", "--scheduler", "tcp://x:1"], "--scheduler needs --backend dask"),
+        (["grid.yaml", "--resume", "--overwrite"], "exclude each other"),
+        (["grid.yaml", "-q", "-v"], "exclude each other"),
+        (["grid.yaml", "--frobnicate"], "--frobnicate"),
+        (["grid.yaml", "--accuracy", "superb"], "superb"),
+        (["grid.yaml", "--set", "speed"], "KEY=VALUE"),
+        (["grid.yaml", "extra"], "extra"),
+        (["no.yaml"], "there is no such file"),
+        (["grid.yaml", "-o", "grid.yaml"], "grid.yaml"),
+    ],
+)
+def test_wrong_use(sweep, grid, words, words_of_error):
+    code, out, err = sweep("run", *words)
+    assert code in (2, 4)
+    assert code == 2 or words[-2:] == ["-o", "grid.yaml"]
+    assert out == ""
+    assert words_of_error in err
+    assert "Traceback" not in err
+
+
+def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
+    seen = {}
+
+    def run(settings, out, **options):
+        seen.update(options)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("boulder_sweep.sweeper.run", run)
+    words = [
+        "-o",
+        "my out",
+        "--jobs",
+        "2",
+        "--backend",
+        "loky",
+        "--accuracy",
+        "0.01 deg",
+        "--set",
+        "vehicle.speed=20 mph",
+    ]
+    code, _, _ = sweep("run", grid, *words)
+    assert code == 130
+    assert shlex.split(seen["resume_command"]) == [
+        "sweep", "run", "grid.yaml", "-o", "my out", "--jobs", "2", "--backend", "loky",
+        "--accuracy", "0.01 deg", "--set", "vehicle.speed=20 mph", "--resume",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("signum", [2, 15])
+def test_an_interrupted_run_tells_how_to_go_on(sweep, grid, monkeypatch, signum):
+    from boulder_sweep.interruption import Interrupted
+
+    def run(*_, **options):
+        raise Interrupted(signum, 5, 18, options["resume_command"])
+
+    monkeypatch.setattr("boulder_sweep.sweeper.run", run)
+    code, out, err = sweep("run", grid)
+    assert (code, out) == (128 + signum, "")
+    assert "sweep run grid.yaml -o small-grid.sweep --resume" in err
+
+
+def test_an_internal_error_is_one_line_unless_verbose(sweep, grid, monkeypatch):
+    def run(*_, **__):
+        raise ZeroDivisionError("on purpose")
+
+    monkeypatch.setattr("boulder_sweep.sweeper.run", run)
+    code, out, err = sweep("run", grid, "-q")
+    assert (code, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "ZeroDivisionError: on purpose" in err
+    assert "please report" in err
+    code, _, err = sweep("run", grid, "--verbose")
+    assert code == 1
+    assert "Traceback" in err
+
+
+def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkeypatch):
+    times = iter([0.0, 1.0, 11.0, 11.0, 12.0, 30.0, 30.0])
+    monkeypatch.setattr(console.time, "monotonic", lambda: next(times))
+    with console.progress(quiet=False) as show:
+        for done in (100, 200, 300, 400):
+            show(progress_of(0, done, 1000, done / 50))
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
+        " 20.0%  200 of 1,000 designs, 50 per second, 16 s left",
+        " 40.0%  400 of 1,000 designs, 50 per second, 12 s left",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.04, "0.0 s"),
+        (3.21, "3.2 s"),
+        (59.4, "59 s"),
+        (61, "1 min 01 s"),
+        (3660, "1 h 01 min"),
+        (4e6, "1,111 h 06 min"),
+    ],
+)
+def test_durations(seconds, text):
+    assert console.duration(seconds) == text

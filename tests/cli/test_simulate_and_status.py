@@ -1,0 +1,96 @@
+"""``sweep simulate`` and ``sweep status`` from the command line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.mark.parametrize(
+    ("case", "preset", "verdict", "rotation", "displacement"),
+    [
+        ("rwg", "corrected", "pass", 13.7612, 0.2820),
+        ("rwg", "as_printed", "pass", 7.6940, 0.1505),
+        ("abg", "corrected", "fail", 157.742, 1.4096),
+        ("abg", "as_printed", "fail", 114.258, 1.6555),
+    ],
+)
+def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
+    code, out, err = sweep("simulate", CONFIGS / f"{case}.yaml", "--set", f"model.readings={preset}", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert found["verdict"] == verdict
+    assert found["preset"] == preset
+    assert found["max_rotation_deg"] == pytest.approx(rotation, abs=0.02)
+    assert found["max_displacement_m"] == pytest.approx(displacement, abs=5e-4)
+
+
+def test_a_design_of_a_list(sweep):
+    code, out, err = sweep("simulate", CONFIGS / "crash_tests.yaml", "--design", "1")
+    assert (code, err) == (0, "")
+    assert "verdict" in out
+    assert "pass" in out
+    code, out, err = sweep("simulate", CONFIGS / "crash_tests.yaml")
+    assert code == 0
+    assert "holds 2 designs; this is number 0" in err
+    code, out, err = sweep("simulate", CONFIGS / "crash_tests.yaml", "--design", "2")
+    assert (code, out) == (2, "")
+    assert "there is no 2" in err
+
+
+def test_plot_and_trajectory_are_written_where_asked(sweep, grid):
+    import pandas as pd
+
+    code, _, _ = sweep("simulate", grid, "--design", "14", "--plot", "history.png", "--trajectory", "history.parquet")
+    assert code == 0
+    assert (grid.parent / "history.png").read_bytes().startswith(b"\x89PNG")
+    assert len(pd.read_parquet("history.parquet")) > 100
+
+
+def test_a_design_that_cannot_be_computed(sweep, grid):
+    code, out, err = sweep("simulate", grid, "--design", "4")
+    assert (code, out) == (3, "")
+    assert err == "design 4 cannot be computed: embedment depth is not less than the boulder's height\n"
+
+
+def test_places_that_cannot_be_written(sweep, grid):
+    for option, name in (("--plot", "no/such/folder.png"), ("--trajectory", "no/such/folder.parquet")):
+        code, _, err = sweep("simulate", grid, "-q", option, name)
+        assert code == 2
+        assert "no/such" in err
+        assert "internal" not in err
+
+
+def test_status_of_a_finished_run(sweep, possible_grid):
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    code, out, err = sweep("status", "small-grid.sweep", "--verify")
+    assert (code, err) == (0, "")
+    assert "finished, 18 of 18 designs (100.0%)" in out
+    assert "every part was read and is whole" in out
+    code, out, _ = sweep("status", "small-grid.sweep", "--json")
+    assert code == 0
+    assert json.loads(out)["complete"] is True
+
+
+def test_status_finds_damage(sweep, possible_grid):
+    sweep("run", possible_grid, "-q")
+    (part,) = [
+        path for path in (possible_grid.parent / "small-grid.sweep").glob("*.parquet") if not path.name.startswith("_")
+    ]
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    part.write_bytes(data)
+    code, out, _ = sweep("status", "small-grid.sweep", "--verify")
+    assert code == 1
+    assert f"damaged  {part.name}" in out
+    assert "go on    sweep run grid.yaml -o small-grid.sweep --resume" in out
+
+
+@pytest.mark.parametrize("name", ["no.sweep", "."])
+def test_status_of_what_is_no_result(sweep, grid, name):
+    code, out, err = sweep("status", name)
+    assert (code, out) == (2, "")
+    assert err
+    assert "internal" not in err
