@@ -232,9 +232,7 @@ class DesignPlan:
             The rows are not within the sweep.
         """
         if not 0 <= start <= stop <= self.n_designs:
-            raise IndexError(
-                f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep"
-            )
+            raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
         rows = _Rows(self, start, stop)
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
         codes = rows.values(self.refusals)

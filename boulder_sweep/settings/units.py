@@ -206,7 +206,9 @@ def _times(one: Dimension, other: Dimension) -> Dimension:
 def _kind(dimension: Dimension) -> str:
     """Return the kind of quantity in words, for a message."""
     kinds = (*((unit, expected.words) for unit, expected in EXPECTED.items()), *_KINDS)
-    return next((words for unit, words in kinds if _product(_read(unit)).dimension == dimension), "another kind of quantity")
+    return next(
+        (words for unit, words in kinds if _product(_read(unit)).dimension == dimension), "another kind of quantity"
+    )
 
 
 def _read(text: str, known: dict[str, tuple[str, Unit]] | None = None) -> dict[str, int]:
