@@ -25,6 +25,7 @@ from boulder_sweep.options import (
     talk_options,
     version_option,
 )
+from boulder_sweep.subcommands import COMMANDS
 
 # Everything heavy (numba, pandas, pyarrow, even numpy) is imported inside the commands that need it:
 # `sweep --help` and `sweep check` answer at once.
@@ -195,6 +196,10 @@ def status(out: str, verify: bool, as_json: bool) -> int:
     lines = [json.dumps(found.to_dict(), default=str)] if as_json else console.status_lines(found)
     click.echo("\n".join(lines))
     return EXIT_INTERNAL if found.damaged else 0
+
+
+for command in COMMANDS:
+    cli.add_command(command)
 
 
 def _load(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 # Okabe and Ito: told apart with every kind of colour vision, and in grey.
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, YELLOW, AMBER, BLACK = "#56B4E9", "#F0E442", "#E69F00", "#222222"
+PALE_ORANGE = "#EDB08A"
 GREY, LIGHT_GREY = "#6E6E6E", "#D9D9D9"
-VERDICT_COLOURS = {"pass": BLUE, "fail": ORANGE, "undecided": YELLOW, "error": BLACK}
 
 STYLE: Any = {
     "font.size": 9.0,

@@ -1,0 +1,6 @@
+"""Commands of ``sweep`` beside the main job, one module each. They import heavy modules inside, as `cli` does."""
+
+from boulder_sweep.subcommands.plot import plot
+
+COMMANDS = (plot,)
+"""In the order of ``sweep --help``."""

@@ -1,0 +1,211 @@
+"""A plane through a table of designs: two inputs across, up to two over small multiples, the rest held fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS
+
+from .figures import PictureError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RATIO = "embedment_ratio"
+DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
+ACROSS = (RATIO, DEPTH, "boulder_width_m", "boulder_length_m", "impact_speed_m_s")
+UP = (HEIGHT, "boulder_width_m", "boulder_length_m", "vehicle_mass_kg")
+OVER = ("friction_angle_deg", "subgrade_reaction_MN_m3", "impact_speed_m_s", "boulder_width_m")
+"""What is shown across, up and over small multiples, the first of each that varies."""
+DEPENDENT = ("impact_height_m",)
+"""Follows from other inputs unless a file gives it; never held fixed."""
+DIGITS = 9
+"""Inputs that agree to so many digits are the same value; products of axes differ in their last bits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """Rows of one plane.
+
+    Attributes
+    ----------
+    rows : DataFrame
+        The rows shown, with ``embedment_ratio`` beside the columns of the table.
+    across, up : str
+        Inputs on the axes of each picture.
+    columns, rows_over : str or None
+        Inputs over the small multiples.
+    column_values, row_values : list of float
+        Their values shown; [nan] where there is none.
+    fixed : dict of str to float
+        What is held fixed, and at what.
+    left_out : dict of str to int
+        Of which multiples only some are shown: how many values there are.
+    """
+
+    rows: pd.DataFrame
+    across: str
+    up: str
+    columns: str | None
+    rows_over: str | None
+    column_values: list[float]
+    row_values: list[float]
+    fixed: dict[str, float]
+    left_out: dict[str, int] = field(default_factory=dict)
+
+
+def plane(
+    table: pd.DataFrame,
+    *,
+    across: str | None = None,
+    up: str | None = None,
+    columns: str | None = None,
+    rows: str | None = None,
+    at: Mapping[str, float] | None = None,
+    most: tuple[int, int] = (4, 3),
+) -> Slice:
+    """Choose a plane of a table of designs.
+
+    Parameters
+    ----------
+    table
+        A result table, or its input columns and whatever is to be shown.
+    across, up
+        Inputs on the axes; by default embedment and height where they vary.
+    columns, rows
+        Inputs over small multiples; by default subgrade reaction and friction angle where they vary.
+    at
+        Values at which other inputs are held; by default the middle one of those there are. The nearest value
+        there is is taken.
+    most
+        Most columns and rows of small multiples; of more values, evenly spaced ones are shown.
+
+    Raises
+    ------
+    PictureError
+        An input is unknown, or fewer than two vary.
+    """
+    inputs = [name for name in INPUT_COLUMNS if name in table.columns]
+    frame = table.assign(**{RATIO: table[DEPTH] / table[HEIGHT]})
+    levels = {name: _levels(frame[name].to_numpy(dtype=float)) for name in (*inputs, RATIO)}
+    varying = [name for name, values in levels.items() if len(values) > 1 and name not in DEPENDENT]
+    chosen = {"across": across, "up": up, "columns": columns, "rows": rows}
+    for name in (*(name for name in chosen.values() if name), *(at or {})):
+        if name not in levels:
+            raise PictureError(f"{name} is not an input column; there are {', '.join(levels)}")
+    # Embedment varies as depth or as ratio; the one with fewer values is the axis, the other follows.
+    if RATIO in varying and DEPTH in varying:
+        follows = DEPTH if len(levels[RATIO]) <= len(levels[DEPTH]) else RATIO
+        if follows not in (*chosen.values(), *(at or {})):
+            varying.remove(follows)
+            levels.pop(follows)
+    for place, wanted in (("across", ACROSS), ("up", UP), ("columns", OVER[::-1][2:]), ("rows", OVER)):
+        free = [name for name in varying if name not in chosen.values() and name not in (at or {})]
+        if chosen[place] is None:
+            candidates = [name for name in wanted if name in free]
+            anything = free if place in ("across", "up") else []
+            chosen[place] = next(iter([*candidates, *anything]), None)
+    if chosen["across"] is None or chosen["up"] is None:
+        raise PictureError("a map needs two inputs that vary; of this table only one does, or none")
+    fixed = {}
+    for name in varying:
+        if name in levels and name not in chosen.values():
+            values = levels[name]
+            middle = values[(len(values) - 1) // 2]
+            wanted_value = (at or {}).get(name, middle)
+            fixed[name] = float(values[np.argmin(np.abs(values - wanted_value))])
+    keep = np.ones(len(frame), dtype=bool)
+    for name, value in fixed.items():
+        keep &= _equal(frame[name].to_numpy(dtype=float), value)
+    shown_columns, shown_rows = (
+        _some(levels, chosen[place], n) for place, n in (("columns", most[0]), ("rows", most[1]))
+    )
+    left_out = {
+        str(chosen[place]): len(levels[str(chosen[place])])
+        for place, shown in (("columns", shown_columns), ("rows", shown_rows))
+        if chosen[place] and len(shown) < len(levels[str(chosen[place])])
+    }
+    return Slice(
+        rows=frame[keep],
+        across=str(chosen["across"]),
+        up=str(chosen["up"]),
+        columns=chosen["columns"],
+        rows_over=chosen["rows"],
+        column_values=shown_columns,
+        row_values=shown_rows,
+        fixed=fixed,
+        left_out=left_out,
+    )
+
+
+def select(rows: pd.DataFrame, name: str | None, value: float) -> pd.DataFrame:
+    """Return the rows at one value of an input; all of them where there is no such input."""
+    return rows if name is None else rows[_equal(rows[name].to_numpy(dtype=float), value)]
+
+
+def label(name: str) -> str:
+    """Name of an input with its unit, for an axis: ``boulder height [m]``."""
+    if name == RATIO:
+        return "embedment depth / boulder height"
+    words = {
+        "boulder_height_m": "boulder height",
+        "embedment_depth_m": "embedment depth",
+        "friction_angle_deg": "friction angle φ′",
+        "subgrade_reaction_MN_m3": "subgrade reaction β",
+    }
+    unit = unit_of(name)
+    plain = words.get(name) or name.removesuffix("_" + BY_NAME[name].unit.replace("/", "_")).replace("_", " ")
+    return f"{plain} [{unit}]" if unit else plain
+
+
+def value_text(name: str, value: float) -> str:
+    """Value of an input with its unit: ``φ′ = 36°``."""
+    symbols = {
+        "friction_angle_deg": "φ′ = {}°",
+        "subgrade_reaction_MN_m3": "β = {} MN/m³",
+        "boulder_width_m": "width {} m",
+        "boulder_length_m": "length {} m",
+        "boulder_height_m": "height {} m",
+        "boulder_density_kg_m3": "density {} kg/m³",
+        "impact_speed_m_s": "{} m/s",
+        "vehicle_mass_kg": "vehicle {} kg",
+    }
+    number = f"{value:.5g}"
+    if name in symbols:
+        return symbols[name].format(number)
+    unit = unit_of(name)
+    return f"{label(name).partition(' [')[0]} {number}{' ' + unit if unit else ''}"
+
+
+def unit_of(name: str) -> str:
+    """Unit of an input as printed in a picture; empty for plain numbers."""
+    unit = BY_NAME[name].unit if name in BY_NAME else ""
+    return {"1": "", "MN/m^3": "MN/m³", "kg/m^3": "kg/m³", "N*s/m": "N·s/m"}.get(unit, unit)
+
+
+def _levels(values: np.ndarray) -> np.ndarray:
+    """Different values of an input, ascending; nearly equal ones count once."""
+    found = np.unique(values[np.isfinite(values)])
+    if len(found) < 2:
+        return found
+    new = np.ones(len(found), dtype=bool)
+    new[1:] = np.diff(found) > 10.0**-DIGITS * np.abs(found[1:])
+    return found[new]
+
+
+def _equal(values: np.ndarray, value: float) -> np.ndarray:
+    return np.abs(values - value) <= 10.0 ** (1 - DIGITS) * max(abs(value), 1e-300)
+
+
+def _some(levels: Mapping[str, np.ndarray], name: str | None, most: int) -> list[float]:
+    """Values of an input over small multiples: all, or evenly spaced ones with both ends."""
+    if name is None:
+        return [float("nan")]
+    values = levels[name]
+    if len(values) > most:
+        values = values[np.round(np.linspace(0, len(values) - 1, most)).astype(int)]
+    return [float(value) for value in values]

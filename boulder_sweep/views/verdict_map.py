@@ -1,0 +1,168 @@
+"""Pass/fail maps: the verdict over embedment and height, small multiples over the soil."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_sweep.columns import INPUT_COLUMNS
+
+from . import figures
+from .figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE, PictureError
+from .slices import Slice, label, plane, select, value_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+CLASSES = (
+    ("pass", BLUE, "pass"),
+    ("undecided", AMBER, "undecided"),
+    ("fail/overturns", PALE_ORANGE, "fail: overturns"),
+    ("fail/penetration", PURPLE, "fail: truck gets too far"),
+    ("fail/no_contact", LIGHT_GREY, "fail: truck passes over it"),
+    ("error", BLACK, "not computed"),
+)
+"""Verdict, or verdict and reason; colour; words of the legend."""
+MOST_CELLS = 400
+"""A map with more values along an axis is drawn as points."""
+
+
+def draw_verdict_map(
+    table: pd.DataFrame,
+    path: str | Path,
+    *,
+    title: str = "",
+    across: str | None = None,
+    up: str | None = None,
+    columns: str | None = None,
+    rows: str | None = None,
+    at: Mapping[str, float] | None = None,
+) -> Slice:
+    """Draw which designs of a table pass, over two of their inputs.
+
+    Parameters
+    ----------
+    table
+        A result table, as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used.
+    path
+        Picture to write (.png, .svg, .pdf).
+    title
+        Name of the study.
+    across, up, columns, rows, at
+        What is shown, see `boulder_sweep.views.slices.plane`.
+
+    Returns
+    -------
+    Slice
+        What was drawn.
+
+    Raises
+    ------
+    PictureError
+        Nothing can be drawn of this table, or the picture cannot be written.
+    """
+    shown = plane(table, across=across, up=up, columns=columns, rows=rows, at=at)
+    n_columns, n_rows = len(shown.column_values), len(shown.row_values)
+    width, height = max(2.2 * n_columns + 1.9, 5.2), max(1.9 * n_rows + 1.6, 3.6)
+    with figures.figure(path, width, height) as fig:
+        grid = fig.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
+        present: set[int] = set()
+        for row, row_value in enumerate(shown.row_values):
+            for column, column_value in enumerate(shown.column_values):
+                axes = grid[row, column]
+                cell_rows = select(select(shown.rows, shown.columns, column_value), shown.rows_over, row_value)
+                present |= _panel(axes, cell_rows, shown)
+                axes.set_title(_panel_title(shown, row_value, column_value), fontsize=8.5)
+                axes.grid(visible=False)
+        for axes in grid[-1]:
+            axes.set_xlabel(label(shown.across))
+        for axes in grid[:, 0]:
+            axes.set_ylabel(label(shown.up))
+        _legend(fig, present)
+        share = float((shown.rows["verdict"].astype(str) == "pass").mean()) if len(shown.rows) else 0.0
+        fig.suptitle(
+            f"{title}: which designs stop the truck" if title else "Which designs stop the truck",
+            x=0.01,
+            ha="left",
+            fontsize=11.5,
+            fontweight="bold",
+        )
+        fig.supxlabel(_caption(shown, share, len(table)), x=0.01, ha="left", fontsize=8.0, color=GREY)
+    return shown
+
+
+def classes_of(rows: pd.DataFrame) -> np.ndarray:
+    """Index into `CLASSES` of every row of a table, int8, shape (n,)."""
+    verdict = rows["verdict"].astype(str).to_numpy(dtype=object)
+    reason = rows["reason"].astype(str).to_numpy(dtype=object)
+    codes = np.full(len(rows), -1, dtype=np.int8)
+    for code, (key, _, _) in enumerate(CLASSES):
+        wanted, _, why = key.partition("/")
+        match = (verdict == wanted) & ((reason == why) if why else True)
+        codes[match] = code
+    return codes
+
+
+def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice) -> set[int]:
+    """Draw one map; return the classes that occur."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    codes = classes_of(rows)
+    colours = ListedColormap([colour for _, colour, _ in CLASSES])
+    norm = BoundaryNorm(np.arange(len(CLASSES) + 1) - 0.5, len(CLASSES))
+    x, y = (rows[name].to_numpy(dtype=float) for name in (shown.across, shown.up))
+    x_levels, x_place = np.unique(np.round(x, 9), return_inverse=True)
+    y_levels, y_place = np.unique(np.round(y, 9), return_inverse=True)
+    cells = np.full((len(y_levels), len(x_levels)), -1, dtype=np.int16)
+    cells[y_place, x_place] = codes
+    filled = len(np.unique(y_place.astype(np.int64) * max(len(x_levels), 1) + x_place))
+    gridded = filled == len(rows) and 2 * filled >= cells.size and max(cells.shape, default=0) <= MOST_CELLS
+    if gridded and min(cells.shape) > 1:
+        masked = np.ma.masked_less(cells, 0)
+        style: dict[str, Any] = {"cmap": colours, "norm": norm, "linewidth": 0.35, "edgecolors": "white"}
+        axes.pcolormesh(_edges(x_levels), _edges(y_levels), masked, **style)
+    else:
+        axes.scatter(x, y, c=codes, cmap=colours, norm=norm, s=9, linewidths=0)
+    return {int(code) for code in np.unique(codes) if code >= 0}
+
+
+def _edges(levels: np.ndarray) -> np.ndarray:
+    """Boundaries of cells around the values of an axis."""
+    middles = 0.5 * (levels[1:] + levels[:-1])
+    return np.concatenate(([2 * levels[0] - middles[0]], middles, [2 * levels[-1] - middles[-1]]))
+
+
+def _panel_title(shown: Slice, row_value: float, column_value: float) -> str:
+    pairs = ((shown.rows_over, row_value), (shown.columns, column_value))
+    return ", ".join(value_text(name, value) for name, value in pairs if name is not None)
+
+
+def _legend(fig: Any, present: set[int]) -> None:
+    from matplotlib.patches import Patch
+
+    handles = [Patch(color=colour, label=words) for k, (_, colour, words) in enumerate(CLASSES) if k in present]
+    fig.legend(handles=handles, loc="outside upper right", ncols=len(handles), handlelength=1.2, columnspacing=1.2)
+
+
+def _caption(shown: Slice, share: float, total: int) -> str:
+    fixed = ", ".join(value_text(name, value) for name, value in shown.fixed.items())
+    words = [f"{len(shown.rows):,} of {total:,} designs" + (f", at {fixed}" if fixed else "")]
+    words.append(f"{share:.1%} of them pass")
+    for name, count in shown.left_out.items():
+        words.append(f"{label(name).partition(' [')[0]}: some of {count} values")
+    return " · ".join(words)
+
+
+def needed_columns() -> list[str]:
+    """Columns of a result table that a map is made of."""
+    return [*INPUT_COLUMNS, "verdict", "reason"]
+
+
+def require_rows(table: pd.DataFrame, where: str | Path) -> None:
+    """Refuse a table without rows."""
+    if len(table) == 0:
+        raise PictureError(f"{where} holds no finished designs yet; `sweep status {where}` says how far it is")
