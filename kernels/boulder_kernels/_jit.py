@@ -27,6 +27,8 @@ from typing import Any
 import llvmlite.binding
 import numba
 
+SETTINGS: Any = numba.config
+"""Numba's settings, which it fills in at run time."""
 CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
 """Environment variable that names another folder for compiled kernels."""
 
@@ -75,10 +77,10 @@ def _ask_for_wide_vectors() -> None:
     gain. The loops over lanes are dense in multiply-adds and gain a third. The choice is Numba's, for the whole
     process, made at its first compilation; one that the user has made (NUMBA_CPU_FEATURES) stands.
     """
-    if numba.config.CPU_FEATURES is None and numba.config.CPU_NAME is None and numba.config.ENABLE_AVX:
+    if SETTINGS.CPU_FEATURES is None and SETTINGS.CPU_NAME is None and SETTINGS.ENABLE_AVX:
         features = llvmlite.binding.get_host_cpu_features()
         if features.get("avx512f", False):
-            numba.config.CPU_FEATURES = f"{features.flatten()},-prefer-256-bit"
+            SETTINGS.CPU_FEATURES = f"{features.flatten()},-prefer-256-bit"
 
 
 _ask_for_wide_vectors()
@@ -87,8 +89,8 @@ _ask_for_wide_vectors()
 def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:
     """Decorate one function, its cache in this package's folder."""
     # Set only while decorating: other users of Numba in this process keep their own cache folder.
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = CACHE_FOLDER or ""
+    before = SETTINGS.CACHE_DIR
+    SETTINGS.CACHE_DIR = CACHE_FOLDER or ""
     try:
         return numba.njit(
             nogil=True,
@@ -98,7 +100,7 @@ def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool 
             forceinline=inline,
         )(function)
     finally:
-        numba.config.CACHE_DIR = before
+        SETTINGS.CACHE_DIR = before
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
