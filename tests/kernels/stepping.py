@@ -1,0 +1,82 @@
+"""Motions of a few milliseconds from any state and mode, to measure the order of the integrator on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+import boulder_kernels as bk
+from boulder_kernels.dense_output import dense_output
+from boulder_kernels.dormand_prince import step
+from boulder_kernels.dynamics import State
+from boulder_kernels.events import gap_factors
+from boulder_kernels.impact import cross_event, keep_up_to_event, rate_of
+from boulder_kernels.modes import Modes, switches_of
+from boulder_kernels.outcomes import no_maxima
+
+from .samples import compression
+
+SCALE = np.array([1.0, 30.0, 1.0, 30.0, 1.0, 30.0])
+"""What an error in each component of the state is measured against: [m], [m/s], [rad], [rad/s], [m], [m/s]."""
+NO_LIMIT = 9.0
+
+
+class Start(NamedTuple):
+    """Where a motion begins."""
+
+    constants: bk.Constants
+    readings: bk.Readings
+    state: State
+    modes: Modes
+
+
+def with_compression(y: State, u: float, c: bk.Constants) -> State:
+    """State with the truck moved to where its spring is compressed by u [m], or off the boulder where negative."""
+    y = y._replace(x_v=0.0)
+    return y._replace(x_v=u - compression(y, c))
+
+
+def advance(start: Start, T: float, steps: int, locate_yield: bool = False) -> tuple[np.ndarray, list[int]]:
+    """Follow a motion for T [s] by equal steps, cut at events; return its last state and the events met."""
+    c, readings, y, modes = start
+    switches = switches_of(modes, readings, c)
+    factors = gap_factors(modes, c, NO_LIMIT, locate_yield)
+    k = rate_of(y, switches, c)
+    t, met = 0.0, []
+    h_full = T / steps
+    while T - t > 1e-12 * T:
+        h = min(h_full, T - t)
+        y_end, k_end = step(y, k, h, switches, c)
+        dense = dense_output(y, k, y_end, k_end, h)
+        event, tau, y, _ = keep_up_to_event(t, h, y_end, k_end.M, dense, factors, switches, no_maxima(), c)
+        t += tau * h
+        k = k_end
+        if event >= 0:
+            met.append(event)
+            y, modes, switches, factors, k = cross_event(event, y, modes, switches, readings, NO_LIMIT, locate_yield, c)
+    return np.array(y), met
+
+
+def errors(
+    start: Start, T: float, steps: Sequence[int], fine: int, locate_yield: bool = False, phases: int = 6
+) -> tuple[np.ndarray, set[tuple[int, ...]]]:
+    """Error at the end of a motion against one by ``fine`` steps, and the sequences of events met.
+
+    The error is the geometric mean over a few lengths of the motion from T to 3T/2, because at one length alone it
+    depends on where in a step a kink happens to fall.
+    """
+    logs, met = [], set()
+    for phase in range(phases):
+        length = T * (1.0 + 0.5 * phase / phases)
+        exact, events = advance(start, length, fine, locate_yield)
+        met.add(tuple(events))
+        coarse = [advance(start, length, n, locate_yield)[0] for n in steps]
+        logs.append([np.log(np.linalg.norm((y - exact) / SCALE)) for y in coarse])
+    return np.exp(np.mean(logs, axis=0)), met
+
+
+def order(steps: Sequence[int], found: np.ndarray) -> float:
+    """Order of convergence: the slope of error over step."""
+    return -float(np.polyfit(np.log(steps), np.log(found), 1)[0])
