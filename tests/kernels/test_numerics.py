@@ -68,7 +68,7 @@ def solve(function, low: float, high: float, enough: float) -> tuple[float, int]
         (lambda x: x**9 - 0.1**9, 0.1),
         (lambda x: cos(x) - x, 0.7390851332151607),
         (lambda x: np.tanh(80.0 * (x - 0.9)), 0.9),
-        (lambda x: (x - 0.2) * (0.01 if x < 0.2 else 1.0), 0.2),
+        (lambda x: (x - 0.2) * (0.25 if x < 0.2 else 1.0), 0.2),
     ],
 )
 def test_roots(function, root: float) -> None:
