@@ -143,6 +143,13 @@ def check(grid: str, overrides: tuple[str, ...]) -> int:
 @click.option("--design", type=click.IntRange(min=0), metavar="N", help="Number of the design [default: 0].")
 @click.option("--plot", type=click.Path(), metavar="F.png", help="Draw the time history.")
 @click.option("--trajectory", type=click.Path(), metavar="F.parquet", help="Write the time history.")
+@click.option(
+    "--energy",
+    type=click.Path(),
+    metavar="F.png",
+    help="Draw where the energy goes, and add its columns to the time history.",
+)
+@click.option("--animate", type=click.Path(), metavar="F.gif|.mp4|.html", help="Make a film of the side view.")
 @set_option
 @json_option
 @talk_options
@@ -151,6 +158,8 @@ def simulate(
     design: int | None,
     plot: str | None,
     trajectory: str | None,
+    energy: str | None,
+    animate: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
     quiet: bool,
@@ -177,7 +186,11 @@ def simulate(
     if plot is not None:
         result.plot(plot)
     if trajectory is not None:
-        result.to_parquet(trajectory)
+        result.to_parquet(trajectory, energy=energy is not None)
+    if energy is not None:
+        result.plot_energy(energy)
+    if animate is not None:
+        result.animate(animate)
     values = result.summary()
     click.echo(json.dumps(values) if as_json else "\n".join(console.value_lines(values)))
     return 0

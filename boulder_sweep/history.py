@@ -22,6 +22,7 @@ from boulder_kernels.modes import (
     Switches,
     switches_of,
 )
+from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
 
 MODE_NAMES = {
     SEATED: "seated",
@@ -177,3 +178,43 @@ def _samples(record: Record, readings: Readings, c: Constants) -> list[tuple[np.
         )
         samples.append((record.states[row], switches_of(modes, readings, c)))
     return samples
+
+
+@dataclass(frozen=True, eq=False)
+class SoilProfile:
+    """The soil along the buried face at one sample, arrays of shape (n,) from the soil line down."""
+
+    depth_m: np.ndarray
+    """Depth of the middle of each slice below the soil line."""
+    displacement_m: np.ndarray
+    """Displacement of the soil there (Eq 22)."""
+    force_N: np.ndarray
+    """Force of each slice on the boulder, spring and drag (Eq 19)."""
+
+
+def soil_profile(record: Record, sample: int, slices: int, c: Constants) -> SoilProfile:
+    """Cut the soil along the buried face into slices of equal height at one sample.
+
+    Parameters
+    ----------
+    record
+        The recorded motion.
+    sample
+        Which sample.
+    slices
+        How many slices; each stands for the soil element in its middle.
+    c
+        Constants of the motion.
+    """
+    x_b, v_b, theta, omega, _, _ = (float(value) for value in record.states[sample])
+    versine = 2.0 * np.sin(0.5 * theta) ** 2
+    k = soil_kinematics(x_b, v_b, omega, float(np.sin(theta)), float(versine), c)
+    ratio = (np.arange(slices) + 0.5) / slices
+    height = c.d / slices
+    displacement = k.A - k.slope_x * ratio
+    velocity = k.B - k.slope_v * ratio
+    force = [
+        -(spring_force(float(u), float(r * c.d), height, c) + drag_force(float(v), height, c))
+        for u, v, r in zip(displacement, velocity, ratio, strict=True)
+    ]
+    return SoilProfile(ratio * c.d, displacement, np.array(force))

@@ -239,6 +239,18 @@ class Trajectory:
 
         draw_energy(self, path)
 
+    def plot_side_view(self, path: str | Path, *, time_s: float | None = None) -> None:
+        """Draw the impact from the side at one instant, by default when the contact force peaks; see `plot`."""
+        from .views.side_view import draw_still  # matplotlib is heavy, and an extra
+
+        draw_still(self, path, time_s=time_s)
+
+    def animate(self, path: str | Path) -> None:
+        """Draw a moving side view: .gif, .mp4 (needs ffmpeg) or .html; see `plot`."""
+        from .views.animation import animate  # matplotlib is heavy, and an extra
+
+        animate(self, path)
+
     def to_json(self) -> str:
         """Return the summary as one JSON object."""
         return json.dumps(self.summary())

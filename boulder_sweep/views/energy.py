@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +10,12 @@ import numpy as np
 
 from . import figures
 from .figures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, YELLOW
-from .trajectory import require_samples, shade_beyond_limit
+from .trajectory import require_samples
 from .wording import design_line, verdict_line
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from boulder_sweep.trajectory import Trajectory
 
 LAYERS = (
@@ -77,11 +80,24 @@ def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
         axes.set_xlim(0.0, float(time[-1]))
         axes.set_ylim(1.05 * float(below.min()), 1.09 * max(float(above.max()), ledger.initial / 1e3))
         axes.grid(visible=False)
-        shade_beyond_limit(axes, trajectory)
+        _mark_limit(axes, trajectory)
         axes.set_xlabel("time since first touch [s]")
         axes.set_ylabel("energy [kJ]")
-        axes.set_title(f"largest residual {ledger.largest_residual:.1e} of the energy at first touch", fontsize=8.5)
-        axes.title.set_fontweight("normal")
+        axes.set_title(
+            f"The parts add up to the energy at first touch to within {ledger.largest_residual:.0e} of it.",
+            fontsize=8.5,
+            fontweight="normal",
+        )
         axes.legend(handles=handles[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5))
         fig.suptitle(verdict_line(trajectory), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
         fig.supxlabel(design_line(trajectory), x=0.01, ha="left", fontsize=8.0, color=GREY)
+
+
+def _mark_limit(axes: Axes, trajectory: Trajectory) -> None:
+    """Mark the time of the rotation limit."""
+    when = trajectory.motion.outcome.t_limit
+    if math.isfinite(when):
+        axes.axvline(when, color=BLACK, linestyle=":", linewidth=1.2)
+        limit = math.degrees(trajectory.motion.control.theta_limit)
+        words = f" {limit:g}°: beyond, the model no longer holds"
+        axes.annotate(words, (when, 0.02), xycoords=("data", "axes fraction"), fontsize=8.5)

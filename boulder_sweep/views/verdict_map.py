@@ -153,7 +153,7 @@ def _caption(shown: Slice, share: float, total: int) -> str:
     words = [f"{len(shown.rows):,} of {total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{share:.1%} of them pass")
     for name, count in shown.left_out.items():
-        words.append(f"{label(name).partition(' [')[0]}: some of {count} values")
+        words.append(f"{label(name).partition(' [')[0]}: a choice of its {count} values")
     return " · ".join(words)
 
 

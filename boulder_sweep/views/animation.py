@@ -1,0 +1,181 @@
+"""Films of the side view: GIF by Pillow, MP4 by ffmpeg, and a page with a slider for any browser."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import figures
+from .figures import PictureError
+from .scene import SideView, samples_shown
+from .shapes import STYLES, Shape
+from .trajectory import require_samples
+from .wording import design_line, verdict_line
+
+if TYPE_CHECKING:
+    from boulder_sweep.trajectory import Trajectory
+
+KINDS = (".gif", ".mp4", ".html")
+EVERY_S = 0.005
+"""Time between two frames of a film [s]."""
+MOST_FRAMES = 120
+FRAMES_PER_S = 20
+"""Frames shown in a second: at 5 ms between frames, ten times slower than it happens."""
+LAST_FRAME_S = 1.5
+"""How long a GIF rests on its last frame before it begins again [s]."""
+COLOURS = 48
+"""Of a GIF; the drawing has few."""
+FILM_DPI = 84
+SWATCH = 40
+"""Height of a strip of each colour in the picture that the palette of a GIF is taken from."""
+
+
+def animate(trajectory: Trajectory, path: str | Path) -> None:
+    """Make a film of the side view: truck, boulder, soil wedge and forces to scale over time.
+
+    Parameters
+    ----------
+    trajectory
+        The impact.
+    path
+        Film to write: .gif, .mp4 (needs the program ffmpeg), or .html, one file with a player and a slider.
+
+    Raises
+    ------
+    PictureError
+        There is nothing to draw, the kind is unknown, ffmpeg or matplotlib is missing, or the file cannot be written.
+    """
+    target = figures.checked_kind(path, KINDS)
+    require_samples(trajectory)
+    kind = target.suffix.lower()
+    if kind == ".mp4" and shutil.which("ffmpeg") is None:
+        raise PictureError(
+            f"{path}: an MP4 film needs the program ffmpeg, which is not installed; "
+            f"{target.with_suffix('.gif').name} or {target.with_suffix('.html').name} need nothing more"
+        )
+    try:
+        if kind == ".html":
+            target.write_text(page(trajectory), encoding="utf-8")
+        elif kind == ".gif":
+            _write_gif(trajectory, target)
+        else:
+            _write_mp4(trajectory, target)
+    except OSError as problem:
+        raise PictureError(f"{path} cannot be written: {problem.strerror or problem}") from problem
+
+
+def frames(trajectory: Trajectory) -> Iterator[np.ndarray]:
+    """Draw the frames of a film one after the other.
+
+    Yields
+    ------
+    ndarray of uint8, shape (height, width, 3)
+        One picture; height and width are even, as films want them.
+    """
+    figures.require_matplotlib()
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from .side_view import WIDTH_IN, draw, height_of, stage
+
+    view = SideView(trajectory)
+    with matplotlib.rc_context(figures.STYLE):
+        fig = Figure(figsize=(WIDTH_IN, height_of(view)), dpi=FILM_DPI, layout="constrained")
+        canvas = FigureCanvasAgg(fig)
+        axes = stage(fig, view)
+        title = axes.set_title(view.caption(0), fontsize=8.5, fontweight="normal", family="monospace")
+        canvas.draw()
+        fig.set_layout_engine("none")  # placed once; the frames must not jump
+        for sample in samples_shown(trajectory, MOST_FRAMES, EVERY_S):
+            title.set_text(view.caption(sample))
+            moving = draw(axes, view.moving(sample))
+            canvas.draw()
+            picture = np.asarray(canvas.buffer_rgba())[..., :3]
+            height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
+            yield picture[:height, :width].copy()
+            for artist in moving:
+                artist.remove()
+
+
+def _write_gif(trajectory: Trajectory, target: Path) -> None:
+    from PIL import Image  # comes with matplotlib
+
+    pictures = [Image.fromarray(picture) for picture in frames(trajectory)]
+    # One palette for all, from frames spread over the film, so that every colour is in it and none flickers.
+    width, height = pictures[0].size
+    sample = pictures[:: max(1, len(pictures) // 6)]
+    colours = sorted({"#FFFFFF"} | {c for style in STYLES.values() for c in (style.fill, style.line) if c != "none"})
+    sheet = Image.new("RGB", (width, height * len(sample) + SWATCH * len(colours)))
+    for k, picture in enumerate(sample):
+        sheet.paste(picture, (0, k * height))
+    for k, colour in enumerate(colours):  # thin lines would lose theirs to the many pixels of soil and sky
+        sheet.paste(Image.new("RGB", (width, SWATCH), colour), (0, height * len(sample) + k * SWATCH))
+    palette = sheet.quantize(COLOURS)
+    reduced = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    times = [1000 // FRAMES_PER_S] * (len(reduced) - 1) + [round(1000 * LAST_FRAME_S)]
+    reduced[0].save(target, save_all=True, append_images=reduced[1:], duration=times, loop=0, optimize=True)
+
+
+def _write_mp4(trajectory: Trajectory, target: Path) -> None:
+    """Hand raw frames to ffmpeg."""
+    film = frames(trajectory)
+    first = next(film)
+    height, width = first.shape[:2]
+    command = [
+        *("ffmpeg", "-y", "-loglevel", "error"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(FRAMES_PER_S), "-i", "-"),
+        *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(target.absolute())),
+    ]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
+        assert encoder.stdin is not None
+        try:
+            for picture in (first, *film):
+                encoder.stdin.write(picture.tobytes())
+        except BrokenPipeError:
+            pass  # it has said why and gone; its words are below
+        _, said = encoder.communicate()
+    if encoder.returncode != 0:
+        words = said.decode(errors="replace").strip()
+        raise PictureError(f"{target}: ffmpeg could not make the film: {words or f'exit code {encoder.returncode}'}")
+
+
+def page(trajectory: Trajectory) -> str:
+    """Return a page with a player of the side view: one file, nothing to be fetched.
+
+    The shapes of every frame travel as numbers and are drawn by the browser, so the page is small and sharp.
+    """
+    view = SideView(trajectory)
+    chosen = samples_shown(trajectory, MOST_FRAMES, EVERY_S)
+    window = view.window
+    content = {
+        "title": verdict_line(trajectory),
+        "design": design_line(trajectory),
+        "window": [window.left, window.right, window.bottom, window.top],
+        "styles": {name: style._asdict() for name, style in STYLES.items()},
+        "ground": [_plain(shape) for shape in view.ground()],
+        "captions": [view.caption(sample) for sample in chosen],
+        "frames": [[_plain(shape) for shape in view.moving(sample)] for sample in chosen],
+        "frames_per_s": FRAMES_PER_S,
+    }
+    template = (files("boulder_sweep.views") / "player.html").read_text(encoding="utf-8")
+    # "</" may not occur inside a script element, whatever the name of the sweep.
+    data = json.dumps(content, separators=(",", ":"), ensure_ascii=False).replace("</", "<\\/")
+    return template.replace("/*DATA*/null", data)
+
+
+def _plain(shape: Shape) -> dict[str, Any]:
+    """Return a shape for JSON, millimetres being fine enough."""
+    plain: dict[str, Any] = {"k": shape.kind, "s": shape.style, "p": [[round(v, 3) for v in at] for at in shape.points]}
+    if shape.text:
+        plain["t"] = shape.text
+    if shape.radius:
+        plain["r"] = shape.radius
+    return plain

@@ -1,0 +1,169 @@
+"""The side view of an impact as plain shapes in metres, for whoever draws it: matplotlib, or a page in a browser.
+
+X points in the direction of travel from where the boulder's near face was, Y up from the soil line.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_kernels.design import G, shear_wedge_angle
+from boulder_sweep.history import soil_profile
+from boulder_sweep.verdict import PENETRATION_LIMITS_M
+
+from .shapes import Shape
+from .truck import truck_shapes
+
+if TYPE_CHECKING:
+    from boulder_sweep.trajectory import Trajectory
+
+SLICES = 8
+"""Soil forces drawn along the buried face."""
+LONGEST_ARROW_M = 1.5
+"""Length of the largest contact force; all forces share one scale."""
+SHORTEST_ARROW_M = 0.03
+
+
+@dataclass(frozen=True)
+class Window:
+    """What the view shows [m]."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+
+@dataclass(frozen=True)
+class SideView:
+    """Draws the samples of one trajectory, all in the same window and on the same scale of force."""
+
+    trajectory: Trajectory
+
+    @property
+    def window(self) -> Window:
+        """The whole impact with some air around it."""
+        design, inputs = self.trajectory.motion.design, self.trajectory.inputs
+        wedge = design.L + design.d * math.tan(shear_wedge_angle(design.phi))
+        reach = max(wedge, self.rating_line + 0.3) + 0.6
+        return Window(
+            left=-(inputs["bed_offset_m"] + 1.6),
+            right=reach,
+            bottom=-design.d - 0.55,
+            top=max(design.H - design.d, 2.55) + 0.95,
+        )
+
+    @property
+    def rating_line(self) -> float:
+        """How far the cargo bed may come: the far face of the boulder and the limit of the rating [m]."""
+        rating = self.trajectory.settings["criterion"]["rating"]
+        return self.trajectory.motion.design.L + PENETRATION_LIMITS_M[rating]
+
+    @property
+    def metres_per_newton(self) -> float:
+        """Scale of the forces."""
+        peak = self.trajectory.motion.outcome.maxima.F_v
+        return LONGEST_ARROW_M / peak if peak > 0.0 else 1e-6
+
+    def ground(self) -> list[Shape]:
+        """Return what does not move: soil, the boulder's first place, the line of the rating, the scale of force."""
+        w, design = self.window, self.trajectory.motion.design
+        rating = self.trajectory.settings["criterion"]["rating"]
+        box = ((0.0, -design.d), (design.L, -design.d), (design.L, design.H - design.d), (0.0, design.H - design.d))
+        unit = 1000e3 if LONGEST_ARROW_M / self.metres_per_newton > 1600e3 else 500e3
+        length, x, y = unit * self.metres_per_newton, w.left + 0.25, w.bottom + 0.25
+        line = self.rating_line
+        return [
+            Shape("polygon", "soil", ((w.left, w.bottom), (w.right, w.bottom), (w.right, 0.0), (w.left, 0.0))),
+            Shape("line", "limit", ((line, 0.0), (line, w.top - 0.75))),
+            Shape("text", "limit", ((line + 0.06, w.top - 0.8),), f"{rating}: cargo bed\nmust stop here"),
+            Shape("line", "first_place", (*box, box[0])),
+            Shape("line", "scale", ((x, y), (x + length, y))),
+            Shape("text", "scale", ((x, y + 0.08),), f"{unit / 1e3:.0f} kN"),
+            Shape("text", "contact_force", ((x, y + 0.80),), "force of the vehicle"),
+            Shape("text", "soil_force", ((x, y + 0.58),), f"soil, each 1/{SLICES} of its depth"),
+            Shape("text", "weight", ((x, y + 0.36),), "weight of the boulder"),
+        ]
+
+    def moving(self, sample: int) -> list[Shape]:
+        """Return what moves, at one sample: soil wedge, boulder, truck, forces."""
+        return [
+            *self._wedge(sample),
+            *self._boulder(sample),
+            *truck_shapes(self.trajectory, sample),
+            *self._soil_forces(sample),
+            *self._contact(sample),
+        ]
+
+    def caption(self, sample: int) -> str:
+        """Return time, rotation and displacements in a line."""
+        t = self.trajectory
+        boulder, vehicle = t.boulder_centre_displacement_m[sample], t.vehicle_displacement_m[sample]
+        return (
+            f"t = {t.time_s[sample] * 1e3:5.0f} ms    rotation {math.degrees(t.rotation_rad[sample]):5.1f}°    "
+            f"boulder {boulder:5.2f} m    vehicle {vehicle:5.2f} m"
+        )
+
+    def _place(self, sample: int, x: float, y: float) -> tuple[float, float]:
+        """Place of a point of the boulder, given from the common centre of mass, x ahead and y up [m]."""
+        c, theta = self.trajectory.motion.constants, float(self.trajectory.rotation_rad[sample])
+        sin, cos = math.sin(theta), math.cos(theta)
+        centre = c.c_x + float(self.trajectory.boulder_displacement_m[sample])
+        return centre + x * cos + y * sin, -c.z_0 - x * sin + y * cos
+
+    def _boulder(self, sample: int) -> list[Shape]:
+        c, design = self.trajectory.motion.constants, self.trajectory.motion.design
+        left, right, low, high = -c.c_x, design.L - c.c_x, -c.c_y, design.H - c.c_y
+        corners = ((left, low), (right, low), (right, high), (left, high))
+        own = self._place(sample, 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y)
+        weight = design.rho_b * design.L * design.W * design.H * G
+        tip = (own[0], own[1] - weight * self.metres_per_newton)
+        return [
+            Shape("polygon", "boulder", tuple(self._place(sample, *corner) for corner in corners)),
+            Shape("circle", "centre", (own,), radius=0.05),
+            Shape("arrow", "weight", (own, tip)),
+        ]
+
+    def _wedge(self, sample: int) -> list[Shape]:
+        """The soil that is lumped on the boulder: a wedge cut into slices, each moving along with its element."""
+        motion = self.trajectory.motion
+        c, design = motion.constants, motion.design
+        slope = math.tan(shear_wedge_angle(design.phi))
+        levels = [k / 24 * c.d for k in range(25)]
+        near = [self._place(sample, c.l_n, c.z_0 - level) for level in levels]
+        far = [(x + (c.d - level) * slope, y) for (x, y), level in zip(near, levels, strict=True)]
+        return [Shape("polygon", "wedge", (*near, *far[::-1]))]
+
+    def _soil_forces(self, sample: int) -> list[Shape]:
+        motion = self.trajectory.motion
+        c, design = motion.constants, motion.design
+        profile = soil_profile(motion.record, sample, SLICES, c)
+        arrows = []
+        for z, force in zip(profile.depth_m, profile.force_N, strict=True):
+            length = float(force) * self.metres_per_newton
+            if abs(length) < SHORTEST_ARROW_M:
+                continue
+            # Pressed forward the soil pushes on the far face; pressed back, on the near one.
+            x, y = self._place(sample, c.l_n if length < 0.0 else c.l_n - design.L, c.z_0 - float(z))
+            arrows.append(Shape("arrow", "soil_force", ((x - length, y), (x, y))))
+        return arrows
+
+    def _contact(self, sample: int) -> list[Shape]:
+        length = float(self.trajectory.contact_force_N[sample]) * self.metres_per_newton
+        if length < SHORTEST_ARROW_M:
+            return []
+        c, design = self.trajectory.motion.constants, self.trajectory.motion.design
+        head = self._place(sample, -c.c_x, design.e + c.z_0)
+        return [Shape("arrow", "contact_force", ((head[0] - length, head[1]), head))]
+
+
+def samples_shown(trajectory: Trajectory, most: int, every_s: float) -> np.ndarray:
+    """Return which samples make a film: one each `every_s` seconds, but not more than `most`."""
+    last = len(trajectory) - 1
+    duration = float(trajectory.time_s[-1])
+    count = min(most, max(2, round(duration / every_s) + 1))
+    return np.unique(np.round(np.linspace(0, last, count)).astype(int))
