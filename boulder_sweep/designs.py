@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -116,16 +115,17 @@ class Source:
         self.values = np.ascontiguousarray(values)
         self.axes = axes
 
-    @cached_property
-    def dictionary(self) -> tuple[np.ndarray | None, np.ndarray]:
+        self.dictionary: tuple[np.ndarray | None, np.ndarray] = None, self.values
         """Places in the dictionary for every value (None: its own place), and the dictionary."""
+
+    def find_dictionary(self) -> None:
+        """Look for repeated values. Done once, before the first block: blocks must cost the same, all of them."""
         head = self.values[: 2 * MAX_DICTIONARY]
         if len(head) < len(self.values) and len(np.unique(head)) > MAX_DICTIONARY:
-            return None, self.values  # a long list of ever different values: sorting the whole is for nothing
+            return  # a long list of ever different values: sorting the whole is for nothing
         unique, inverse = np.unique(self.values, return_inverse=True)
-        if len(unique) == len(self.values):
-            return None, self.values
-        return inverse.astype(np.int32), unique
+        if len(unique) < len(self.values):
+            self.dictionary = inverse.astype(np.int32), unique
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +206,9 @@ class DesignPlan:
         else:
             impact = quantities["impact_height_m"]
         self.columns = {name: quantities[name] for name in INPUT_COLUMNS}
+        for quantity in self.columns.values():
+            if isinstance(quantity, Source):
+                quantity.find_dictionary()
         self.refusals = self.combine(refusal, height, embedment, bumper, hood, impact)
 
     def combine(self, function: Callable[..., np.ndarray], *inputs: Quantity) -> Quantity:

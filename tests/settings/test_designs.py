@@ -202,11 +202,12 @@ def test_few_values_stay_a_dictionary(load_it, example):
 
 
 def test_a_long_list_of_ever_different_values_is_no_dictionary():
-    values = np.random.default_rng(1).random(3 * MAX_DICTIONARY)
-    lookup, dictionary = Source(values, (0,)).dictionary
+    source = Source(np.random.default_rng(1).random(3 * MAX_DICTIONARY), (0,))
+    source.find_dictionary()
+    lookup, dictionary = source.dictionary
     assert lookup is None
     assert dictionary is not None
-    assert len(dictionary) == len(values)
+    assert len(dictionary) == len(source.values)
 
 
 def test_parts_of_a_grid_without_possible_rows(load_with):
