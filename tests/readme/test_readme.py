@@ -1,0 +1,98 @@
+"""What the README prints is what its commands print."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import boulder_sweep
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def marked(name: str) -> str:
+    """Return the text between the markers of one block, without its fence."""
+    found = re.search(rf"<!-- {name} -->\n(.*?)\n<!-- end -->", README, re.DOTALL)
+    assert found, f"the README has no block {name}"
+    return re.sub(r"^```\w*\n|\n```$", "", found.group(1))
+
+
+def sweep(*arguments: str, cwd: Path = ROOT) -> str:
+    """Run the command line and return what it prints."""
+    command = [sys.executable, "-m", "boulder_sweep", *arguments]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def m30(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Run the README's main job: folder of the table, and what was printed."""
+    out = tmp_path_factory.mktemp("readme") / "m30-sizing.sweep"
+    return out, sweep("run", "configs/m30_sizing.yaml", "-o", str(out))
+
+
+def test_the_main_job_counts_what_the_readme_shows(m30: tuple[Path, str]) -> None:
+    shown = marked("m30-summary")
+    assert shown in m30[1]
+
+
+def test_the_number_of_designs(m30: tuple[Path, str]) -> None:
+    assert len(boulder_sweep.read(m30[0])) == 107_008
+    assert "107 008 designs" in README
+
+
+def test_the_python_example_prints_what_the_readme_shows(m30: tuple[Path, str]) -> None:
+    code = re.search(r"```python\n(import boulder_sweep.*?)```", README, re.DOTALL)
+    assert code
+    done = subprocess.run(
+        [sys.executable, "-c", code.group(1)], cwd=m30[0].parent, capture_output=True, text=True, check=True
+    )
+    assert [line.rstrip() for line in done.stdout.splitlines()] == [
+        line.rstrip() for line in marked("lightest").splitlines()
+    ]
+
+
+def test_the_example_file_is_valid(tmp_path: Path) -> None:
+    example = re.search(r"```yaml\n(.*?)```", README, re.DOTALL)
+    assert example
+    (tmp_path / "grid.yaml").write_text(example.group(1), encoding="utf-8")
+    assert "valid" in sweep("check", "grid.yaml", cwd=tmp_path)
+
+
+def test_the_mistake_that_the_readme_shows(tmp_path: Path) -> None:
+    mistaken = re.search(r"<!-- mistake -->\n```text\n(.*?)\n```", README, re.DOTALL)
+    example = re.search(r"```yaml\n(.*?)```", README, re.DOTALL)
+    assert mistaken
+    assert example
+    text = example.group(1).replace("friction_angle: [36, 40, 43.2] deg", "friction_angle: [36, 40, 432] deg")
+    (tmp_path / "grid.yaml").write_text(text, encoding="utf-8")
+    command = [sys.executable, "-m", "boulder_sweep", "check", "grid.yaml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert mistaken.group(1) in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "config"), [("American Black Granite", "abg"), ("Rockville White Granite", "rwg")], ids=["ABG", "RWG"]
+)
+@pytest.mark.parametrize(("shown", "readings"), [("as printed", "as_printed"), ("corrected", "corrected")])
+def test_the_crash_tests(name: str, config: str, shown: str, readings: str) -> None:
+    row = next(line for line in marked("crash-tests").splitlines() if name in line and f"| {shown} |" in line)
+    _, _, _, rotation, displacement, verdict, _ = (cell.strip() for cell in row.split("|"))
+    settings = boulder_sweep.load(ROOT / "configs" / f"{config}.yaml", [f"model.readings={readings}"])
+    summary = boulder_sweep.simulate(settings).summary()
+    decimals = len(rotation.rstrip("°").partition(".")[2])
+    assert f"{summary['max_rotation_deg']:.{decimals}f}°" == rotation
+    assert f"{summary['max_displacement_m']:.3f} m" == displacement
+    assert verdict == ", ".join(word for word in (summary["verdict"], summary["reason"]) if word)
+
+
+def test_links_lead_somewhere() -> None:
+    for target in re.findall(r"\]\((?!https?:|#)([^)]+)\)", README):
+        assert (ROOT / target).exists(), target
