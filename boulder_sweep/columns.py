@@ -45,28 +45,18 @@ INPUTS: tuple[ColumnSpec, ...] = (
     ColumnSpec("boulder_height_m", "float64", "m", "whole height H of the boulder, buried part included"),
     ColumnSpec("boulder_density_kg_m3", "float64", "kg/m^3", "density of the boulder"),
     ColumnSpec("embedment_depth_m", "float64", "m", "depth d of the boulder's base below the soil line"),
-    ColumnSpec(
-        "impact_height_m", "float64", "m", "height e of the blow over the soil line (Eq 9, or as given)"
-    ),
+    ColumnSpec("impact_height_m", "float64", "m", "height e of the blow over the soil line (Eq 9, or as given)"),
     ColumnSpec("soil_density_kg_m3", "float64", "kg/m^3", "density of the compacted soil"),
     ColumnSpec("friction_angle_deg", "float64", "deg", "effective friction angle of the soil"),
-    ColumnSpec(
-        "subgrade_reaction_MN_m3", "float64", "MN/m^3", "constant of horizontal subgrade reaction of the soil"
-    ),
-    ColumnSpec(
-        "strain_rate_factor", "float64", "1", "factor K_epsilon on the soil's strength under rapid loading"
-    ),
+    ColumnSpec("subgrade_reaction_MN_m3", "float64", "MN/m^3", "constant of horizontal subgrade reaction of the soil"),
+    ColumnSpec("strain_rate_factor", "float64", "1", "factor K_epsilon on the soil's strength under rapid loading"),
     ColumnSpec("vehicle_mass_kg", "float64", "kg", "mass of the vehicle with its ballast"),
     ColumnSpec("impact_speed_m_s", "float64", "m/s", "speed of the vehicle at first contact"),
     ColumnSpec("vehicle_spring_N_m", "float64", "N/m", "spring of the vehicle's front (Maxwell element)"),
     ColumnSpec("vehicle_damper_N_s_m", "float64", "N*s/m", "damper of the vehicle's front (Maxwell element)"),
-    ColumnSpec(
-        "bumper_height_m", "float64", "m", "height of the underside of the vehicle's bumper over the ground"
-    ),
+    ColumnSpec("bumper_height_m", "float64", "m", "height of the underside of the vehicle's bumper over the ground"),
     ColumnSpec("hood_height_m", "float64", "m", "height of the top of the vehicle's hood over the ground"),
-    ColumnSpec(
-        "bed_offset_m", "float64", "m", "distance from the front bumper to the leading edge of the cargo bed"
-    ),
+    ColumnSpec("bed_offset_m", "float64", "m", "distance from the front bumper to the leading edge of the cargo bed"),
 )
 
 OUTCOMES: tuple[ColumnSpec, ...] = (
@@ -107,9 +97,7 @@ OUTCOMES: tuple[ColumnSpec, ...] = (
         "",
         "penetration rating reached (P1, P2, P3); null beyond P3 or where not rated",
     ),
-    ColumnSpec(
-        "time_to_limit_s", "float64", "s", "time at which the rotation reached the limit; null where never"
-    ),
+    ColumnSpec("time_to_limit_s", "float64", "s", "time at which the rotation reached the limit; null where never"),
     ColumnSpec("end_time_s", "float64", "s", "time simulated"),
     ColumnSpec("rotation_error_deg", "float64", "deg", "estimated numerical error of max_rotation_deg"),
     ColumnSpec("displacement_error_m", "float64", "m", "estimated numerical error of the displacements"),

@@ -114,9 +114,7 @@ def run_options(function: Command) -> Command:
     path = click.Path()
     for option in reversed(
         (
-            click.option(
-                "-o", "--output", "out", type=path, help="Folder of the table [default: NAME.sweep]."
-            ),
+            click.option("-o", "--output", "out", type=path, help="Folder of the table [default: NAME.sweep]."),
             click.option("--jobs", type=click.IntRange(min=1), help="Workers [default: all cores]."),
             click.option(
                 "--backend",

@@ -38,7 +38,7 @@ _TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """Values of one entry in the unit of the contract.
+    """Values of one entry in the unit of the table.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ class NumberError(ValueError):
 
 
 class Quantity(NamedTuple):
-    """An exact number in the unit of the contract, and whether a unit was written behind it."""
+    """An exact number in the unit of the table, and whether a unit was written behind it."""
 
     value: Fraction
     has_unit: bool
@@ -39,7 +39,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Qu
     node : Node
         Must be a piece of text such as ``1.65``, ``6.5 ft`` or ``95 MN/m^3``.
     unit : str
-        Unit of the contract; the unit of a bare number.
+        Unit of the table; the unit of a bare number.
     outer_unit : Scalar, optional
         Unit written behind the bracket of the list the number stands in.
 

@@ -72,7 +72,7 @@ class Expected(NamedTuple):
     examples: str
 
 
-# By the unit of the contract (the unit of a bare number).
+# By the unit of the table (the unit of a bare number).
 EXPECTED: dict[str, Expected] = {
     "m": Expected("a length", "m, cm, ft or in"),
     "kg": Expected("a mass", "kg, t, lb or short_ton"),
@@ -121,14 +121,14 @@ class UnitError(ValueError):
 
 @lru_cache(maxsize=1024)
 def factor(text: str, target: str) -> Fraction:
-    """Return the factor from a unit as written to the unit of the contract.
+    """Return the factor from a unit as written to the unit of the table.
 
     Parameters
     ----------
     text : str
         Unit as the user wrote it, for example ``kN·s/m``.
     target : str
-        Unit of the contract, a key of `EXPECTED`.
+        Unit of the table, a key of `EXPECTED`.
 
     Returns
     -------
