@@ -1,6 +1,7 @@
 """Commands of ``sweep`` beside the main job, one module each. They import heavy modules inside, as `cli` does."""
 
+from boulder_sweep.subcommands.fit_vehicle import fit_vehicle
 from boulder_sweep.subcommands.plot import plot
 
-COMMANDS = (plot,)
+COMMANDS = (plot, fit_vehicle)
 """In the order of ``sweep --help``."""

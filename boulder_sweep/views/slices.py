@@ -124,9 +124,9 @@ def plane(
     shown_columns, shown_rows = (
         _some(levels, chosen[place], n) for place, n in (("columns", most[0]), ("rows", most[1]))
     )
-    for name, shown in ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows)):
-        if name is not None:
-            values = frame[name].to_numpy(dtype=float)
+    for over, shown in ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows)):
+        if over is not None:
+            values = frame[over].to_numpy(dtype=float)
             keep &= np.logical_or.reduce([_equal(values, value) for value in shown])
     left_out = {
         str(chosen[place]): len(levels[str(chosen[place])])
