@@ -6,7 +6,6 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +18,7 @@ if TYPE_CHECKING:
     from .designs import DesignBlock
 
 COMMIT_EVERY_S = 5.0
-"""How often a part that is still growing is written, so that a slow run can be watched and loses little."""
-_COMMIT_SHARE = 0.05
-"""Share of the time that writing growing parts may take."""
+"""How often a part is written before it is complete, so that a slow run can be watched and loses little [s]."""
 
 
 class Collector(threading.Thread):
@@ -51,16 +48,17 @@ class Collector(threading.Thread):
     ):
         super().__init__(name="collector", daemon=True)
         self.problem: BaseException | None = None
-        self.rows_written = 0
-        """Rows written by this run."""
         self._folder = folder
         self._make_block = make_block
         self._metadata = metadata
         self._admission = admission
         self._ranges: Iterator[tuple[int, int]] = folder.manifest.missing()
         self._arrived: queue.SimpleQueue[tuple[int, Judged] | None] = queue.SimpleQueue()
+        self._stopped = threading.Event()
         self._waiting: dict[int, Judged] = {}
-        self._growing: _Growing | None = None
+        self._ready: list[Judged] = []
+        self._from_row = self._to_row = self._last_row = 0
+        """Rows [from, to) are ready, and are written with those up to the last if nothing hurries."""
         self._commit_every_s = commit_every_s
         self._written_at = time.monotonic()
 
@@ -69,7 +67,12 @@ class Collector(threading.Thread):
         self._arrived.put((start, judged))
 
     def finish(self) -> None:
-        """Say that no more will come; what is ready in order is written, then the thread ends."""
+        """Say that no more will come; what is ready in order is written, small parts are merged, that is all."""
+        self._arrived.put(None)
+
+    def stop(self) -> None:
+        """Say that there is no time left; what is ready in order is written, and the thread ends."""
+        self._stopped.set()
         self._arrived.put(None)
 
     def run(self) -> None:
@@ -79,92 +82,66 @@ class Collector(threading.Thread):
             while (piece := self._arrived.get()) is not None:
                 start, judged = piece
                 self._waiting[start] = judged
-                self._append_ready()
-                if self._growing and self._growing.fresh and time.monotonic() - self._written_at > self._pause:
-                    self._write(self._growing)
-            if self._growing and self._growing.fresh:
-                self._write(self._growing)
+                self._take_ready()
+                if time.monotonic() - self._written_at > self._commit_every_s:
+                    self._write()
+            self._write()
+            self._merge()
         except BaseException as problem:
             self.problem = problem
 
-    @property
-    def _pause(self) -> float:
-        """Time between two writings of a growing part [s]."""
-        cost = self._growing.cost_s if self._growing else 0.0
-        return max(self._commit_every_s, cost / _COMMIT_SHARE)
-
-    def _append_ready(self) -> None:
-        """Append what continues the growing part, and write parts that are complete."""
-        while self._growing and (judged := self._waiting.pop(self._growing.stop, None)) is not None:
-            self._growing.append(judged)
-            if self._growing.stop == self._growing.end:
-                self._write(self._growing)
+    def _take_ready(self) -> None:
+        """Take what continues the rows that are ready, and write parts that are complete."""
+        while (judged := self._waiting.pop(self._to_row, None)) is not None:
+            self._ready.append(judged)
+            self._to_row += len(judged.verdict)
+            if self._to_row == self._last_row:
+                self._write()
                 self._open_next()
 
     def _open_next(self) -> None:
-        """Begin with the next part that lacks rows."""
-        upcoming = next(self._ranges, None)
-        if upcoming is None:
-            self._growing = None
+        """Begin with the next range of rows that is not there."""
+        self._from_row, self._last_row = next(self._ranges, (-1, -1))
+        self._to_row = self._from_row
+
+    def _write(self) -> None:
+        """Put what is ready into the folder."""
+        rows = self._to_row - self._from_row
+        if rows == 0:
             return
-        start, end = upcoming
-        size = self._folder.manifest.rows_per_part
-        first = start - start % size
-        there = self._there(first) if start > first else []
-        self._growing = _Growing(first, start, end, there)
+        judged = joined(self._ready)
+        self._folder.commit(self._from_row, self._encoded(self._from_row, judged), rows, verdict_counts(judged))
+        self._admission.release(rows)
+        self._ready.clear()
+        self._from_row = self._to_row
+        self._written_at = time.monotonic()
 
-    def _there(self, first: int) -> list[Judged]:
-        """Read the rows that a part already has."""
-        import pyarrow.parquet as pq  # heavy, and only needed when a run goes on
+    def _merge(self) -> None:
+        """Replace small parts, once all are there, by those that a fast run writes at once."""
+        import pyarrow as pa  # heavy, and only needed where there are small parts
+        import pyarrow.parquet as pq
 
+        from .store.errors import DamagedError
         from .store.schema import judged_rows
 
-        path: Path = self._folder.path / self._folder.manifest.part_name(first)
-        return [judged_rows(pq.read_table(path, page_checksum_verification=True))]
+        for names in self._folder.manifest.mergeable():
+            if self._stopped.is_set():
+                return
+            try:
+                paths = [self._folder.path / name for name in names]
+                tables = [pq.read_table(path, page_checksum_verification=True) for path in paths]
+            except (OSError, pa.ArrowException) as problem:
+                raise DamagedError(f"{self._folder.path} was damaged during the run: {problem}") from problem
+            judged = joined([judged_rows(table) for table in tables])
+            first = self._folder.manifest.parts[names[0]].first
+            self._folder.merge(names, self._encoded(first, judged))
 
-    def _write_growing(self) -> None:
-        """Put what is ready of an incomplete part into the folder."""
-        if self._growing and self._growing.fresh:
-            self._write(self._growing)
-
-    def _write(self, part: _Growing) -> None:
-        """Put the part as it is now into the folder."""
+    def _encoded(self, first: int, judged: Judged) -> memoryview:
+        """Return the bytes of a part from its first row and its outcomes."""
         from .store.schema import encode, part_table
 
-        begun = time.monotonic()
-        judged = part.whole()
-        block = self._make_block(part.first, part.stop)
-        content = encode(part_table(block, judged, self._metadata))
-        self._folder.commit(part.first, content, part.stop - part.first, verdict_counts(judged))
-        self.rows_written += part.fresh
-        self._admission.release(part.fresh)
-        part.fresh = 0
-        self._written_at = time.monotonic()
-        part.cost_s = self._written_at - begun
-
-
-class _Growing:
-    """Rows [first, stop) of a part that will end at `end`."""
-
-    def __init__(self, first: int, stop: int, end: int, pieces: list[Judged]):
-        self.first, self.stop, self.end = first, stop, end
-        self.fresh = 0
-        """Rows that are not in the folder yet."""
-        self.cost_s = 0.0
-        """How long it took to write it the last time [s]."""
-        self._pieces = pieces
-
-    def append(self, judged: Judged) -> None:
-        """Add the rows that follow."""
-        rows = len(judged.verdict)
-        self._pieces.append(judged)
-        self.stop += rows
-        self.fresh += rows
-
-    def whole(self) -> Judged:
-        """Return all rows so far."""
-        self._pieces = [joined(self._pieces)]
-        return self._pieces[0]
+        block = self._make_block(first, first + len(judged.verdict))
+        return encode(part_table(block, judged, self._metadata))
 
 
 def verdict_counts(judged: Judged) -> dict[str, int]:

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from .collector import COMMIT_EVERY_S
 from .evaluation import Evaluation
 from .store.writer import ROWS_PER_PART
 
@@ -169,14 +170,15 @@ def estimated(
         Whether workers are processes of their own.
     """
     per_block = rows_per_block(sample.seconds_per_row, rows_to_compute, jobs)
-    parts = -(-rows_to_compute // rows_per_part)
+    seconds = rows_to_compute * sample.seconds_per_row / jobs
+    parts = max(-(-rows_to_compute // rows_per_part), int(seconds / COMMIT_EVERY_S))
     memory = _BYTES_UNDER_WAY * rows_under_way(per_block, jobs, rows_per_part) + _resident_bytes()
     if worker_processes:
         memory += jobs * _WORKER_PROCESS_BYTES
     return Estimate(
         rows=rows,
         rows_to_compute=rows_to_compute,
-        seconds=rows_to_compute * sample.seconds_per_row / jobs,
+        seconds=seconds,
         disk_bytes=int(rows_to_compute * sample.bytes_per_row + parts * sample.bytes_per_part),
         disk_free_bytes=None if out is None else _disk_free(out),
         memory_bytes=memory,

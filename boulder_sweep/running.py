@@ -75,28 +75,30 @@ class Run:
 
     def compute(self, progress: Report | None, commit_every_s: float) -> None:
         """Compute and write what is missing."""
-        if self._backend is None or self._estimate is None:
-            return  # nothing is missing
         self._signals.prompt = False
-        manifest = self._folder.manifest
-        block = self._estimate.rows_per_block
-        admission = Admission(rows_under_way(block, self._backend.jobs, manifest.rows_per_part))
-        make_block = self._sweep.block
-        ranges = blocks(manifest.missing(), block)
+        manifest, make_block = self._folder.manifest, self._sweep.block
+        admission = Admission(0)
         collector = Collector(self._folder, make_block, self._metadata, admission, commit_every_s)
-        workers = Workers(self._backend, self._evaluation, make_block, ranges, admission)
         collector.start()
-        workers.start()
+        workers = None
         try:
+            if self._backend is not None and self._estimate is not None:
+                size = self._estimate.rows_per_block
+                admission.limit = rows_under_way(size, self._backend.jobs, manifest.rows_per_part)
+                ranges = blocks(manifest.missing(), size)
+                workers = Workers(self._backend, self._evaluation, make_block, ranges, admission)
+                workers.start()
             self._look_after(workers, collector, progress)
         except BaseException:
-            workers.stop()
-            collector.finish()
+            if workers is not None:
+                workers.stop()
+            collector.stop()
             collector.join(_PATIENCE_S)
-            workers.join(_PATIENCE_S / 3)
+            if workers is not None:
+                workers.join(_PATIENCE_S / 3)
             raise
         finally:
-            self.notes += workers.notes
+            self.notes += workers.notes if workers is not None else []
         self._folder.close("finished")
 
     def end(self) -> None:
@@ -104,14 +106,16 @@ class Run:
         if self._backend is not None:
             self._backend.close()
 
-    def _look_after(self, workers: Workers, collector: Collector, progress: Report | None) -> None:
+    def _look_after(self, workers: Workers | None, collector: Collector, progress: Report | None) -> None:
         """Pass results on until everything is written."""
         begun = reported = time.monotonic()
-        ended = False
+        ended = workers is None
+        if ended:
+            collector.finish()
         while collector.is_alive():
             if self._signals.caught is not None:
                 raise Interrupted(self._signals.caught)
-            if ended:
+            if workers is None or ended:
                 collector.join(_LOOK_UP_S)
             else:
                 try:

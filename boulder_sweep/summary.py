@@ -150,6 +150,6 @@ def summary_of(
         jobs=jobs,
         backend=backend,
         parts=len(manifest.parts),
-        bytes=sum(part.now.bytes for part in manifest.parts.values()),
+        bytes=sum(part.bytes for part in manifest.parts.values()),
         notes=tuple(notes),
     )

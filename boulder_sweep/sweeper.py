@@ -21,8 +21,9 @@ from .limits import MOST_ROWS, Estimate, estimated, take_sample
 from .running import Report, Run
 from .store.errors import DoesNotFitError, NotASweepError
 from .store.manifest import Manifest, load
+from .store.opening import open_output
 from .store.provenance import file_metadata, identity, new_session
-from .store.writer import ROWS_PER_PART, open_output
+from .store.writer import ROWS_PER_PART
 from .summary import Progress, Summary, summary_of
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -23,41 +24,45 @@ _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
 _PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
 _DIGITS = 12
-
-
-@dataclass(frozen=True)
-class Version:
-    """One state of a part on the disk."""
-
-    rows: int
-    bytes: int
-    sha256: str
+_PART_NAME = re.compile(rf"{_PART_PREFIX}\d{{{_DIGITS},}}-\d{{{_DIGITS},}}{re.escape(_PART_SUFFIX)}")
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the table as it was last written.
+    """A finished part of the table; its file never changes.
 
     Parameters
     ----------
-    first
-        Row number of its first row in the whole table.
-    now
-        What its file is.
+    first, rows
+        Number of its first row in the whole table, and how many it has.
+    bytes, sha256
+        Size and checksum of its file.
     verdicts
-        How many rows have each verdict and reason, keyed ``verdict/reason``.
+        How many rows have each verdict and reason, keyed ``verdict/reason``, or ``verdict`` without one.
     written
         When, in ISO 8601.
-    before
-        What its file still is if the run was killed between announcing `now` and replacing the file.
     """
 
     first: int
-    now: Version
+    rows: int
+    bytes: int
+    sha256: str
     verdicts: dict[str, int]
     written: str
-    before: Version | None = None
-    verdicts_before: dict[str, int] | None = None
+
+    @property
+    def stop(self) -> int:
+        """Number of the row after its last."""
+        return self.first + self.rows
+
+
+@dataclass(frozen=True)
+class Merge:
+    """Several parts about to be replaced by one that holds the same rows."""
+
+    name: str
+    part: Part
+    replaced: list[str]
 
 
 @dataclass
@@ -94,6 +99,8 @@ class Manifest:
         Finished parts by file name.
     sessions
         Runs into this folder, oldest first.
+    merge
+        The merge under way, if any.
     """
 
     identity: dict[str, Any]
@@ -102,20 +109,16 @@ class Manifest:
     resume_command: str
     parts: dict[str, Part] = field(default_factory=dict)
     sessions: list[Session] = field(default_factory=list)
-
-    @property
-    def part_count(self) -> int:
-        """How many parts the whole table has."""
-        return -(-self.rows // self.rows_per_part)
+    merge: Merge | None = None
 
     @property
     def rows_done(self) -> int:
         """Rows in finished parts."""
-        return sum(part.now.rows for part in self.parts.values())
+        return sum(part.rows for part in self.parts.values())
 
     @property
     def verdicts(self) -> dict[str, int]:
-        """How many finished rows have each verdict and reason, keyed ``verdict/reason``."""
+        """How many finished rows have each verdict and reason, keyed as in `Part`."""
         total: dict[str, int] = {}
         for part in self.parts.values():
             for key, count in part.verdicts.items():
@@ -123,32 +126,53 @@ class Manifest:
         return dict(sorted(total.items()))
 
     def missing(self) -> Iterator[tuple[int, int]]:
-        """Yield the ranges [start, stop) of rows that are not there, in order, none across two parts."""
-        for first in range(0, self.rows, self.rows_per_part):
-            part = self.parts.get(self.part_name(first))
-            start = first + (part.now.rows if part else 0)
-            stop = min(first + self.rows_per_part, self.rows)
-            if start < stop:
-                yield start, stop
+        """Return the ranges [start, stop) of rows that are not there now, in order, none across two parts."""
+        there = sorted((part.first, part.stop) for part in self.parts.values())
+        return self._gaps([*there, (self.rows, self.rows)])
 
-    def part_name(self, first: int) -> str:
-        """Return the file name of the part that begins with a row; names sort as the rows do."""
+    def _gaps(self, there: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
+        """Yield what lies between ranges, cut at the ends of parts."""
+        start = 0
+        for first, stop in there:
+            while start < first:
+                end = min(start - start % self.rows_per_part + self.rows_per_part, first)
+                yield start, end
+                start = end
+            start = stop
+
+    def mergeable(self) -> list[list[str]]:
+        """Return the names of the parts, in order, that together are one whole part of the table."""
+        groups: dict[int, list[str]] = {}
+        for name in sorted(self.parts):
+            groups.setdefault(self.parts[name].first // self.rows_per_part, []).append(name)
+        whole = []
+        for place, names in groups.items():
+            rows = min(self.rows_per_part, self.rows - place * self.rows_per_part)
+            if len(names) > 1 and sum(self.parts[name].rows for name in names) == rows:
+                whole.append(names)
+        return whole
+
+    def part_name(self, first: int, stop: int) -> str:
+        """Return the file name of the part with the rows [first, stop); names sort as the rows do."""
         digits = max(_DIGITS, len(str(self.rows)))
-        return f"{_PART_PREFIX}{first:0{digits}d}{_PART_SUFFIX}"
+        return f"{_PART_PREFIX}{first:0{digits}d}-{stop:0{digits}d}{_PART_SUFFIX}"
+
+
+def hidden_name(name: str) -> str:
+    """Return the name of a merged part while the parts it replaces are still there."""
+    return f"_{name}{WRITING_SUFFIX}"
 
 
 def is_ours(name: str) -> bool:
     """Whether a sweep gives its files such a name, passing names included."""
     if name.endswith(WRITING_SUFFIX):
         return name.startswith("_") and is_ours(name[1 : -len(WRITING_SUFFIX)])
-    middle = name.removeprefix(_PART_PREFIX).removesuffix(_PART_SUFFIX)
-    is_part = name == f"{_PART_PREFIX}{middle}{_PART_SUFFIX}" and middle.isdigit() and len(middle) >= _DIGITS
-    return is_part or name in (MANIFEST_NAME, LOCK_NAME)
+    return bool(_PART_NAME.fullmatch(name)) or name in (MANIFEST_NAME, LOCK_NAME)
 
 
 def is_part_name(name: str) -> bool:
     """Whether a file name is that of a part."""
-    return is_ours(name) and name.startswith(_PART_PREFIX)
+    return bool(_PART_NAME.fullmatch(name))
 
 
 def save(manifest: Manifest, folder: Path) -> None:
@@ -202,13 +226,9 @@ def load(folder: Path) -> Manifest:
     content = json.loads(text)
     if content.pop("format") != _FORMAT:
         raise DamagedError(f"{path} was written by another version of boulder-sweep")
-    content["parts"] = {name: _part(record) for name, record in content["parts"].items()}
+    content["parts"] = {name: Part(**record) for name, record in content["parts"].items()}
     content["sessions"] = [Session(**record) for record in content["sessions"]]
+    if content["merge"] is not None:
+        content["merge"]["part"] = Part(**content["merge"]["part"])
+        content["merge"] = Merge(**content["merge"])
     return Manifest(**content)
-
-
-def _part(record: dict[str, Any]) -> Part:
-    """Rebuild a part from its JSON."""
-    before = record.pop("before")
-    now = record.pop("now")
-    return Part(now=Version(**now), before=Version(**before) if before else None, **record)

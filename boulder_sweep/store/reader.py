@@ -68,7 +68,8 @@ def _read(folder: Path, columns: Sequence[str] | None, verify: bool) -> tuple[pa
     manifest, damaged = load_checked(folder, read_parts=verify)
     if damaged:
         raise DamagedError(_damage_text(folder, damaged))
-    files = [str(folder / name) for name in sorted(manifest.parts)]
+    in_order = sorted(manifest.parts.items(), key=lambda item: item[1].first)
+    files = [str(folder / name) for name, _ in in_order]
     wanted = list(columns) if columns is not None else None
     if not files:
         empty = table_schema().empty_table()

@@ -21,8 +21,8 @@ class RunStatus:
         The folder.
     rows, rows_done
         Rows of the whole table, and those in finished, undamaged parts.
-    parts, parts_done
-        Files of the whole table, and finished ones that hold all their rows.
+    parts
+        Finished, undamaged files.
     running
         Whether a run writes into it now.
     verified
@@ -47,7 +47,6 @@ class RunStatus:
     rows: int
     rows_done: int
     parts: int
-    parts_done: int
     running: bool
     verified: bool
     damaged: dict[str, str]
@@ -99,22 +98,18 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
             break
         else:
             missing.append((start, stop))
-    full = sum(
-        part.now.rows == min(manifest.rows_per_part, manifest.rows - part.first) for part in manifest.parts.values()
-    )
     done = manifest.rows_done
     return RunStatus(
         out=str(folder),
         rows=manifest.rows,
         rows_done=done,
-        parts=manifest.part_count,
-        parts_done=full,
+        parts=len(manifest.parts),
         running=running,
         verified=verify,
         damaged=damaged,
         missing=missing,
         verdicts=manifest.verdicts,
-        bytes=sum(part.now.bytes for part in manifest.parts.values()),
+        bytes=sum(part.bytes for part in manifest.parts.values()),
         resume_command=None if done == manifest.rows else manifest.resume_command,
         sessions=manifest.sessions,
         identity=manifest.identity,

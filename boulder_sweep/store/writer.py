@@ -1,42 +1,33 @@
 """The output folder of a run: taken, written part by part, let go.
 
-A part is put in place whole (see `files`) and then recorded in the manifest with its rows and checksum. The
-last part of a slow run grows: the file is replaced by a longer one now and then, announced in the manifest
-before, so that a long run keeps few large files at all times and ends with the same files as a fast one.
-Compaction thus goes along with writing; nobody ever sees a row twice or misses one that was there before.
+A part is put in place whole (see `files`) and then recorded in the manifest with its rows and checksum; its
+file never changes, so whoever reads it is never disturbed. A slow run writes small parts, so that it can be
+watched and loses little. When all rows are there, small parts are merged into those a fast run would have
+written: the merge is announced in the manifest, the merged file is written under a ``_`` name, the small ones
+go, and it gets its name. So no row is ever seen twice, and a run killed in the middle can finish the merge.
 """
 
 from __future__ import annotations
 
+import hashlib
 import threading
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from . import errors
-from .files import flush_folder, put_file
-from .lock import LOCK_NAME, FolderLock
-from .manifest import (
-    MANIFEST_NAME,
-    Manifest,
-    Part,
-    Session,
-    Version,
-    is_ours,
-    is_part_name,
-    load,
-    save,
-)
-from .provenance import PREFIX, differences, now
-from .verify import sha256_of_bytes, verified_parts
+from .files import put_file
+from .lock import FolderLock
+from .manifest import MANIFEST_NAME, Manifest, Merge, Part, hidden_name, save
+from .merging import finish_merge
+from .provenance import now
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
 
 
 class OutputFolder:
-    """The folder of a run, open for writing until `close`; made by `open_output`."""
+    """The folder of a run, open for writing until `close`; made by `opening.open_output`."""
 
     def __init__(self, path: Path, lock: FolderLock, manifest: Manifest, created: bool):
         self.path = path
@@ -50,7 +41,7 @@ class OutputFolder:
         self._open = True
 
     def commit(self, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> None:
-        """Put a part in place, or a longer version of one, and record it.
+        """Put a part in place and record it.
 
         Parameters
         ----------
@@ -68,25 +59,53 @@ class OutputFolder:
         WriteError
             The disk is full or the folder cannot be written; what was there before still is.
         """
-        with self._busy:
-            if not self._open:
+        name = self.manifest.part_name(first, first + rows)
+        with self._writing() as is_open:
+            if not is_open:
                 return  # the run was stopped while this part was encoded
-            name = self.manifest.part_name(first)
-            before = self.manifest.parts.get(name)
+            put_file(self.path, name, content)
+            self.manifest.parts[name] = _part(first, content, rows, verdicts)
             try:
-                self._put(Part(first, _version(content, rows), verdicts, now()), name, content, before)
-            except OSError as problem:
-                self.manifest.parts.pop(name, None)
-                if before is not None:
-                    self.manifest.parts[name] = before
-                raise errors.WriteError(
-                    f"cannot write into {self.path}: {problem.strerror}. {self.manifest.rows_done:,} of "
-                    f"{self.manifest.rows:,} rows are safe; make room and go on with: "
-                    f"{self.manifest.resume_command}"
-                ) from problem
-            finally:
-                if self._ended is not None:
-                    self.close(self._ended)
+                save(self.manifest, self.path)
+            except OSError:
+                del self.manifest.parts[name]
+                raise
+
+    def merge(self, names: list[str], content: memoryview | bytes) -> None:
+        """Replace neighbouring parts by one that holds the same rows.
+
+        Parameters
+        ----------
+        names
+            Names of the parts, in order.
+        content
+            The bytes of the file that replaces them.
+
+        Raises
+        ------
+        WriteError
+            As `commit`.
+        """
+        parts = [self.manifest.parts[name] for name in names]
+        verdicts: dict[str, int] = {}
+        for part in parts:
+            for key, count in part.verdicts.items():
+                verdicts[key] = verdicts.get(key, 0) + count
+        rows = sum(part.rows for part in parts)
+        merged = _part(parts[0].first, content, rows, dict(sorted(verdicts.items())))
+        with self._writing() as is_open:
+            if not is_open:
+                return
+            name = self.manifest.part_name(merged.first, merged.stop)
+            self.manifest.merge = Merge(name, merged, names)
+            try:
+                save(self.manifest, self.path)
+                put_file(self.path, hidden_name(name), content)
+            except OSError:
+                self.manifest.merge = None
+                raise
+            finish_merge(self.manifest, self.path)
+            save(self.manifest, self.path)
 
     def sign_of_life(self) -> None:
         """Show that the run is alive; cheap, to be called often."""
@@ -130,163 +149,23 @@ class OutputFolder:
             with suppress(OSError):
                 self.path.rmdir()
 
-    def _put(self, part: Part, name: str, content: memoryview | bytes, before: Part | None) -> None:
-        """Put a part in place and record it; announce it first where it replaces a shorter one."""
-        if before is not None:
-            self.manifest.parts[name] = replace(part, before=before.now, verdicts_before=before.verdicts)
-            save(self.manifest, self.path)
-        put_file(self.path, name, content)
-        self.manifest.parts[name] = part
-        save(self.manifest, self.path)
+    @contextmanager
+    def _writing(self) -> Iterator[bool]:
+        """Keep others from closing the folder while something is written; False if it is closed."""
+        with self._busy:
+            try:
+                yield self._open
+            except OSError as problem:
+                done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
+                raise errors.WriteError(
+                    f"cannot write into {self.path}: {problem.strerror}. {done}; make room and go on with: "
+                    f"{self.manifest.resume_command}"
+                ) from problem
+            finally:
+                if self._ended is not None:
+                    self.close(self._ended)
 
 
-def _version(content: memoryview | bytes, rows: int) -> Version:
-    """Return what a file of this content will be."""
-    return Version(rows, len(content), sha256_of_bytes(content))
-
-
-def open_output(
-    out: Path,
-    manifest: Manifest,
-    session: Session,
-    *,
-    resume: bool = False,
-    overwrite: bool = False,
-) -> OutputFolder:
-    """Take a folder for a run.
-
-    Parameters
-    ----------
-    out
-        The folder; it may exist if it is empty, or as `resume` and `overwrite` say.
-    manifest
-        What the run is, without parts.
-    session
-        Who runs it.
-    resume
-        Keep the finished parts of the same run if there are any. Damaged ones become missing.
-    overwrite
-        Remove what a sweep wrote there before.
-
-    Raises
-    ------
-    StoreError
-        The folder cannot be used; see the classes in `errors` for the reasons.
-    """
-    if resume and overwrite:
-        raise errors.StoreError("--resume and --overwrite exclude each other")
-    created = _make(out)
-    try:
-        lock = _locked(out)
-    except BaseException:
-        if created:
-            with suppress(OSError):
-                out.rmdir()
-        raise
-    try:
-        folder = _taken(out, lock, manifest, resume, overwrite, created)
-        folder.manifest.sessions.append(session)
-        save(folder.manifest, out)
-    except OSError as problem:
-        lock.release()
-        raise errors.WriteError(f"cannot write into {out}: {problem.strerror}") from problem
-    except BaseException:
-        lock.release()
-        raise
-    return folder
-
-
-def _make(out: Path) -> bool:
-    """Make the folder if it is not there; True if it was made."""
-    if not out.parent.is_dir():
-        raise errors.StoreError(f"there is no folder {out.parent} to make {out.name} in")
-    try:
-        out.mkdir()
-    except FileExistsError:
-        if not out.is_dir():
-            raise errors.StoreError(f"{out} is a file; the output of a sweep is a folder") from None
-        return False
-    except OSError as problem:
-        raise errors.WriteError(f"cannot make the folder {out}: {problem.strerror}") from problem
-    return True
-
-
-def _locked(out: Path) -> FolderLock:
-    """Lock the folder, with words for who else may hold it."""
-    holder, host = "another run", None
-    with suppress(errors.StoreError):
-        sessions = load(out).sessions
-        if sessions and sessions[-1].ended is None:
-            last = sessions[-1]
-            holder, host = f"process {last.pid} on {last.host} since {last.started}", last.host
-    return FolderLock(out, host, holder)
-
-
-def _taken(
-    out: Path, lock: FolderLock, manifest: Manifest, resume: bool, overwrite: bool, created: bool
-) -> OutputFolder:
-    """Bring a locked folder into the state from which the run goes on."""
-    names = sorted(entry.name for entry in out.iterdir())
-    foreign = [name for name in names if not is_ours(name) or (out / name).is_dir()]
-    there = None
-    if MANIFEST_NAME in names and not (overwrite and _is_damaged(out)):
-        there = load(out)
-    parts = [name for name in names if is_part_name(name)]
-    if there is None and not overwrite and parts:
-        raise errors.DamagedError(f"{out} holds parts but no {MANIFEST_NAME}; --overwrite starts again")
-    if there is None or overwrite:
-        unknown = parts if there is None else [name for name in parts if name not in there.parts]
-        foreign += [name for name in unknown if not _is_written_by_us(out / name)]
-        if foreign:
-            raise errors.ForeignFilesError(out, foreign)
-    if there is not None and not (resume or overwrite):
-        raise errors.OutputExistsError(out, there.rows_done, there.rows)
-    if there is None or overwrite:
-        _remove(out, [name for name in names if is_ours(name) and name not in (LOCK_NAME, MANIFEST_NAME)])
-        return OutputFolder(out, lock, manifest, created)
-    return _resumed(out, lock, manifest, there, names)
-
-
-def _resumed(out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, names: list[str]) -> OutputFolder:
-    """Go on with the run that is there, if it is the same."""
-    different = differences(there.identity, manifest.identity)
-    if there.rows != manifest.rows:
-        different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
-    if different:
-        raise errors.SettingsDifferError(out, different)
-    there.parts, damaged = verified_parts(out, there)
-    there.resume_command = manifest.resume_command
-    keep = {*there.parts, MANIFEST_NAME, LOCK_NAME}
-    _remove(out, [name for name in names if is_ours(name) and name not in keep])
-    folder = OutputFolder(out, lock, there, created=False)
-    folder.damaged = damaged
-    return folder
-
-
-def _remove(out: Path, names: list[str]) -> None:
-    """Remove files and make that durable."""
-    for name in names:
-        (out / name).unlink(missing_ok=True)
-    if names:
-        flush_folder(out)
-
-
-def _is_damaged(out: Path) -> bool:
-    """Whether the manifest cannot be trusted."""
-    try:
-        load(out)
-    except errors.DamagedError:
-        return True
-    return False
-
-
-def _is_written_by_us(path: Path) -> bool:
-    """Whether a file that is named like a part says itself that a sweep wrote it."""
-    import pyarrow as pa  # heavy, and only needed where a manifest is missing
-    import pyarrow.parquet as pq
-
-    try:
-        metadata: dict[bytes, Any] = pq.read_metadata(path).metadata or {}
-    except (OSError, pa.ArrowException):
-        return False
-    return any(key.startswith(PREFIX.encode()) for key in metadata)
+def _part(first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> Part:
+    """Return the record of a part."""
+    return Part(first, rows, len(content), hashlib.sha256(content).hexdigest(), verdicts, now())

@@ -8,9 +8,10 @@ from typing import Any
 from boulder_sweep.collector import verdict_counts
 from boulder_sweep.evaluation import evaluation_of
 from boulder_sweep.store.manifest import Manifest
+from boulder_sweep.store.opening import open_output
 from boulder_sweep.store.provenance import file_metadata, new_session
 from boulder_sweep.store.schema import encode, part_table
-from boulder_sweep.store.writer import OutputFolder, open_output
+from boulder_sweep.store.writer import OutputFolder
 from tests.sweep.grids import grid, plausible
 
 IDENTITY = {"settings": {"soil": 1}, "settings_sha256": "a" * 64, "versions": {"numba": "1"}}

@@ -107,8 +107,8 @@ def test_passing_names_begin_with_an_underscore_and_are_known_as_ours(tmp_path, 
 
     monkeypatch.setattr(os, "rename", watch)
     for _ in range(2):
-        put_file(tmp_path, "rows-000000000000.parquet", b"x")
-    assert seen == ["_rows-000000000000.parquet.writing"]
+        put_file(tmp_path, "rows-000000000000-000000000100.parquet", b"x")
+    assert seen == ["_rows-000000000000-000000000100.parquet.writing"]
     assert is_ours(seen[0])
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,9 +12,9 @@ from boulder_sweep.store.errors import DamagedError, NotASweepError
 from boulder_sweep.store.manifest import (
     MANIFEST_NAME,
     Manifest,
+    Merge,
     Part,
     Session,
-    Version,
     is_ours,
     is_part_name,
     load,
@@ -22,15 +24,19 @@ from boulder_sweep.store.manifest import (
 
 def manifest_with_parts() -> Manifest:
     manifest = Manifest({"settings": {"name": "t", "x": [1.5, 2.0]}}, 1000, 300, "sweep run t.yaml --resume")
-    whole = Part(0, Version(300, 5000, "ab"), {"pass": 290, "fail/overturns": 10}, "2026")
-    grown = Part(600, Version(50, 900, "cd"), {"pass": 50}, "2026", Version(20, 400, "ef"), {"pass": 20})
-    manifest.parts = {manifest.part_name(part.first): part for part in (whole, grown)}
+    for first, rows, verdicts in ((0, 300, {"pass": 290, "fail/overturns": 10}), (600, 50, {"pass": 50})):
+        name = manifest.part_name(first, first + rows)
+        manifest.parts[name] = Part(first, rows, 5000, "ab", verdicts, "2026")
     manifest.sessions = [Session("2026", "host", 12, "cpu", 2, "threading", "sweep run t.yaml")]
     return manifest
 
 
-def test_what_is_saved_is_loaded(tmp_path):
+@pytest.mark.parametrize("merging", [False, True])
+def test_what_is_saved_is_loaded(tmp_path, merging):
     manifest = manifest_with_parts()
+    if merging:
+        name, part = next(iter(manifest.parts.items()))
+        manifest.merge = Merge("x", part, [name])
     save(manifest, tmp_path)
     assert load(tmp_path) == manifest
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST_NAME]
@@ -38,7 +44,6 @@ def test_what_is_saved_is_loaded(tmp_path):
 
 def test_counts(tmp_path):
     manifest = manifest_with_parts()
-    assert manifest.part_count == 4
     assert manifest.rows_done == 350
     assert manifest.verdicts == {"fail/overturns": 10, "pass": 340}
     assert list(manifest.missing()) == [(300, 600), (650, 900), (900, 1000)]
@@ -75,16 +80,40 @@ def test_a_truncated_one_is_noticed(tmp_path, keep):
 @given(st.integers(1, 10**13), st.integers(1, 10**6), st.data())
 def test_missing_ranges_are_the_complement_of_what_is_there(rows, size, data):
     manifest = Manifest({}, rows, max(size, rows // 50), "")
-    firsts = range(0, rows, manifest.rows_per_part)
-    for first in data.draw(st.lists(st.sampled_from(firsts), max_size=10)):
-        most = min(manifest.rows_per_part, rows - first)
-        there = data.draw(st.integers(1, most))
-        manifest.parts[manifest.part_name(first)] = Part(first, Version(there, 1, ""), {}, "")
+    for first in data.draw(st.sets(st.sampled_from(range(0, rows, manifest.rows_per_part)), max_size=10)):
+        end = min(first + manifest.rows_per_part, rows)
+        start = data.draw(st.integers(first, end - 1))
+        while start < end:
+            stop = data.draw(st.integers(start + 1, end))
+            name = manifest.part_name(start, stop)
+            manifest.parts[name] = Part(start, stop - start, 1, "", {}, "")
+            start = stop + data.draw(st.integers(0, 5))
     missing = list(manifest.missing())
-    assert sum(stop - start for start, stop in missing) == rows - manifest.rows_done
+    there = [(part.first, part.stop) for part in manifest.parts.values()]
+    edge = 0
+    for start, stop in sorted(missing + there):
+        assert start == edge < stop
+        edge = stop
+    assert edge == rows
     assert missing == sorted(missing)
     for start, stop in missing:
         assert start // manifest.rows_per_part == (stop - 1) // manifest.rows_per_part
+
+
+def test_small_parts_are_mergeable_only_when_they_make_a_whole_one():
+    manifest = Manifest({}, 250, 100, "")
+
+    def add(*edges):
+        for first, stop in pairwise(edges):
+            manifest.parts[manifest.part_name(first, stop)] = Part(first, stop - first, 1, "", {}, "")
+
+    add(0, 100)
+    add(100, 150, 199)
+    add(200, 230, 250)
+    assert manifest.mergeable() == [[manifest.part_name(200, 230), manifest.part_name(230, 250)]]
+    add(199, 200)
+    assert len(manifest.mergeable()) == 2
+    assert manifest.mergeable()[0] == [manifest.part_name(*rows) for rows in ((100, 150), (150, 199), (199, 200))]
 
 
 def test_missing_ranges_of_a_huge_table_come_one_by_one():
@@ -98,21 +127,22 @@ def test_missing_ranges_of_a_huge_table_come_one_by_one():
 def test_names_sort_as_rows_do(rows, data):
     manifest = Manifest({}, rows, 1, "")
     one, other = data.draw(st.integers(0, rows - 1)), data.draw(st.integers(0, rows - 1))
-    assert (manifest.part_name(one) < manifest.part_name(other)) == (one < other)
-    assert is_part_name(manifest.part_name(one))
+    names = [manifest.part_name(first, first + 1) for first in (one, other)]
+    assert (names[0] < names[1]) == (one < other)
+    assert all(is_part_name(name) for name in names)
 
 
 @pytest.mark.parametrize(
-    "name", ["notes.txt", "rows-1.parquet", "rows-00000000000x.parquet", "data.parquet", "_x.writing", "_manifest.json",
-             "rows-000000000000.parquet.bak", "writing", "_rows.writing"],
+    "name", ["notes.txt", "rows-1.parquet", "rows-000000000000.parquet", "data.parquet", "_x.writing", "_manifest.json",
+             "rows-000000000000-000000000100.parquet.bak", "writing", "_rows.writing"],
 )  # fmt: skip
 def test_foreign_names(name):
     assert not is_ours(name)
 
 
 @pytest.mark.parametrize(
-    "name", ["rows-000000000000.parquet", "_manifest.parquet", "_lock", "__manifest.parquet.writing",
-             "_rows-000000131072.parquet.writing"],
+    "name", ["rows-000000000000-000000131072.parquet", "_manifest.parquet", "_lock", "__manifest.parquet.writing",
+             "_rows-000000131072-000000262144.parquet.writing"],
 )  # fmt: skip
 def test_own_names(name):
     assert is_ours(name)

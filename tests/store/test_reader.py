@@ -51,7 +51,7 @@ def test_no_result(tmp_path):
 @pytest.mark.parametrize("damage", ["flip", "truncate", "remove"])
 def test_damage_is_never_read_as_data(tmp_path, damage):
     out = finished_folder(tmp_path / "out")
-    path = out / "rows-000000000100.parquet"
+    path = out / "rows-000000000100-000000000200.parquet"
     content = bytearray(path.read_bytes())
     if damage == "flip":
         content[2000] ^= 1

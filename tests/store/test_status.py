@@ -15,7 +15,7 @@ def test_a_finished_run(tmp_path):
     found = status(finished_folder(tmp_path / "out"), verify=True)
     assert found.complete
     assert found.rows == found.rows_done == ROWS
-    assert (found.parts, found.parts_done) == (5, 5)
+    assert found.parts == 5
     assert found.missing == []
     assert found.damaged == {}
     assert found.resume_command is None
@@ -33,7 +33,7 @@ def test_a_run_under_way(tmp_path):
     assert found.running
     assert not found.complete
     assert found.rows_done == 130
-    assert (found.parts, found.parts_done) == (5, 1)
+    assert found.parts == 2
     assert found.missing == [(100, 200), (230, ROWS)]
     assert found.resume_command == "sweep run x.yaml --resume"
     assert found.sessions[-1].ended is None
@@ -46,12 +46,12 @@ def test_a_run_under_way(tmp_path):
 @pytest.mark.parametrize("verify", [False, True])
 def test_truncated_and_lost_parts_are_found(tmp_path, verify):
     out = finished_folder(tmp_path / "out")
-    path = out / "rows-000000000100.parquet"
+    path = out / "rows-000000000100-000000000200.parquet"
     path.write_bytes(path.read_bytes()[:500])
-    (out / "rows-000000000300.parquet").unlink()
+    (out / "rows-000000000300-000000000400.parquet").unlink()
     found = status(out, verify=verify)
-    assert found.damaged["rows-000000000100.parquet"].startswith("truncated: 500 bytes instead of")
-    assert found.damaged["rows-000000000300.parquet"] == "gone"
+    assert found.damaged["rows-000000000100-000000000200.parquet"].startswith("truncated: 500 bytes instead of")
+    assert found.damaged["rows-000000000300-000000000400.parquet"] == "gone"
     assert found.missing == [(100, 200), (300, 400)]
     assert found.rows_done == ROWS - 200
     assert found.resume_command
@@ -59,7 +59,7 @@ def test_truncated_and_lost_parts_are_found(tmp_path, verify):
 
 def test_every_flipped_bit_is_found_by_verifying(tmp_path):
     out = finished_folder(tmp_path / "out")
-    path = out / "rows-000000000400.parquet"
+    path = out / "rows-000000000400-000000000441.parquet"
     content = path.read_bytes()
     for place in range(0, len(content), max(len(content) // 40, 1)):
         flipped = bytearray(content)

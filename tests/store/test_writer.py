@@ -26,7 +26,7 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-PARTS = [f"rows-{first:012d}.parquet" for first in range(0, ROWS, 100)]
+PARTS = [f"rows-{first:012d}-{min(first + 100, ROWS):012d}.parquet" for first in range(0, ROWS, 100)]
 
 
 def test_a_finished_folder_holds_parts_and_manifest_only(tmp_path):
@@ -60,7 +60,7 @@ def test_a_folder_in_a_folder_that_does_not_exist_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("how", [{}, {"resume": True}, {"overwrite": True}])
-@pytest.mark.parametrize("name", ["notes.txt", "data.parquet", "rows-000000000000.parquet/"])
+@pytest.mark.parametrize("name", ["notes.txt", "data.parquet", "rows-000000000000-000000000100.parquet/"])
 def test_foreign_files_are_left_alone(tmp_path, how, name):
     out = tmp_path / "out"
     out.mkdir()
@@ -174,45 +174,6 @@ def test_a_part_that_was_put_but_not_recorded_is_computed_again(tmp_path, monkey
     assert again.damaged == {}
     assert next(again.manifest.missing()) == (100, 200)
     assert PARTS[1] not in names(out)
-    again.close("finished")
-
-
-@pytest.mark.parametrize("reached", ["announced", "put", "recorded"])
-def test_a_growing_part_is_whole_wherever_the_run_is_killed(tmp_path, monkeypatch, reached):
-    out = tmp_path / "out"
-    folder = open_folder(out)
-    commit(folder, 0, rows=30)
-    put, save = writer.put_file, writer.save
-    saved = []
-
-    def killed_at_put(*arguments):
-        if reached == "announced":
-            raise KeyboardInterrupt
-        put(*arguments)
-
-    def killed_at_save(*arguments):
-        saved.append(1)
-        if len(saved) == 2 and reached == "put":
-            raise KeyboardInterrupt
-        save(*arguments)
-
-    monkeypatch.setattr(writer, "put_file", killed_at_put)
-    monkeypatch.setattr(writer, "save", killed_at_save)
-    if reached == "recorded":
-        commit(folder, 0, rows=70)
-    else:
-        with pytest.raises(KeyboardInterrupt):
-            commit(folder, 0, rows=70)
-    monkeypatch.undo()
-    folder._lock.release()
-    there = 30 if reached == "announced" else 70
-    assert status(out).rows_done == status(out, verify=True).rows_done == there
-    assert status(out, verify=True).damaged == {}
-    assert len(read_table(out)) == there
-    again = open_folder(out, resume=True)
-    assert again.damaged == {}
-    assert next(again.manifest.missing()) == (there, 100)
-    assert sum(again.manifest.verdicts.values()) == there
     again.close("finished")
 
 

@@ -241,7 +241,10 @@ def test_overwriting_replaces_the_table(tmp_path):
     run(grid(), out, rows_per_part=50, simulate=plausible)
     summary = run(grid_of(30), out, overwrite=True, simulate=plausible)
     assert summary.rows == len(pd.read_parquet(out)) == 30
-    assert sorted(path.name for path in out.iterdir()) == ["_manifest.parquet", "rows-000000000000.parquet"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "_manifest.parquet",
+        "rows-000000000000-000000000030.parquet",
+    ]
 
 
 def test_a_run_outside_the_main_thread(tmp_path):

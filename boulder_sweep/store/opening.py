@@ -1,0 +1,165 @@
+"""Taking an output folder for a run: new, resumed or overwritten, or refused with the reason."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from . import errors
+from .files import flush_folder
+from .lock import LOCK_NAME, FolderLock
+from .manifest import MANIFEST_NAME, Manifest, Session, is_ours, is_part_name, load, save
+from .merging import recover_merge
+from .provenance import PREFIX, differences
+from .verify import damaged_parts
+from .writer import OutputFolder
+
+
+def open_output(
+    out: Path,
+    manifest: Manifest,
+    session: Session,
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+) -> OutputFolder:
+    """Take a folder for a run.
+
+    Parameters
+    ----------
+    out
+        The folder; it may exist if it is empty, or as `resume` and `overwrite` say.
+    manifest
+        What the run is, without parts.
+    session
+        Who runs it.
+    resume
+        Keep the finished parts of the same run if there are any. Damaged ones become missing.
+    overwrite
+        Remove what a sweep wrote there before.
+
+    Raises
+    ------
+    StoreError
+        The folder cannot be used; see the classes in `errors` for the reasons.
+    """
+    if resume and overwrite:
+        raise errors.StoreError("--resume and --overwrite exclude each other")
+    created = _make(out)
+    try:
+        lock = _locked(out)
+    except BaseException:
+        if created:
+            with suppress(OSError):
+                out.rmdir()
+        raise
+    try:
+        folder = _taken(out, lock, manifest, resume, overwrite, created)
+        folder.manifest.sessions.append(session)
+        save(folder.manifest, out)
+    except OSError as problem:
+        lock.release()
+        raise errors.WriteError(f"cannot write into {out}: {problem.strerror}") from problem
+    except BaseException:
+        lock.release()
+        raise
+    return folder
+
+
+def _make(out: Path) -> bool:
+    """Make the folder if it is not there; True if it was made."""
+    if not out.parent.is_dir():
+        raise errors.StoreError(f"there is no folder {out.parent} to make {out.name} in")
+    try:
+        out.mkdir()
+    except FileExistsError:
+        if not out.is_dir():
+            raise errors.StoreError(f"{out} is a file; the output of a sweep is a folder") from None
+        return False
+    except OSError as problem:
+        raise errors.WriteError(f"cannot make the folder {out}: {problem.strerror}") from problem
+    return True
+
+
+def _locked(out: Path) -> FolderLock:
+    """Lock the folder, with words for who else may hold it."""
+    holder, host = "another run", None
+    with suppress(errors.StoreError):
+        sessions = load(out).sessions
+        if sessions and sessions[-1].ended is None:
+            last = sessions[-1]
+            holder, host = f"process {last.pid} on {last.host} since {last.started}", last.host
+    return FolderLock(out, host, holder)
+
+
+def _taken(
+    out: Path, lock: FolderLock, manifest: Manifest, resume: bool, overwrite: bool, created: bool
+) -> OutputFolder:
+    """Bring a locked folder into the state from which the run goes on."""
+    names = sorted(entry.name for entry in out.iterdir())
+    foreign = [name for name in names if not is_ours(name) or (out / name).is_dir()]
+    there = None
+    if MANIFEST_NAME in names and not (overwrite and _is_damaged(out)):
+        there = load(out)
+    parts = [name for name in names if is_part_name(name)]
+    if there is None and not overwrite and parts:
+        raise errors.DamagedError(f"{out} holds parts but no {MANIFEST_NAME}; --overwrite starts again")
+    if there is None or overwrite:
+        unknown = parts if there is None else [name for name in parts if name not in there.parts]
+        foreign += [name for name in unknown if not _is_written_by_us(out / name)]
+        if foreign:
+            raise errors.ForeignFilesError(out, foreign)
+    if there is not None and not (resume or overwrite):
+        raise errors.OutputExistsError(out, there.rows_done, there.rows)
+    if there is None or overwrite:
+        _remove(out, [name for name in names if is_ours(name) and name not in (LOCK_NAME, MANIFEST_NAME)])
+        return OutputFolder(out, lock, manifest, created)
+    return _resumed(out, lock, manifest, there, names)
+
+
+def _resumed(out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, names: list[str]) -> OutputFolder:
+    """Go on with the run that is there, if it is the same."""
+    different = differences(there.identity, manifest.identity)
+    if there.rows != manifest.rows:
+        different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
+    if different:
+        raise errors.SettingsDifferError(out, different)
+    recover_merge(there, out)
+    damaged = damaged_parts(out, there, read_parts=True)
+    there.parts = {name: part for name, part in there.parts.items() if name not in damaged}
+    there.resume_command = manifest.resume_command
+    keep = {*there.parts, MANIFEST_NAME, LOCK_NAME}
+    _remove(out, [name for name in names if is_ours(name) and name not in keep])
+    folder = OutputFolder(out, lock, there, created=False)
+    folder.damaged = damaged
+    return folder
+
+
+def _remove(out: Path, names: list[str]) -> None:
+    """Remove files and make that durable."""
+    for name in names:
+        (out / name).unlink(missing_ok=True)
+    if names:
+        flush_folder(out)
+
+
+def _is_damaged(out: Path) -> bool:
+    """Whether the manifest cannot be trusted."""
+    try:
+        load(out)
+    except errors.DamagedError:
+        return True
+    return False
+
+
+def _is_written_by_us(path: Path) -> bool:
+    """Whether a file that is named like a part says itself that a sweep wrote it."""
+    import pyarrow as pa  # heavy, and only needed where a manifest is missing
+    import pyarrow.parquet as pq
+
+    try:
+        metadata: dict[bytes, Any] = pq.read_metadata(path).metadata or {}
+    except (OSError, pa.ArrowException):
+        return False
+    return any(key.startswith(PREFIX.encode()) for key in metadata)

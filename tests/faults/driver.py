@@ -1,0 +1,64 @@
+"""A process that runs a sweep, for tests that do things to processes.
+
+It prints a line for every progress report and at last the summary or the problem as JSON; its exit code is that
+of the command line. Run as ``python -m tests.faults.driver OUT [options]`` from the root of the repository.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+
+from boulder_sweep.evaluation import by_kernels
+from boulder_sweep.interruption import Interrupted
+from boulder_sweep.store.errors import StoreError
+from boulder_sweep.sweeper import Progress, run
+from tests.faults import faulty
+from tests.sweep.grids import grid_of
+
+
+def main() -> int:
+    """Run a sweep as the arguments say."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("out")
+    parser.add_argument("--rows", type=int, default=2000)
+    parser.add_argument("--soil", default="closed_form")
+    parser.add_argument("--simulate", default="by_kernels")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--backend", default="threading")
+    parser.add_argument("--rows-per-part", type=int, default=500)
+    parser.add_argument("--commit-every", type=float, default=0.05)
+    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--overwrite", action="store_true")
+    parser.add_argument("--force", action="store_true")
+    options = parser.parse_args()
+    os.environ[faulty.MAIN_PROCESS] = str(os.getpid())
+
+    def report(progress: Progress) -> None:
+        print(progress.rows_done, flush=True)
+
+    try:
+        summary = run(
+            grid_of(options.rows, soil=options.soil),
+            options.out,
+            jobs=options.jobs,
+            backend=options.backend,
+            resume=options.resume,
+            overwrite=options.overwrite,
+            force=options.force,
+            progress=report,
+            rows_per_part=options.rows_per_part,
+            commit_every_s=options.commit_every,
+            simulate=by_kernels if options.simulate == "by_kernels" else getattr(faulty, options.simulate),
+        )
+    except (Interrupted, StoreError) as problem:
+        print(json.dumps({"problem": str(problem)}), flush=True)
+        return problem.exit_code
+    print(json.dumps(summary.to_dict()), flush=True)
+    return summary.exit_code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

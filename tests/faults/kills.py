@@ -1,0 +1,117 @@
+"""Kill runs with SIGKILL at random instants, again and again, and let them go on.
+
+A process that has loaded everything once forks a child for every run, so that a kill costs a fraction of a
+second. Prints one JSON object: kills, tables finished, and what was found wrong. Run from the root of the
+repository as ``python -m tests.faults.kills FOLDER KILLS SEED``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+
+from boulder_sweep.evaluation import evaluation_of
+from boulder_sweep.store import status
+from boulder_sweep.store.manifest import load
+from boulder_sweep.store.reader import read_table
+from boulder_sweep.sweeper import run
+from tests.sweep.grids import grid_of, same_bits
+
+ROWS, ROWS_PER_PART = 20_000, 4_000
+LONGEST_LIFE_S = 0.3
+
+
+def one_run(out: Path) -> None:
+    """Go on with the run in this process, and leave it."""
+    run(
+        grid_of(ROWS, soil="{elements: 100}"),
+        out,
+        jobs=2,
+        resume=True,
+        rows_per_part=ROWS_PER_PART,
+        commit_every_s=0.02,
+    )
+
+
+def in_a_child(out: Path, life_s: float | None) -> bool:
+    """Go on with the run in a child, which is killed after a while; True if it was."""
+    child = os.fork()
+    if child == 0:
+        try:
+            one_run(out)
+            os._exit(0)
+        finally:
+            os._exit(1)
+    if life_s is not None:
+        time.sleep(life_s)
+        os.kill(child, signal.SIGKILL)
+    _, how = os.waitpid(child, 0)
+    if os.WIFSIGNALED(how):
+        return True
+    if os.WEXITSTATUS(how) != 0:
+        raise RuntimeError("a run failed without being killed")
+    return False
+
+
+def look_at(out: Path, faults: list[str]) -> None:
+    """See that readers find whole rows only, each once and in order, after a kill."""
+    if not (out / "_manifest.parquet").exists():
+        return
+    found = status(out, verify=True)
+    if found.damaged:
+        faults.append(f"damaged: {found.damaged}")
+    recorded = read_table(out)["design_id"].to_pylist()
+    if recorded != list(range(len(recorded))) or len(recorded) != found.rows_done:
+        faults.append("recorded rows are not there")
+    ids = pd.read_parquet(out).get("design_id", pd.Series(dtype=int)).to_list()
+    merge = load(out).merge
+    # Killed between taking small parts away and naming the merged one: other readers miss its rows for now.
+    hidden = set(range(merge.part.first, merge.part.stop)) - set(ids) if merge else set()
+    if sorted({*ids, *hidden}) != list(range(len(ids) + len(hidden))) or ids != sorted(ids):
+        faults.append("rows lost or double after a kill")
+
+
+def tally(table: pa.Table, whole: pa.Table) -> dict[str, int]:
+    """Count rows lost, double and different against the uninterrupted table."""
+    ids = table["design_id"].to_pylist()
+    return {
+        "lost": len(set(range(ROWS)) - set(ids)),
+        "double": len(ids) - len(set(ids)),
+        "different": 0 if same_bits(table, whole) else 1,
+    }
+
+
+def main() -> None:
+    """Kill as often as asked for and print what came of it."""
+    folder, kills, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    chance = random.Random(seed)
+    evaluation_of(grid_of(10, soil="{elements: 100}")).warm_up()
+    whole_out = folder / "whole"
+    in_a_child(whole_out, None)
+    done, tables, faults = 0, [], []
+    outs = []
+    while done < kills:
+        out = folder / f"killed-{len(outs)}"
+        outs.append(out)
+        while done < kills and in_a_child(out, chance.uniform(0.0, LONGEST_LIFE_S)):
+            done += 1
+            look_at(out, faults)
+    whole = read_table(whole_out)
+    for out in outs:
+        in_a_child(out, None)
+        tables.append(tally(read_table(out), whole))
+    result: dict[str, Any] = {"kills": done, "tables": tables, "faults": faults}
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""Starting, watching and finding the processes that the tests do things to."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+_MARK = "TEST_MARK"
+
+
+class Driver:
+    """A process that runs a sweep (see `driver`), in a session of its own, with a mark that its children inherit."""
+
+    def __init__(self, out: Path, *options: str, **environment: str):
+        self.mark = uuid.uuid4().hex
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tests.faults.driver", str(out), *options],
+            cwd=ROOT,
+            env={**os.environ, **environment, _MARK: self.mark},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def wait_for_rows(self, rows: int = 1) -> None:
+        """Wait until the process reports that so many rows are done."""
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if line.strip().isdigit() and int(line) >= rows:
+                return
+        raise AssertionError(f"the run ended before: {self.process.communicate()}")
+
+    def signal(self, number: int, *, group: bool = False) -> None:
+        """Send a signal to the process, or as a terminal does to all in its session."""
+        if group:
+            os.killpg(self.process.pid, number)
+        else:
+            self.process.send_signal(number)
+
+    def end(self, timeout: float = 60.0) -> tuple[int, dict[str, Any], str]:
+        """Wait for the end; exit code, what was told at last, and what went to stderr."""
+        told, complaints = self.process.communicate(timeout=timeout)
+        lines = told.splitlines()
+        last = json.loads(lines[-1]) if lines and lines[-1].startswith("{") else {}
+        return self.process.returncode, last, complaints
+
+    def left_behind(self, patience: float = 3.0) -> list[str]:
+        """Command lines of processes with the mark that are still alive after a while."""
+        end = time.monotonic() + patience
+        while (alive := _marked(self.mark)) and time.monotonic() < end:
+            time.sleep(0.05)
+        return alive
+
+
+def run_driver(out: Path, *options: str, **environment: str) -> tuple[int, dict[str, Any], str]:
+    """Run a process to its end."""
+    return Driver(out, *options, **environment).end()
+
+
+def _marked(mark: str) -> list[str]:
+    """Command lines of all processes whose environment holds the mark."""
+    found = []
+    for process in Path("/proc").iterdir():
+        if not process.name.isdigit():
+            continue
+        try:
+            if mark.encode() in (process / "environ").read_bytes():
+                found.append((process / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+        except OSError:
+            continue  # it has just ended
+    return found

@@ -1,0 +1,67 @@
+"""Workers that die, blocks that raise: retried, then rows of verdict error; everything else is as ever."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boulder_sweep.store.reader import read_table
+from boulder_sweep.sweeper import run
+from tests.faults import faulty
+from tests.faults.processes import run_driver
+from tests.sweep.grids import grid_of, plausible, same_bits
+
+pytestmark = pytest.mark.faults
+
+ROWS = 80
+OPTIONS = ("--rows", str(ROWS), "--rows-per-part", "30")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The table without faults."""
+    out = tmp_path_factory.mktemp("whole") / "out"
+    run(grid_of(ROWS), out, rows_per_part=30, simulate=plausible)
+    return read_table(out)
+
+
+def poison(whole, rows) -> str:
+    values = whole["subgrade_reaction_MN_m3"].take(rows).to_pylist()
+    return " ".join(str(round(value, 6)) for value in values)
+
+
+def assert_only_these_are_errors(out, whole, rows, words):
+    found = read_table(out)
+    assert found["design_id"].to_pylist() == list(range(ROWS))
+    for row in rows:
+        assert found["verdict"][row].as_py() == "error"
+        assert words in found["reason"][row].as_py()
+    others = np.setdiff1d(np.arange(ROWS), rows)
+    assert same_bits(found.take(others), whole.take(others))
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky", "dask"])
+def test_designs_that_raise(tmp_path, whole, backend):
+    rows = [0, 41, 79]
+    environment = {faulty.POISON: poison(whole, rows)}
+    options = (*OPTIONS, "--simulate", "raises", "--backend", backend)
+    code, told, complaints = run_driver(tmp_path / "out", *options, **environment)
+    assert (code, told["rows"], complaints) == (3, ROWS, "")
+    assert_only_these_are_errors(tmp_path / "out", whole, rows, "failed: ArithmeticError: this design cannot be")
+
+
+def test_a_worker_that_dies_once_loses_nothing(tmp_path, whole):
+    options = (*OPTIONS, "--simulate", "kills_its_worker_once", "--backend", "loky")
+    code, told, _ = run_driver(tmp_path / "out", *options, **{faulty.ONCE: str(tmp_path / "once")})
+    assert (code, told["rows"]) == (3, ROWS)
+    assert any("ended unexpectedly" in note for note in told["notes"])
+    assert (tmp_path / "once").exists()
+    assert_only_these_are_errors(tmp_path / "out", whole, [], "")
+
+
+def test_a_design_that_kills_every_worker_is_found(tmp_path, whole):
+    rows = [41]
+    options = (*OPTIONS, "--simulate", "kills_its_worker", "--backend", "loky")
+    code, told, _ = run_driver(tmp_path / "out", *options, **{faulty.POISON: poison(whole, rows)})
+    assert (code, told["rows"]) == (3, ROWS)
+    assert_only_these_are_errors(tmp_path / "out", whole, rows, "the worker that computed this design ended")

@@ -1,0 +1,130 @@
+"""Small parts become one, wherever the run is killed."""
+
+from __future__ import annotations
+
+import errno
+
+import pytest
+
+from boulder_sweep.store import merging, status, writer
+from boulder_sweep.store.errors import WriteError
+from boulder_sweep.store.manifest import MANIFEST_NAME, load
+from boulder_sweep.store.reader import read_table
+from tests.store.folders import ROWS, commit, open_folder, part_bytes
+from tests.sweep.grids import same_bits
+
+SMALL = [(0, 30), (30, 30), (60, 40)]
+
+
+class Killed(BaseException):
+    """Stands for SIGKILL: nothing is cleaned up."""
+
+
+@pytest.fixture
+def out(tmp_path):
+    """A folder with three small parts in place of the first whole one."""
+    folder = open_folder(tmp_path / "out")
+    for first, rows in SMALL:
+        commit(folder, first, rows)
+    folder.close("interrupted")
+    return tmp_path / "out"
+
+
+def names(out):
+    return sorted(path.name for path in out.iterdir() if path.name not in (MANIFEST_NAME, "_lock"))
+
+
+def merge(out):
+    folder = open_folder(out, resume=True)
+    (group,) = folder.manifest.mergeable()
+    folder.merge(group, part_bytes(0, 100)[0])
+    return folder
+
+
+def test_small_parts_are_replaced_by_the_file_that_a_fast_run_writes(out, tmp_path):
+    before = read_table(out)
+    folder = merge(out)
+    folder.close("finished")
+    assert names(out) == ["rows-000000000000-000000000100.parquet"]
+    assert same_bits(read_table(out), before)
+    assert sum(load(out).verdicts.values()) == 100
+    assert status(out, verify=True).damaged == {}
+    assert load(out).merge is None
+
+
+def killed_at(monkeypatch, step: int):
+    """Kill the merge before its step-th change to the disk."""
+    done = []
+
+    def watched(change):
+        def maybe(*arguments, **words):
+            done.append(change)
+            if len(done) > step:
+                raise Killed
+            return change(*arguments, **words)
+
+        return maybe
+
+    monkeypatch.setattr(writer, "save", watched(writer.save))
+    monkeypatch.setattr(writer, "put_file", watched(writer.put_file))
+    monkeypatch.setattr(merging, "flush_folder", watched(merging.flush_folder))
+    monkeypatch.setattr(type(merging.Path()), "unlink", watched(type(merging.Path()).unlink))
+    monkeypatch.setattr(type(merging.Path()), "rename", watched(type(merging.Path()).rename))
+
+
+@pytest.mark.parametrize("step", range(9))
+def test_a_merge_killed_at_any_step_loses_and_doubles_nothing(out, monkeypatch, step):
+    before = read_table(out)
+    folder = open_folder(out, resume=True)
+    (group,) = folder.manifest.mergeable()
+    content = part_bytes(0, 100)[0]
+    with monkeypatch.context() as patch:
+        killed_at(patch, step)
+        try:
+            folder.merge(group, content)
+        except Killed:
+            killed = True
+        else:
+            killed = False
+    folder._lock.release()
+    assert killed == (step < 8)  # announce, put, three unlinks, rename, flush, record
+    for verify in (False, True):
+        assert status(out, verify=verify).rows_done == 100
+        assert status(out, verify=verify).damaged == {}
+    assert same_bits(read_table(out), before)
+    again = open_folder(out, resume=True)
+    assert again.damaged == {}
+    assert again.manifest.rows_done == 100
+    for group in again.manifest.mergeable():
+        again.merge(group, content)
+    again.close("finished")
+    assert names(out) == ["rows-000000000000-000000000100.parquet"]
+    assert same_bits(read_table(out), before)
+
+
+@pytest.mark.parametrize("failing", ["save", "put_file"])
+def test_a_full_disk_leaves_the_small_parts(out, monkeypatch, failing):
+    folder = open_folder(out, resume=True)
+    (group,) = folder.manifest.mergeable()
+
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(writer, failing, full)
+        with pytest.raises(WriteError, match="No space left"):
+            folder.merge(group, part_bytes(0, 100)[0])
+    folder.close("stopped")
+    assert len(names(out)) == 3
+    assert status(out, verify=True).rows_done == 100
+    merge(out).close("finished")
+    assert len(names(out)) == 1
+
+
+def test_verdicts_add_up(out):
+    expected = load(out).verdicts
+    folder = merge(out)
+    assert folder.manifest.verdicts == expected
+    assert next(folder.manifest.missing()) == (100, 200)
+    assert folder.manifest.rows == ROWS
+    folder.close("interrupted")
