@@ -1,8 +1,9 @@
 """Both crash tests against figures known beforehand, under both presets and each single reading.
 
-The figures were computed by another program: sums over N = 20 000 elements, 0.5 s, no stop at a limit of rotation. Half
-a unit of the last digit is allowed. Peak forces, and times of maxima, were read off at instants and are allowed a
-little more. The printed impact arm depends on N by its half element, 0.0006 deg on RWG between N = 20 000 and the limit.
+The figures were computed by another program: sums over N = 20 000 elements, 0.5 s, no stop at a limit of rotation.
+Half a unit of the last digit is allowed. Peak forces, and times of maxima, were read off at instants and are allowed a
+little more. The printed impact arm depends on N by its half element: on RWG by 0.0006 deg between N = 20 000 and the
+limit.
 """
 
 from typing import NamedTuple
