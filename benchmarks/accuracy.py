@@ -1,0 +1,171 @@
+"""Work and precision of the steps, with and without located events: what the named accuracies rest on.
+
+Run as ``python -m benchmarks.accuracy``. Every step simulates the same random designs; the errors are against a far
+finer step with the yield of the soil located, too. Rotations and displacements are compared where neither solution
+reached the limit of rotation; where only one of them did, the verdict is flipped, and counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from dataclasses import asdict, fields
+
+import numpy as np
+
+import boulder_kernels as bk
+from boulder_sweep.accuracy import STEPS_S
+
+from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, first, sample
+from .literal import literal_table
+from .points import LIMIT, Peaks, Point, observed_order, point_of
+from .report import FIGURES, Table, significant
+from .timing import machine, timed, versions
+
+STEPS_MS = (16.0, 14.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
+LITERAL_STEPS_MS = (16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
+LITERAL_DESIGNS = 1024
+"""They cost a hundred times as much."""
+SHOWN_MS = (16.0, 14.0, 12.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
+"""Steps in the tables; the data file has all."""
+REFERENCE_STEP_S = 5e-5
+PRESETS = {"corrected": bk.corrected(), "as_printed": bk.as_printed()}
+
+
+def control(step_s: float, *, error_estimate: bool = False, locate_yield: bool = False) -> bk.Control:
+    """How all ways here simulate: to the limit of rotation, the horizon or the proof that nothing grows."""
+    return bk.Control(step_s, HORIZON, ROTATION_LIMIT, 0, error_estimate, True, locate_yield)
+
+
+def reference_of(table: bk.DesignTable, readings: bk.Readings) -> bk.OutcomeTable:
+    """Solution that all others are compared with."""
+    return bk.simulate_table(table, readings, control(REFERENCE_STEP_S, locate_yield=True))
+
+
+def kernel_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable, repeats: int) -> list[Point]:
+    """Points of the kernels: plain, with error estimate, with located yield."""
+    readings, points = PRESETS[preset], []
+    ways = {
+        "events located": {},
+        "with error estimate": {"error_estimate": True},
+        "yield located, too": {"locate_yield": True},
+    }
+    for way, options in ways.items():
+        for step_ms in STEPS_MS:
+            how = control(1e-3 * step_ms, **options)
+            out, seconds = timed(lambda how=how: bk.simulate_table(table, readings, how), repeats)
+            point = point_of(preset, way, 1e-3 * step_ms, 1e6 * seconds / table.L.size, Peaks.of(out), Peaks.of(known))
+            if how.error_estimate:
+                both = (out.status != LIMIT) & (known.status != LIMIT)
+                covered = out.theta_error >= np.abs(out.theta_max - known.theta_max)
+                point.coverage = float(np.mean(covered[both]))
+            points.append(point)
+    return points
+
+
+def literal_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable) -> list[Point]:
+    """Points of the same method with the switches inside the right-hand side."""
+    readings, points = PRESETS[preset], []
+    literal_table(first(table, 1), readings, 1e-3, known.t_end, ROTATION_LIMIT)  # compiles
+    for step_ms in LITERAL_STEPS_MS:
+        (theta, x_b, x_v), seconds = timed(
+            lambda h=1e-3 * step_ms: literal_table(table, readings, h, known.t_end, ROTATION_LIMIT), 1
+        )
+        # A design that the reference stopped at the limit comes to it there only but for the error of either.
+        overturned = (known.status == LIMIT) & (theta > 0.99 * ROTATION_LIMIT) | (theta >= ROTATION_LIMIT)
+        found = Peaks(theta, x_b, x_v, overturned)
+        cpu_us = 1e6 * seconds / table.L.size
+        points.append(point_of(preset, "switches inside", 1e-3 * step_ms, cpu_us, found, Peaks.of(known)))
+    return points
+
+
+def measure(count: int = DESIGNS, repeats: int = 2) -> list[Point]:
+    """Measure all points of both presets."""
+    designs = sample(count)
+    points = []
+    for preset, readings in PRESETS.items():
+        known = reference_of(designs, readings)
+        points += kernel_points(designs, preset, known, repeats)
+        fewer = min(LITERAL_DESIGNS, count)
+        points += literal_points(first(designs, fewer), preset, bk.OutcomeTable(*(column[:fewer] for column in known)))
+    return points
+
+
+def tables(points: list[Point], count: int) -> list[Table]:
+    """Put the points into tables: one for each preset."""
+    conditions = (
+        f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {count} random designs, {HORIZON:g} s, limit 20 deg; "
+        f"errors against a step of {1e3 * REFERENCE_STEP_S:g} ms; CPU time of one thread; switches inside: "
+        f"{min(LITERAL_DESIGNS, count)} designs, told the time at which the reference ended"
+    )
+    steps_named = {round(1e3 * step, 6): name for name, step in STEPS_S.items()}
+    found = []
+    for preset in PRESETS:
+        table = Table(
+            f"accuracy-{preset}",
+            f"Work and precision, readings `{preset}`",
+            conditions,
+            [
+                "way",
+                "step",
+                "CPU time a design",
+                "rotation: max, 99 %, rms [deg]",
+                "displacement: max, 99 %, rms [mm]",
+                "verdicts flipped",
+            ],
+        )
+        for p in points:
+            if p.preset != preset or p.step_ms not in SHOWN_MS:
+                continue
+            name = steps_named.get(p.step_ms)
+            step = f"{p.step_ms:g} ms" + (f" (`{name}`)" if name and p.way == "events located" else "")
+            way = p.way if np.isnan(p.coverage) else f"{p.way}, covers {100 * p.coverage:.1f} %"
+            table.rows.append(
+                [
+                    way,
+                    step,
+                    f"{p.cpu_us:.2f} us",
+                    ", ".join(significant(v) for v in (p.theta_max_deg, p.theta_p99_deg, p.theta_rms_deg)),
+                    ", ".join(significant(v) for v in (p.x_max_mm, p.x_p99_mm, p.x_rms_mm)),
+                    str(p.flips),
+                ]
+            )
+        for way in ("events located", "yield located, too", "switches inside"):
+            these = [p for p in points if p.preset == preset and p.way == way]
+            order = observed_order(these, 8.0, 1.0)
+            table.notes.append(f"Observed order of the rms error from 8 to 1 ms, {way}: {order:.1f}.")
+        found.append(table)
+    return found
+
+
+def write(points: list[Point]) -> None:
+    """Leave the points as data and as figures."""
+    from .plots import plot_order, plot_steps
+
+    FIGURES.mkdir(exist_ok=True)
+    with (FIGURES / "accuracy.csv").open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, [field.name for field in fields(Point)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(
+            {name: f"{value:.5g}" if isinstance(value, float) else value for name, value in asdict(p).items()}
+            for p in points
+        )
+    plot_steps(points, FIGURES / "accuracy.png")
+    plot_order(points, FIGURES / "order.png")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__)
+    parser.add_argument("--designs", type=int, default=DESIGNS, help="size of the sample (default %(default)s)")
+    parser.add_argument("--repeats", type=int, default=2, help="repeats of a timed run (default %(default)s)")
+    parser.add_argument("--write", action="store_true", help="write data and figures into benchmarks/figures")
+    arguments = parser.parse_args()
+    points = measure(arguments.designs, arguments.repeats)
+    if arguments.write:
+        write(points)
+    for table in tables(points, arguments.designs):
+        print(table.markdown(), end="\n\n")
+
+
+if __name__ == "__main__":
+    main()

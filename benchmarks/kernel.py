@@ -1,0 +1,131 @@
+"""The kernels on one core: a right-hand side, a step, an event, a design, an element of the soil.
+
+Run as ``python -m benchmarks.kernel``. Every figure is CPU time of one thread, the loops timed in turn with the loop of
+nothing but multiply-adds that shows what the core can do at that moment.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+import boulder_kernels as bk
+from boulder_kernels import lanes
+from boulder_kernels.design import design_at
+from boulder_kernels.soil import Kinematics
+from boulder_kernels.table import empty_outcomes
+from boulder_kernels.workspace import LANES, SIZE
+
+from . import loops
+from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, sample
+from .flops import (
+    EVALUATIONS_PER_STEP,
+    assembly_of,
+    operations_in_machine_code,
+    operations_of_step,
+    packed_instructions,
+)
+from .peak import PeakLoop
+from .report import Table
+from .timing import interleaved, least_cpu_seconds, machine, median_ratio, versions
+
+ATTEMPTS = 20_000
+ELEMENTS = 5000
+SUMS = 2000
+CLOSED_FORMS = 400_000
+STEP_S = 0.014
+ROUNDS = 9
+
+
+def measure(rounds: int = ROUNDS) -> Table:
+    """Measure everything; takes about ten seconds once the kernels are compiled."""
+    designs = sample(DESIGNS)
+    control = bk.Control(STEP_S, HORIZON, ROTATION_LIMIT, 0, False)
+    readings = bk.corrected()
+    ws = loops.filled_workspace(designs, readings, control, 6)
+    lanes.attempt_steps(ws)
+    looked_at, scratch = ws.copy(), ws.copy()
+    peak = PeakLoop()
+    with_elements = bk.constants_of(design_at(designs, 0), readings, ELEMENTS)
+    closed = bk.constants_of(design_at(designs, 0), readings, 0)
+    lines = Kinematics(0.05, 0.03, 2.0, 0.5, 0.4, 1.5)
+    times = interleaved(
+        {
+            "peak": peak,
+            "attempt": lambda: loops.attempt_often(ws, ATTEMPTS),
+            "look": lambda: loops.look_often(scratch, looked_at, HORIZON, ATTEMPTS),
+            "copy": lambda: loops.copy_often(scratch, looked_at, ATTEMPTS),
+            "sums": lambda: loops.sum_elements_often(lines, with_elements, SUMS),
+            "closed": lambda: loops.integrate_often(lines, closed, CLOSED_FORMS),
+        },
+        rounds,
+    )
+    least = {name: min(values) for name, values in times.items()}
+    attempt_ns = 1e9 * least["attempt"] / (ATTEMPTS * LANES)
+    look_ns = 1e9 * (least["look"] - least["copy"]) / (ATTEMPTS * LANES)
+    evaluation_ns = attempt_ns / EVALUATIONS_PER_STEP
+    sum_ns = 1e9 * least["sums"] / (SUMS * ELEMENTS)
+    closed_ns = 1e9 * least["closed"] / CLOSED_FORMS
+
+    of_evaluation, of_step = operations_of_step()
+    assembly = assembly_of(lanes.attempt_steps, np.zeros(SIZE))
+    executed = operations_in_machine_code(assembly)
+    instructions = packed_instructions(assembly)
+    flops_attempted = executed.flops * ATTEMPTS * LANES
+    share = median_ratio(times["peak"], times["attempt"]) * flops_attempted / peak.flops
+    # A processor that could do nothing but this mix, one packed instruction in either unit and cycle, would reach:
+    mix = executed.flops / (2 * instructions)
+
+    out = empty_outcomes(DESIGNS)
+    attempts, in_use, attended = loops.count_attempts(designs, readings, control, out)
+    whole = least_cpu_seconds(lambda: lanes.simulate_lanes(designs, readings, control, out), 3)
+    started = 1e9 * whole / DESIGNS - attempts / DESIGNS * (attempt_ns + look_ns)
+    table = Table(
+        "kernel",
+        "Kernels on one core",
+        f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; corrected readings; CPU time of one thread, least of "
+        f"{rounds} rounds; designs: {DESIGNS} random ones, step {1e3 * STEP_S:g} ms, no error estimate",
+        ["what", "figure"],
+    )
+    table.rows = [
+        ["one evaluation of the right-hand side in lanes, its stage included", f"{evaluation_ns:.2f} ns"],
+        ["one attempted step of six evaluations", f"{attempt_ns:.1f} ns"],
+        ["looking at a step and taking it over", f"{look_ns:.1f} ns"],
+        [
+            "flops of a step in the machine code (in the formulas)",
+            f"{executed.flops} ({of_step.flops}), and {executed.least_or_most} minima and maxima",
+        ],
+        [
+            "flops of one evaluation in the formulas, without its stage",
+            f"{of_evaluation.flops}, {of_evaluation.divide} of them divisions",
+        ],
+        ["rate of the steps", f"{executed.flops / attempt_ns:.1f} GFLOP/s"],
+        ["most that a loop of fused multiply-adds reached", f"{1e-9 * peak.flops / least['peak']:.1f} GFLOP/s"],
+        ["share of that peak (median of the rounds)", f"{100 * share:.0f} %"],
+        ["most that this mix of instructions would allow", f"{100 * mix:.0f} % of the peak"],
+        ["attempted steps of a design (in lanes that held one)", f"{attempts / DESIGNS:.1f} ({in_use / attempts:.1%})"],
+        ["steps attended to one by one: events, peaks, the end", f"{attended / DESIGNS:.1f} a design"],
+        ["cost of one of these, starting designs included", f"{started * DESIGNS / attended:.0f} ns"],
+        ["a whole design", f"{1e6 * whole / DESIGNS:.2f} us"],
+        ["element sums", f"{sum_ns:.2f} ns an element, {1e-3 * sum_ns * ELEMENTS:.1f} us for N = {ELEMENTS}"],
+        ["closed form in their place, one by one", f"{closed_ns:.0f} ns"],
+    ]
+    peaks = sorted(1e-9 * peak.flops / seconds for seconds in times["peak"])
+    table.notes = [
+        f"{instructions} packed instructions make up a step, {executed.add + executed.multiply - instructions} of them "
+        "fused; the formulas count common terms each time they stand there, the machine code once.",
+        f"The multiply-add loop reached {peaks[0]:.0f} to {peaks[-1]:.0f} GFLOP/s in the {rounds} rounds. Where two of "
+        "the machine's cores are threads of one, it halves while the other is busy.",
+    ]
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.kernel", description=__doc__)
+    parser.add_argument("--rounds", type=int, default=ROUNDS, help="how often each loop is timed (default %(default)s)")
+    print(measure(parser.parse_args().rounds).markdown())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""The model with its switches inside the right-hand side, as a plain reading of the equations has it.
+
+This is what integrators without events get: contact, seat and the direction of the weight's couple are decided anew in
+every evaluation. The kernels do not do this (see `boulder_kernels.modes`); here it shows what that is worth, and serves
+the other solvers that the kernels are compared with.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from boulder_kernels import Constants, DesignTable, Readings
+from boulder_kernels.dense_output import dense_output
+from boulder_kernels.design import constants_of, design_at
+from boulder_kernels.dynamics import Acceleration, State
+from boulder_kernels.modes import Switches
+from boulder_kernels.outcomes import Maxima, no_maxima, updated_maxima
+from boulder_kernels.restoring import printed_restoring_moment
+from boulder_kernels.soil import soil_kinematics, soil_reaction
+from boulder_kernels.tableau import STAGES, A
+from boulder_kernels.trigonometry import sine_versine
+from boulder_kernels.vehicle import contact_displacement, contact_lever, spring_compression
+
+_compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+_A = np.array(A)
+
+
+@_compiled
+def literal_net_moment(
+    M: float, theta_b: float, omega_b: float, sin: float, versin: float, readings: Readings, c: Constants
+) -> float:
+    """Moment of soil, truck and weight [N m] (Eqs 37-39, or the couple of the weight)."""
+    if not readings.restoring_gravity:
+        return M + printed_restoring_moment(M, theta_b, omega_b, sin, versin, c)
+    if theta_b == 0.0 and omega_b == 0.0:
+        return M - min(max(M, -c.C_cos), c.C_cos)
+    direction = math.copysign(1.0, theta_b if theta_b != 0.0 else omega_b)
+    return M - direction * (c.C_cos - c.C_cos * versin + c.C_sin * abs(sin))
+
+
+@_compiled
+def literal_acceleration(y: State, readings: Readings, c: Constants) -> Acceleration:
+    """Right-hand side of Eq 52 with every switch inside."""
+    sin, versin = sine_versine(y.theta_b)
+    soil = soil_reaction(soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), c)
+    u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+    F_v = c.k_v * max(u, 0.0)
+    M = soil.M + F_v * contact_lever(sin, versin, c)
+    net = literal_net_moment(M, y.theta_b, y.omega_b, sin, versin, readings, c)
+    pressed = max(u, 0.0) if readings.separation_released else u
+    return Acceleration((soil.F + F_v) * c.inverse_m_eff, net * c.inverse_J_eff, -c.k_m * pressed, M)
+
+
+@_compiled
+def literal_step(y: State, k1: Acceleration, h: float, readings: Readings, c: Constants) -> tuple[State, Acceleration]:
+    """One step of Dormand and Prince with the switches inside."""
+    v = np.empty((STAGES, 3))
+    a = np.empty((STAGES, 3))
+    v[0, 0], v[0, 1], v[0, 2] = y.v_b, y.omega_b, y.v_v
+    a[0, 0], a[0, 1], a[0, 2] = k1.a_b, k1.alpha_b, k1.a_v
+    end, k = y, k1
+    for i in range(1, STAGES):
+        x = np.array((y.x_b, y.theta_b, y.x_v))
+        v[i] = v[0]
+        for j in range(i):
+            x += h * _A[i, j] * v[j]
+            v[i] += h * _A[i, j] * a[j]
+        end = State(x[0], v[i, 0], x[1], v[i, 1], x[2], v[i, 2])
+        k = literal_acceleration(end, readings, c)
+        a[i, 0], a[i, 1], a[i, 2] = k.a_b, k.alpha_b, k.a_v
+    return end, k
+
+
+@_compiled
+def literal_maxima(c: Constants, readings: Readings, h_full: float, t_end: float, theta_limit: float) -> Maxima:
+    """Simulate one impact by fixed steps [s] up to a time [s] or to the limit of rotation [rad]."""
+    y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
+    k = literal_acceleration(y, readings, c)
+    m = no_maxima()
+    contact = Switches(1.0, 0.0, 0.0, c.k_v, c.k_m)
+    t = 0.0
+    while t < t_end and m.theta < theta_limit:
+        h = min(h_full, t_end - t)
+        y_end, k_end = literal_step(y, k, h, readings, c)
+        m = updated_maxima(m, t, h, 1.0, y_end, dense_output(y, k, y_end, k_end, h), contact, c)
+        t = t + h if h == h_full else t_end
+        y, k = y_end, k_end
+    return m
+
+
+@_compiled
+def literal_table(
+    table: DesignTable, readings: Readings, h: float, t_end: np.ndarray, theta_limit: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Largest rotation [rad], displacement of the boulder and of the truck [m] of every design.
+
+    Parameters
+    ----------
+    table
+        Designs, SI, arrays of shape (n,).
+    readings
+        Which formulas are read as printed.
+    h
+        Step [s].
+    t_end
+        Time at which each design is known to have come to its end [s], shape (n,).
+    theta_limit
+        Rotation at which a simulation ends [rad].
+    """
+    n = table.L.size
+    theta, x_b, x_v = np.zeros(n), np.zeros(n), np.zeros(n)
+    for row in range(n):
+        m = literal_maxima(constants_of(design_at(table, row), readings, 0), readings, h, t_end[row], theta_limit)
+        theta[row], x_b[row], x_v[row] = m.theta, m.x_b, m.x_v
+    return theta, x_b, x_v

@@ -1,0 +1,89 @@
+"""Results as tables: printed, kept as JSON, and written into the README between its markers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+FOLDER = Path(__file__).parent
+FIGURES = FOLDER / "figures"
+README = FOLDER / "README.md"
+
+
+@dataclass
+class Table:
+    """One table of results.
+
+    Parameters
+    ----------
+    name
+        Of its place in the README.
+    title
+        What was measured.
+    conditions
+        Machine, versions, designs, what was counted.
+    header, rows
+        Text of the cells.
+    notes
+        What a reader must know to read it right.
+    """
+
+    name: str
+    title: str
+    conditions: str
+    header: list[str]
+    rows: list[list[str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def markdown(self) -> str:
+        """Return the table with title, conditions and notes."""
+        lines = [f"**{self.title}**", "", f"*{self.conditions}*", "", _row(self.header)]
+        lines.append("|" + "---|" * len(self.header))
+        lines += [_row(row) for row in self.rows]
+        if self.notes:
+            lines += [""] + [f"- {note}" for note in self.notes]
+        return "\n".join(lines)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def as_json(tables: Sequence[Table]) -> str:
+    """Return tables as JSON, for another process."""
+    return json.dumps([asdict(table) for table in tables])
+
+
+def from_json(text: str) -> list[Table]:
+    """Return the tables of `as_json`."""
+    return [Table(**table) for table in json.loads(text)]
+
+
+def write_between_markers(tables: Sequence[Table], readme: Path = README) -> None:
+    """Put each table between its markers in the README; the prose around them stays as it is.
+
+    Raises
+    ------
+    ValueError
+        The README has no place for a table.
+    """
+    text = readme.read_text()
+    for table in tables:
+        begin, end = f"<!-- begin {table.name} -->", f"<!-- end {table.name} -->"
+        if text.count(begin) != 1 or text.count(end) != 1:
+            raise ValueError(f"{readme.name} has no place for the table {table.name!r}: {begin} ... {end}")
+        before, rest = text.split(begin)
+        after = rest.split(end)[1]
+        text = f"{before}{begin}\n{table.markdown()}\n{end}{after}"
+    readme.write_text(text)
+
+
+def significant(value: float, digits: int = 2) -> str:
+    """Write a number with few significant digits, small and large ones with an exponent."""
+    if value == 0.0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e4:
+        return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+    return f"{value:.{digits - 1}e}"

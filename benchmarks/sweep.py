@@ -1,0 +1,235 @@
+"""Whole sweeps, from process start to finished table: throughput, what is not kernels, memory, start-up, scaling.
+
+Run as ``python -m benchmarks.sweep``. Every run is a process of its own. Wall time is what a user waits for, and is
+only worth something on a machine that does nothing else; CPU time and memory hold anywhere.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from .designs import API, API_ANGLES
+from .peak import PeakLoop
+from .report import Table
+from .timing import machine, versions
+
+SIZES = (10_000, 100_000, 1_000_000)
+LARGE = 10_000_000
+SCALING_ROWS = 1_000_000
+SETTINGS = """\
+name: benchmark
+boulder: {{length: {length}, width: {width}, height: {height}, density: 2650 kg/m^3}}
+site: {{embedment_ratio: {embedment}}}
+soil: {{density: {soil}, friction_angle: 40 deg, subgrade_reaction: {reaction}, strain_rate_factor: {rate}}}
+vehicle:
+  {{mass: 6800 kg, speed: 13.4 m/s, spring: 3103.3 kN/m, damper: 138.91 kN*s/m,
+    bumper_height: 0.5 m, hood_height: 1.4 m, bed_offset: 2.9 m}}
+criterion: {{max_rotation: 20 deg, rating: P1}}
+model: {{readings: corrected, soil: closed_form}}
+solver: {{accuracy: balanced, horizon: 1 s}}
+"""
+RANGES = {
+    "embedment": (0.35, 0.75, ""),
+    "height": (1.5, 4.0, " m"),
+    "width": (0.8, 2.5, " m"),
+    "reaction": (0.5 * (API[0] + API[1]), API[1], " MN/m^3"),
+    "length": (0.6, 2.0, " m"),
+    "soil": (1520.0, 2240.0, " kg/m^3"),
+    "rate": (1.0, 1.2, ""),
+}
+"""Axes in the order in which a larger grid takes them up; ten values each."""
+assert API_ANGLES[0] < 40.0 <= API_ANGLES[1], "the friction angle of the grid is on the API curve"
+
+
+def settings_of(rows: int) -> str:
+    """Return a settings file of a grid of a power of ten rows; all stiffnesses are from one family."""
+    axes = len(str(rows)) - 1
+    if rows != 10**axes or not 1 <= axes <= len(RANGES):
+        raise ValueError(f"a benchmark grid has 10 to 10^{len(RANGES)} rows, by powers of ten, not {rows}")
+    values = {}
+    for place, (name, (low, high, unit)) in enumerate(RANGES.items()):
+        if place < axes:
+            values[name] = f"{{from: {low}{unit}, to: {high}{unit}, count: 10}}"
+        else:
+            values[name] = f"{0.5 * (low + high)}{unit}"
+    return SETTINGS.format(**values)
+
+
+@dataclass
+class Run:
+    """What one process took."""
+
+    rows: int
+    wall_s: float
+    cpu_s: float
+    kernel_cpu_s: float
+    first_block_s: float
+    peak_bytes: int
+
+    @property
+    def beside_kernels(self) -> float:
+        """Share of the CPU time that was not spent in kernels."""
+        return 1.0 - self.kernel_cpu_s / self.cpu_s
+
+
+class Started:
+    """A sweep that is running in a process of its own."""
+
+    def __init__(self, rows: int, jobs: int, accuracy: str, folder: Path, cache: Path | None = None) -> None:
+        self.rows = rows
+        self._scratch = tempfile.TemporaryDirectory(dir=folder)
+        here = Path(self._scratch.name)
+        (here / "grid.yaml").write_text(settings_of(rows))
+        self._record = here / "record.json"
+        environment = os.environ | ({"BOULDER_SWEEP_CACHE_DIR": str(cache)} if cache else {})
+        self._begun = time.monotonic()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "benchmarks.sweep_child", repr(self._begun), str(self._record)]
+            + ["run", str(here / "grid.yaml"), "-o", str(here / "table")]
+            + ["--jobs", str(jobs), "--accuracy", accuracy, "--quiet", "--json"],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+        )
+
+    def finish(self) -> Run:
+        """Wait for its end.
+
+        Raises
+        ------
+        RuntimeError
+            The sweep failed.
+        """
+        _, status, used = os.wait4(self._process.pid, 0)
+        wall = time.monotonic() - self._begun
+        self._process.returncode = os.waitstatus_to_exitcode(status)
+        if self._process.returncode != 0:
+            raise RuntimeError(f"the sweep of {self.rows} rows ended with exit code {self._process.returncode}")
+        record = json.loads(self._record.read_text())
+        self._scratch.cleanup()
+        return Run(
+            self.rows,
+            wall,
+            used.ru_utime + used.ru_stime,
+            record["kernel_cpu_s"],
+            record["first_block_s"],
+            used.ru_maxrss * 1024,
+        )
+
+
+def peak_scaling(threads: int) -> float:
+    """Rate of several threads with the loop of nothing but multiply-adds, over that of one: what the machine allows."""
+    peak = PeakLoop()
+
+    def rate(count: int) -> float:
+        workers = [threading.Thread(target=lambda: [peak() for _ in range(30)]) for _ in range(count)]
+        begun = time.monotonic()
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        return count / (time.monotonic() - begun)
+
+    peak()
+    return rate(threads) / rate(1)
+
+
+def throughput(sizes: tuple[int, ...], folder: Path) -> Table:
+    """Sweeps of several sizes at two accuracies."""
+    table = Table(
+        "sweep",
+        "Whole sweeps, process start to finished table",
+        f"{machine()}; {versions('numba', 'numpy', 'pyarrow', 'joblib')}; `sweep run --jobs 2`, corrected readings, "
+        "warm cache of compiled kernels; balanced: an error estimate on every row, fast: none",
+        ["designs", "accuracy", "wall time", "designs/s", "CPU time a design", "not in kernels", "peak memory"],
+    )
+    for accuracy in ("balanced", "fast"):
+        for rows in sizes:
+            run = Started(rows, 2, accuracy, folder).finish()
+            table.rows.append(
+                [
+                    f"{rows:.0e}".replace("e+0", "e"),
+                    accuracy,
+                    f"{run.wall_s:.2f} s",
+                    f"{rows / run.wall_s:,.0f}",
+                    f"{1e6 * run.cpu_s / rows:.2f} us",
+                    f"{100 * run.beside_kernels:.0f} %",
+                    f"{run.peak_bytes / 1e6:.0f} MB",
+                ]
+            )
+    table.notes = [
+        "Designs that the truck passes over are in the grid, too; they cost nothing in the kernels.",
+        "Start-up, about a second of imports and loading, is in all figures.",
+    ]
+    return table
+
+
+def start_up(folder: Path) -> Table:
+    """Process start to the first block, without and with compiled kernels on the disk."""
+    cache = folder / "cache"
+    cold = Started(10_000, 2, "balanced", folder, cache).finish()
+    warm = min(
+        (Started(10_000, 2, "balanced", folder, cache).finish() for _ in range(3)), key=lambda r: r.first_block_s
+    )
+    table = Table(
+        "start",
+        "Start-up",
+        f"{machine()}; {versions('numba', 'pyarrow', 'pandas')}; `sweep run` of 10 000 designs; warm: least of three",
+        ["", "process start to first block", "CPU time of the process"],
+    )
+    for name, run in (("cold: kernels compiled", cold), ("warm: kernels from the disk", warm)):
+        table.rows.append([name, f"{run.first_block_s:.2f} s", f"{run.cpu_s:.2f} s"])
+    return table
+
+
+def scaling(folder: Path, rows: int = SCALING_ROWS) -> Table:
+    """One thread, two threads, and two processes that know nothing of each other."""
+    one = Started(rows, 1, "balanced", folder).finish()
+    two = Started(rows, 2, "balanced", folder).finish()
+    begun = time.monotonic()
+    both = [Started(rows, 1, "balanced", folder) for _ in range(2)]
+    for process in both:
+        process.finish()
+    apart = time.monotonic() - begun
+    table = Table(
+        "scaling",
+        "One core and two",
+        f"{machine()}; `sweep run` of {rows:.0e} designs, balanced; wall time, start-up included",
+        ["", "designs/s", "over one thread"],
+    )
+    rate = rows / one.wall_s
+    table.rows = [
+        ["one thread", f"{rate:,.0f}", "1"],
+        ["two threads", f"{rows / two.wall_s:,.0f}", f"{one.wall_s / two.wall_s:.2f}"],
+        ["two independent processes of one thread", f"{2 * rows / apart:,.0f}", f"{2 * one.wall_s / apart:.2f}"],
+        ["loop of multiply-adds in two threads: the machine's own limit", "", f"{peak_scaling(2):.2f}"],
+    ]
+    return table
+
+
+def measure(*, large: bool = False) -> list[Table]:
+    """Measure everything; about a minute, and another two with the large grid."""
+    sizes = (*SIZES, LARGE) if large else SIZES
+    with tempfile.TemporaryDirectory(prefix="sweep-benchmark-") as name:
+        folder = Path(name)
+        Started(100, 2, "balanced", folder).finish()  # compiles where the cache is cold
+        return [throughput(sizes, folder), start_up(folder), scaling(folder)]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.sweep", description=__doc__)
+    parser.add_argument("--large", action="store_true", help="a grid of 10^7 designs, too")
+    for table in measure(large=parser.parse_args().large):
+        print(table.markdown(), end="\n\n")
+
+
+if __name__ == "__main__":
+    main()

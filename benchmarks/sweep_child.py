@@ -1,0 +1,55 @@
+"""One ``sweep run`` in a process of its own, with a clock around the kernels.
+
+Run as ``python -m benchmarks.sweep_child BEGUN RECORD ARGUMENT...``: the arguments are those of ``sweep``, BEGUN is the
+monotonic time at which the process was started, and RECORD the file that takes the measurements.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+
+class KernelClock:
+    """Stands in for `simulate_table` and takes the CPU time of every call."""
+
+    def __init__(self, simulate: Any) -> None:
+        self._simulate = simulate
+        self._busy = threading.Lock()
+        self.seconds = 0.0
+        self.first_block: float | None = None
+        """When the first block of the run proper was ready, monotonic [s]; samples are not blocks."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Simulate."""
+        begun = time.thread_time()
+        result = self._simulate(*arguments)
+        spent = time.thread_time() - begun
+        with self._busy:
+            self.seconds += spent
+            if self.first_block is None and threading.current_thread() is not threading.main_thread():
+                self.first_block = time.monotonic()
+        return result
+
+
+def main() -> None:
+    begun, record = float(sys.argv[1]), Path(sys.argv[2])
+    from boulder_sweep import cli, evaluation
+
+    clock = KernelClock(evaluation.simulate_table)
+    vars(evaluation)["simulate_table"] = clock
+    try:
+        code = cli.main(sys.argv[3:])
+    except SystemExit as end:
+        code = end.code
+    first = None if clock.first_block is None else clock.first_block - begun
+    record.write_text(json.dumps({"kernel_cpu_s": clock.seconds, "first_block_s": first}))
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

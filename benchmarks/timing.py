@@ -1,0 +1,97 @@
+"""CPU time of a piece of work, the machine it was taken on, and versions.
+
+CPU time and not wall time, because others may use the machine; the least of several repeats, because whatever
+disturbs a measurement makes it longer.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from statistics import median
+from typing import TypeVar
+
+Result = TypeVar("Result")
+REPEATS = 5
+
+
+def cpu_seconds(work: Callable[[], object]) -> float:
+    """CPU time of all threads of this process while some work is done once [s]."""
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
+
+
+def timed(work: Callable[[], Result], repeats: int) -> tuple[Result, float]:
+    """Do some compiled work several times; return its result and the least CPU time [s]."""
+    best, result = float("inf"), None
+    for _ in range(repeats):
+        begun = time.process_time()
+        result = work()
+        best = min(best, time.process_time() - begun)
+    assert result is not None, "there must be one repeat at least"
+    return result, best
+
+
+def least_cpu_seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Least CPU time of several repeats, after one that is not counted (it may have to compile) [s]."""
+    work()
+    return min(cpu_seconds(work) for _ in range(repeats))
+
+
+def interleaved(works: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
+    """CPU times of several pieces of work, done in turn so that a change of the clock meets all of them [s].
+
+    Parameters
+    ----------
+    works
+        What to do, by name; each is done once before, uncounted.
+    rounds
+        How often each is done.
+    """
+    for work in works.values():
+        work()
+    times: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(rounds):
+        for name, work in works.items():
+            times[name].append(cpu_seconds(work))
+    return times
+
+
+def median_ratio(times: list[float], others: list[float]) -> float:
+    """Median of the ratios of times that were taken in turn."""
+    return median(a / b for a, b in zip(times, others, strict=True))
+
+
+def processor() -> str:
+    """Name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def machine() -> str:
+    """Processor, cores and width of its vectors, in one line."""
+    import llvmlite.binding
+
+    features = llvmlite.binding.get_host_cpu_features()
+    vectors = next((name for name in ("avx512f", "avx2", "sse2") if features.get(name)), "no known vectors")
+    return f"{processor()} ({llvmlite.binding.get_host_cpu_name()}, {vectors}), {os.cpu_count()} cores"
+
+
+def versions(*packages: str) -> str:
+    """Python and packages with their versions, in one line."""
+    found = [f"Python {platform.python_version()}"]
+    for package in packages:
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            found.append(f"{package} not installed")
+    return ", ".join(found)
