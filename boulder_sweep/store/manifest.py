@@ -226,6 +226,11 @@ def load(folder: Path) -> Manifest:
     content = json.loads(text)
     if content.pop("format") != _FORMAT:
         raise DamagedError(f"{path} was written by another version of boulder-sweep")
+    return _from_json(content)
+
+
+def _from_json(content: dict[str, Any]) -> Manifest:
+    """Rebuild a manifest from its JSON."""
     content["parts"] = {name: Part(**record) for name, record in content["parts"].items()}
     content["sessions"] = [Session(**record) for record in content["sessions"]]
     if content["merge"] is not None:
