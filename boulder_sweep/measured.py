@@ -11,6 +11,7 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
@@ -229,7 +230,7 @@ def _number(cell: str, column: _Column, place: Place, problems: ProblemList) -> 
         number, unit = split_number(cell, "1")
         message = f"'{shorten(cell)}' has a unit; the column has one in its name" if unit else ""
     except NumberError as error:
-        number, message = 0, str(error)
+        number, message = Fraction(0), str(error)
     if message:
         problems.add(place, column.signal.name, message)
     return float(number) * column.factor

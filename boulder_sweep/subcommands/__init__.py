@@ -2,6 +2,7 @@
 
 from boulder_sweep.subcommands.fit_vehicle import fit_vehicle
 from boulder_sweep.subcommands.plot import plot
+from boulder_sweep.subcommands.validate import validate
 
-COMMANDS = (plot, fit_vehicle)
+COMMANDS = (plot, validate, fit_vehicle)
 """In the order of ``sweep --help``."""

@@ -1,0 +1,226 @@
+"""What the paper's figures show of the simulated side, redrawn; and everything that `validate` found, as files."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_sweep.comparison import simulated_signal
+from boulder_sweep.crash_tests import NAMES
+
+from . import figures
+from .figures import BLACK, BLUE, GREY, ORANGE, PictureError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+
+    from boulder_sweep.measured import TimeHistory
+    from boulder_sweep.rigid_wall import RigidWall
+    from boulder_sweep.studies.convergence import Convergence
+    from boulder_sweep.trajectory import Trajectory
+    from boulder_sweep.validation import Validation
+
+STYLES: dict[str, dict[str, Any]] = {
+    "corrected": {"color": BLUE},
+    "as_printed": {"color": ORANGE, "linestyle": "--"},
+}
+SIGNALS = (
+    ("boulder_displacement", "Displacement of the boulder's centre", "displacement [m]"),
+    ("rotation", "Rotation of the boulder", "rotation [deg]"),
+    ("vehicle_displacement", "Displacement of the vehicle", "displacement [m]"),
+)
+FIGURES = {"abg": ("12 to 14", "figures_12_to_14_abg.png"), "rwg": ("16 to 18", "figures_16_to_18_rwg.png")}
+CLOSE_UNTIL_S = 0.1
+
+
+def write_validation(found: Validation, folder: Path) -> list[Path]:
+    """Write pictures and Parquet files.
+
+    Parameters
+    ----------
+    found
+        What `validate` found.
+    folder
+        Where to; made if it does not exist.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    PictureError
+        The folder cannot be made or written, or matplotlib is not installed.
+    """
+    figures.require_matplotlib()
+    make_folder(folder)
+    written = [folder / "figure_10_rigid_wall.png"]
+    draw_rigid_wall(found.wall, written[0])
+    for test, (_, name) in FIGURES.items():
+        own = {preset: t for (t_name, preset), t in found.trajectories.items() if t_name == test}
+        draw_crash_test(test, own, folder / name)
+        written.append(folder / name)
+    draw_convergence(found.convergence, folder / "convergence.png")
+    written.append(folder / "convergence.png")
+    return [*written, *_write_tables(found, folder)]
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for pictures."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise PictureError(f"{folder} cannot be made: {problem.strerror or problem}") from problem
+
+
+def draw_crash_test(
+    test: str, trajectories: Mapping[str, Trajectory], path: Path, measured: TimeHistory | None = None
+) -> None:
+    """Draw one test under its presets: displacement of the boulder's own centre, rotation, vehicle.
+
+    Parameters
+    ----------
+    test
+        ``abg``, ``rwg``, or the name of another test.
+    trajectories
+        By preset.
+    path
+        Picture to write.
+    measured
+        Test data to lay over it.
+    """
+    names = [name for name, _, _ in SIGNALS] if measured is None else list(measured.signals)
+    with figures.figure(path, 3.6 * len(names), 3.6) as fig:
+        row = fig.subplots(1, len(names), squeeze=False)[0]
+        for axes, name in zip(row, names, strict=True):
+            _signal(axes, name, trajectories, measured)
+        handles, labels = row[0].get_legend_handles_labels()
+        fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        title = NAMES.get(test, test) + (
+            f" (Figures {FIGURES[test][0]})" if test in FIGURES and measured is None else ""
+        )
+        words = ", ".join(f"{t.verdict} ({preset.replace('_', ' ')})" for preset, t in trajectories.items())
+        fig.suptitle(f"{title}: {words}", x=0.01, ha="left", fontsize=11.0, fontweight="bold")
+
+
+def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory | None) -> None:
+    """Draw one signal under all presets."""
+    title, label = next((title, label) for signal, title, label in SIGNALS if signal == name)
+    for preset, trajectory in trajectories.items():
+        style = STYLES.get(preset, {"color": BLACK})
+        words = f"simulated, {preset.replace('_', ' ')}"
+        axes.plot(trajectory.time_s, simulated_signal(trajectory, name), label=words, **style)
+        when = trajectory.motion.outcome.t_limit
+        if math.isfinite(when):
+            value = float(np.interp(when, trajectory.time_s, simulated_signal(trajectory, name)))
+            axes.plot([when], [value], "o", color=style["color"], markersize=5.0)
+    if measured is not None:
+        axes.plot(measured.time_s, measured.signals[name], ".", color=GREY, markersize=3.5, label="measured")
+    end = max(float(trajectory.time_s[-1]) for trajectory in trajectories.values())
+    axes.set_xlim(0.0, end)
+    axes.set_title(title)
+    axes.set_ylabel(label)
+    axes.set_xlabel("time since first touch [s]")
+    overturned = any(math.isfinite(t.motion.outcome.t_limit) for t in trajectories.values())
+    if overturned:
+        axes.axvspan(CLOSE_UNTIL_S, end, color="#F4F0EC", zorder=-2, linewidth=0)
+        words = "dots: 20° passed\nshaded: after 0.1 s, where the\npaper sees test and model part"
+        if name == SIGNALS[0][0]:
+            axes.annotate(words, (0.97, 0.05), xycoords="axes fraction", ha="right", fontsize=7.5, color=GREY)
+    if name == "rotation":
+        limit = math.degrees(next(iter(trajectories.values())).motion.control.theta_limit)
+        axes.axhline(limit, color=BLACK, linewidth=0.9, linestyle=":")
+        axes.annotate(f"{limit:g}°", (end, limit), xytext=(-4, 2), textcoords="offset points", ha="right", fontsize=8.5)
+
+
+def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
+    """Draw the paper's truck against a rigid wall, what Figure 10 shows of the Maxwell element."""
+    time = np.linspace(0.0, 0.2, 401)
+    x, v, acceleration = wall.response(time)
+    with figures.figure(path, 9.6, 3.3) as fig:
+        row = fig.subplots(1, 3)
+        curves = (
+            (x, "Displacement", "displacement [m]", wall.max_displacement_time_s, wall.max_displacement_m, "{:.3f} m"),
+            (v, "Velocity", "velocity [m/s]", wall.separation_time_s, wall.rebound_speed_m_s, "{:.2f} m/s"),
+            (
+                -wall.mass_kg * acceleration / 1e3,
+                "Force on the wall",
+                "force [kN]",
+                wall.peak_force_time_s,
+                wall.peak_force / 1e3,
+                "{:.0f} kN",
+            ),
+        )
+        for axes, (values, title, label, when, peak, words) in zip(row, curves, strict=True):
+            axes.plot(time, values, color=BLUE)
+            axes.set_xlim(0.0, time[-1])
+            axes.set_title(title)
+            axes.set_ylabel(label)
+            axes.set_xlabel("time since first touch [s]")
+            bottom, top = axes.get_ylim()
+            axes.set_ylim(bottom - (0.06 * (top - bottom) if peak < 0.0 else 0.0), top + 0.08 * (top - bottom))
+            figures.mark_peak(axes, when, peak, words.format(peak).replace("-", "−"), BLUE, below=peak < 0.0)
+        fig.suptitle(
+            f"Rigid wall (Figure 10): {wall.mass_kg:.0f} kg at {wall.speed_m_s:g} m/s, Maxwell element of the paper",
+            x=0.01,
+            ha="left",
+            fontsize=11.0,
+            fontweight="bold",
+        )
+
+
+def draw_convergence(study: Convergence, path: Path) -> None:
+    """Draw how element sums approach the closed form."""
+    with figures.figure(path, 6.4, 4.0) as fig:
+        axes = fig.subplots()
+        for preset, style in STYLES.items():
+            n = np.array([n for n in study.elements if study.difference("rwg", preset, n) != 0.0])
+            gap = [abs(study.difference("rwg", preset, int(count))) for count in n]
+            order = study.order("rwg", preset)
+            words = f"{preset.replace('_', ' ')}: order {order:.1f}"
+            axes.loglog(n, gap, marker="o", markersize=4.5, label=words, **style)
+        axes.axvline(5000, color=GREY, linewidth=0.9, linestyle=":")
+        axes.annotate("N of the paper", (5000, axes.get_ylim()[1]), fontsize=8.5, color=GREY, ha="right", va="top")
+        axes.set_xlabel("number N of soil elements")
+        axes.set_ylabel("|largest rotation − closed form| [deg]")
+        axes.set_title("Rockville White Granite: element sums against N → ∞")
+        axes.legend()
+
+
+def draw_overlay(test: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory, path: Path) -> None:
+    """Draw a user's own test data over the simulation."""
+    draw_crash_test(test, trajectories, path, measured)
+
+
+def _write_tables(found: Validation, folder: Path) -> list[Path]:
+    """Write figures, statements, convergence and time histories to Parquet files."""
+    import pandas as pd
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    content = found.to_dict()
+    flat = [{k: v for k, v in row.items() if k != "readings"} for row in content["crash_tests"]]
+    frames = {
+        "crash_tests.parquet": pd.DataFrame(flat),
+        "statements.parquet": pd.DataFrame(content["statements"]),
+        "convergence.parquet": pd.DataFrame(content["convergence"]["elements"]).astype({"soil_elements": str}),
+    }
+    written = []
+    for name, frame in frames.items():
+        frame.to_parquet(folder / name)
+        written.append(folder / name)
+    parts = []
+    for (test, preset), trajectory in found.trajectories.items():
+        part = trajectory.to_arrow(energy=True).replace_schema_metadata(None)
+        for column, text in (("preset", preset), ("test", test)):
+            words = pa.array([text] * len(part)).dictionary_encode()
+            part = part.add_column(0, pa.field(column, words.type, metadata={"unit": ""}), words)
+        parts.append(part)
+    pq.write_table(pa.concat_tables(parts).unify_dictionaries(), folder / "trajectories.parquet", compression="zstd")
+    return [*written, folder / "trajectories.parquet"]
