@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from boulder_sweep.columns import BY_NAME
 
 from .errors import DamagedError
+from .manifest import load
 from .verify import load_checked
 
 if TYPE_CHECKING:
@@ -56,6 +57,37 @@ def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool 
 def read_table(folder: Path, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
     """Read the finished parts of a folder as one Arrow table; otherwise as `read`."""
     return _read(folder, columns, verify)[0]
+
+
+def read_row(folder: Path, design_id: int) -> pa.Table:
+    """Read one row of a result, from the one part that holds it.
+
+    Raises
+    ------
+    IndexError
+        The table has no such row, or not yet.
+    DamagedError
+        The part is gone, truncated or changed.
+    """
+    import pyarrow as pa  # heavy, and only readers need it
+    import pyarrow.parquet as pq
+
+    from .verify import wrong_content
+
+    manifest = load(folder)
+    if not 0 <= design_id < manifest.rows:
+        raise IndexError(f"{folder} holds {manifest.rows:,} designs, numbered from 0; there is no {design_id}")
+    for name, part in manifest.parts.items():
+        if part.first <= design_id < part.first + part.rows:
+            damage = wrong_content(folder / name, part)
+            if damage:
+                raise DamagedError(_damage_text(folder, {name: damage}))
+            try:
+                rows = pq.read_table(folder / name, page_checksum_verification=True)
+            except (OSError, pa.ArrowException) as problem:
+                raise DamagedError(_damage_text(folder, {name: str(problem)})) from problem
+            return rows.slice(design_id - part.first, 1)
+    raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` says how to go on")
 
 
 def _read(folder: Path, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, int]:
