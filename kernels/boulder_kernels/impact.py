@@ -28,7 +28,7 @@ from .events import (
 from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, Outcome, Status, no_maxima, undefined_maxima, updated_maxima
 from .readings import Readings
-from .settling import NO_PROOF, barrier_energy, boulder_energy, proof_is_possible
+from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible
 from .stability import shortened_step
 
 FULL_TURN = math.pi
@@ -292,7 +292,7 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
         if seeking_proof and y_end.v_v <= 0.0 and t < control.horizon:
             if turned_back(y, y_end):
                 barrier = barrier_energy(m, c)
-            if boulder_energy(y_end, c) < barrier:
+            if inside_maxima(y_end, m) and boulder_energy(y_end, c) < barrier:
                 return Outcome(Status.SETTLED.value, m, t_limit, t, attempts)
         y = y_end
         if event >= 0:

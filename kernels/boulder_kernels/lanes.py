@@ -31,7 +31,7 @@ from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, OutcomeTable, Status, compression_rate, no_maxima
 from .readings import Readings
 from .restoring import signed_arm
-from .settling import NO_PROOF, barrier_energy, boulder_energy, proof_is_possible
+from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible
 from .soil import soil_kinematics
 from .stability import shortened_step
 from .trigonometry import sine_versine
@@ -234,7 +234,7 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
     if proof_is_possible(readings) and y.v_v <= 0.0:
         if turned_back(y_start, y):
             put(ws, BARRIER, 0, lane, barrier_energy(m, c))
-        if boulder_energy(y, c) < field(ws, BARRIER, 0, lane):
+        if inside_maxima(y, m) and boulder_energy(y, c) < field(ws, BARRIER, 0, lane):
             return Status.SETTLED.value
     k1 = k_end
     if event >= 0:

@@ -24,7 +24,7 @@ from .soil import Potential, soil_kinematics, soil_potential
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, spring_compression
 
-NO_PROOF = -1.0
+NO_PROOF = -1e300
 """Barrier of a motion that nothing has been proved of: no energy is below it."""
 PLACING_STEPS = 6
 """Steps of the root finder that places a tangent."""
@@ -141,6 +141,12 @@ def barrier_energy(m: Maxima, c: Constants) -> float:
     if to_turn <= 0.0:
         return NO_PROOF
     return CAUTION * min(to_turn, energy_to_move(m.x_b, m.theta, c), to_press)
+
+
+@inlined
+def inside_maxima(y: State, m: Maxima) -> bool:
+    """Whether a state lies within the maxima so far; at one of them, a barrier taken earlier may lie behind it."""
+    return abs(y.theta_b) < m.theta and y.x_b < m.x_b
 
 
 @inlined
