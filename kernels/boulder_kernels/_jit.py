@@ -124,6 +124,15 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compiled(function, {"contract", "nsz"}, inline=True)
 
 
+def exact_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile as `kernel` does, without fused multiply-add: every operation rounds by itself.
+
+    For what is worked out once per design. Of a b + c d either product may be fused, and the compiler chooses anew
+    wherever it puts the code in; rounded one by one, the bits are the same everywhere.
+    """
+    return _compiled(function, {"nsz"})
+
+
 def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile as `kernel` does, and let sums be reordered so that one long sum is vectorised.
 

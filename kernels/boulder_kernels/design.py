@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import exact_kernel
 from .readings import Readings
 
 G = 9.80665
@@ -73,7 +73,7 @@ class DesignTable(NamedTuple):
     e_bumper: np.ndarray
 
 
-@kernel
+@exact_kernel
 def design_at(table: DesignTable, row: int) -> Design:
     """Return one row of a table as a `Design`."""
     return Design(
@@ -146,19 +146,19 @@ class Constants(NamedTuple):
     """Angle beyond which sin(gamma_N + theta_b) < 0 [rad]; infinite where no reading asks for it."""
 
 
-@kernel
+@exact_kernel
 def shear_wedge_angle(phi: float) -> float:
     """Angle theta_w of the wedge of soil that moves with the boulder [rad] (Eq 1)."""
     return 0.25 * math.pi + 0.5 * phi
 
 
-@kernel
+@exact_kernel
 def element_depth(n: int, d: float, elements: int) -> float:
     """Depth alpha_n of the middle of element n = 1 ... N below the soil line [m] (Eq 24)."""
     return (n - 0.5) * d / elements
 
 
-@kernel
+@exact_kernel
 def element_mass(n: int, design: Design, elements: int) -> float:
     """Mass m_n of soil element n = 1 ... N [kg] (Eq 2)."""
     h_e = design.d / elements
@@ -171,19 +171,19 @@ def element_mass(n: int, design: Design, elements: int) -> float:
     )
 
 
-@kernel
+@exact_kernel
 def impact_height(H: float, d: float, e_bumper: float, e_hood: float) -> float:
     """Height e of the blow over the soil line [m] (Eq 9), halfway up the face that truck and boulder share."""
     return 0.5 * (min(H - d, e_hood) + e_bumper)
 
 
-@kernel
+@exact_kernel
 def boulder_mass(design: Design) -> float:
     """Mass m_b of the boulder [kg] (Eq 15)."""
     return design.rho_b * design.L * design.W * design.H
 
 
-@kernel
+@exact_kernel
 def boulder_inertia(design: Design, m_b: float, c_x: float, c_y: float, box: bool) -> float:
     """Moment of inertia J_b of the boulder about the common centre of mass [kg m^2] (Eq 16).
 
@@ -208,7 +208,7 @@ class SoilMass(NamedTuple):
     """Sum of m_n times height over the base, squared [kg m^2] (for Eq 13)."""
 
 
-@kernel
+@exact_kernel
 def soil_mass(design: Design, elements: int) -> SoilMass:
     """Sums of Eqs 3, 4 and 13 over the soil elements, or their limits for N -> infinity.
 
@@ -233,25 +233,25 @@ def soil_mass(design: Design, elements: int) -> SoilMass:
     return SoilMass(mass, first, second)
 
 
-@kernel
+@exact_kernel
 def passive_pressure_coefficient(phi: float) -> float:
     """Rankine coefficient of passive earth pressure K_p [-] (with Eq 27)."""
     return math.tan(0.25 * math.pi + 0.5 * phi) ** 2
 
 
-@kernel
+@exact_kernel
 def ultimate_pressure(alpha: float, phi: float, rho_s: float, K_epsilon: float) -> float:
     """Ultimate lateral pressure sigma of the soil at depth alpha [Pa] (Eq 27)."""
     return passive_pressure_coefficient(phi) ** 2 * rho_s * G * alpha * K_epsilon
 
 
-@kernel
+@exact_kernel
 def compression_wedge_length(d: float, phi: float) -> float:
     """Length L_soil,c of the wedge of soil that is compressed [m] (Eq 25)."""
     return d / math.tan(phi)
 
 
-@kernel
+@exact_kernel
 def spring_per_depth(design: Design) -> float:
     """Spring of a soil element of unit height per metre of its depth [N/m^3] (Eqs 24, 25).
 
@@ -260,7 +260,7 @@ def spring_per_depth(design: Design) -> float:
     return 1e6 * design.beta * design.W / compression_wedge_length(design.d, design.phi)
 
 
-@kernel
+@exact_kernel
 def yield_displacement(design: Design) -> float:
     """Displacement at which a soil element reaches its ultimate resistance [m] (Eqs 26-28).
 
@@ -270,7 +270,7 @@ def yield_displacement(design: Design) -> float:
     return per_depth / spring_per_depth(design)
 
 
-@kernel
+@exact_kernel
 def constants_of(design: Design, readings: Readings, elements: int) -> Constants:
     """Constants of the motion of one design (Eqs 1-16, 24-28).
 
@@ -335,7 +335,7 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
     )
 
 
-@kernel
+@exact_kernel
 def is_computable(c: Constants) -> bool:
     """Whether every constant is finite and every mass, stiffness and length that divides is positive."""
     positive = (
