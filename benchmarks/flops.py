@@ -153,7 +153,7 @@ def _count() -> tuple[Operations, Operations]:
     return counts[0], counts[1]
 
 
-_PACKED = re.compile(r"\bv(fn?m(?:add|sub)\w*|add|sub|mul|div|min|max)pd\s+(.*)")
+_PACKED = re.compile(r"\bv?(fn?m(?:add|sub)\w*|add|sub|mul|div|min|max)pd\s+(.*)")
 
 
 def operations_in_machine_code(assembly: str) -> Operations:

@@ -115,8 +115,7 @@ def measure(rounds: int = ROUNDS) -> Table:
     table.notes = [
         f"{instructions} packed instructions make up a step, {executed.add + executed.multiply - instructions} of them "
         "fused; the formulas count common terms each time they stand there, the machine code once.",
-        f"The multiply-add loop reached {peaks[0]:.0f} to {peaks[-1]:.0f} GFLOP/s in the {rounds} rounds. Where two of "
-        "the machine's cores are threads of one, it halves while the other is busy.",
+        f"The multiply-add loop reached {peaks[0]:.0f} to {peaks[-1]:.0f} GFLOP/s in the {rounds} rounds.",
     ]
     return table
 

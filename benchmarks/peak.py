@@ -72,17 +72,18 @@ class PeakLoop:
         build = llvmlite.ir.IRBuilder(loop)
         turn = build.phi(index)
         turn.add_incoming(index(0), entry)
-        accumulators = [build.phi(vector) for _ in range(ACCUMULATORS)]
-        for number_of, accumulator in enumerate(accumulators):
-            accumulator.add_incoming(vector([0.1 * number_of] * self.width), entry)
-            accumulator.add_incoming(build.call(fma, [accumulator, factor, factor]), loop)
+        before = [build.phi(vector) for _ in range(ACCUMULATORS)]
+        after = [build.call(fma, [accumulator, factor, factor]) for accumulator in before]
+        for chain in range(ACCUMULATORS):
+            before[chain].add_incoming(vector([0.1 * chain] * self.width), entry)
+            before[chain].add_incoming(after[chain], loop)
         following = build.add(turn, index(1))
         turn.add_incoming(following, loop)
         build.cbranch(build.icmp_signed("<", following, function.args[0]), loop, done)
 
         build = llvmlite.ir.IRBuilder(done)
         total = llvmlite.ir.Constant(number, 0.0)
-        for accumulator in accumulators:
+        for accumulator in after:
             for place in range(self.width):
                 total = build.fadd(total, build.extract_element(accumulator, index(place)))
         build.ret(build.fdiv(total, llvmlite.ir.Constant(number, float(ACCUMULATORS * self.width))))

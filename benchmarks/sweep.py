@@ -93,9 +93,11 @@ class Started:
         environment = os.environ | ({"BOULDER_SWEEP_CACHE_DIR": str(cache)} if cache else {})
         self._begun = time.monotonic()
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.sweep_child", repr(self._begun), str(self._record)]
-            + ["run", str(here / "grid.yaml"), "-o", str(here / "table")]
-            + ["--jobs", str(jobs), "--accuracy", accuracy, "--quiet", "--json"],
+            [
+                *(sys.executable, "-m", "benchmarks.sweep_child", repr(self._begun), str(self._record)),
+                *("run", str(here / "grid.yaml"), "-o", str(here / "table")),
+                *("--jobs", str(jobs), "--accuracy", accuracy, "--quiet", "--json"),
+            ],
             env=environment,
             stdout=subprocess.DEVNULL,
         )

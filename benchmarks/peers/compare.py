@@ -1,0 +1,128 @@
+"""Bring every solver to the same accuracy, and time it there."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import boulder_kernels as bk
+
+from ..designs import HORIZON, ROTATION_LIMIT
+from ..timing import timed
+from .problem import READINGS, Problem, Solver, peaks
+
+ACCURACY_DEG = 0.01
+"""Largest error of the largest rotation at which all are compared."""
+KERNEL_STEPS_S = (0.016, 0.014, 0.012, 0.010, 0.008, 0.006, 0.004, 0.002, 0.001)
+LONGEST_S = 20.0
+"""A solver that takes longer than this for one tolerance is not tried at a finer one."""
+MODULES = {
+    "scipy_solvers": "scipy",
+    "numbalsoda_solvers": "numbalsoda",
+    "diffrax_solvers": "diffrax",
+    "heyoka_solvers": "heyoka",
+}
+"""Modules of solvers, with the package each needs."""
+
+
+@dataclass
+class Measured:
+    """One solver at several tolerances.
+
+    Parameters
+    ----------
+    name
+        Of the solver.
+    designs
+        How many designs it solved.
+    points
+        Tolerance, CPU time of a design [s], largest error [deg]; in the order tried.
+    problem
+        Why there is no more; empty where there is nothing to say.
+    """
+
+    name: str
+    designs: int
+    points: list[tuple[float, float, float]] = field(default_factory=list)
+    problem: str = ""
+
+    @property
+    def chosen(self) -> tuple[float, float, float] | None:
+        """The loosest tolerance from which on every finer one that was tried is accurate enough, too."""
+        best = None
+        for point in reversed(self.points):
+            if point[2] > ACCURACY_DEG:
+                break
+            best = point
+        return best
+
+
+def measure_kernels(problem: Problem) -> Measured:
+    """The lanes of this project; their sample is the whole problem."""
+    measured = Measured("boulder-sweep, lanes", problem.size)
+    bk.simulate_table(problem.designs, READINGS, bk.Control(0.01, HORIZON, ROTATION_LIMIT, 0, False))
+    for step in KERNEL_STEPS_S:
+        control = bk.Control(step, HORIZON, ROTATION_LIMIT, 0, False)
+        out, seconds = timed(lambda control=control: bk.simulate_table(problem.designs, READINGS, control), 5)
+        # A design that only one of two solutions stops at the limit has an error of its own: its distance to it.
+        measured.points.append((step, seconds / problem.size, problem.largest_error_deg(out.theta_max)))
+    return measured
+
+
+def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measured:
+    """Tighten the tolerance until the solver is accurate enough, and a little further.
+
+    Parameters
+    ----------
+    solver
+        Which.
+    problem
+        At least as many designs as it wants.
+    finer
+        How many tolerances more, to see that the accuracy stays.
+    """
+    own = problem.first(min(solver.designs, problem.size))
+    measured = Measured(solver.name, own.size)
+    solve = solver.prepare(own)
+    solve(solver.tolerances[0])
+    enough = 0
+    for tolerance in solver.tolerances:
+        begun = time.process_time()
+        states = solve(tolerance)
+        seconds = time.process_time() - begun
+        error = own.largest_error_deg(peaks(own, states))
+        measured.points.append((tolerance, seconds / own.size, error))
+        enough = enough + 1 if error <= ACCURACY_DEG else 0
+        if enough > finer:
+            break
+        if seconds > LONGEST_S:
+            measured.problem = f"finer tolerances were not tried: this one took {seconds:.0f} s"
+            break
+    return measured
+
+
+def measure_all(problem: Problem) -> tuple[list[Measured], list[str]]:
+    """Measure the kernels and every solver that is installed.
+
+    Returns
+    -------
+    measured, missing
+        The solvers, this project's lanes first; packages that could not be imported, with the reason.
+    """
+    measured, missing = [measure_kernels(problem)], []
+    for module, package in MODULES.items():
+        try:
+            solvers = importlib.import_module(f"benchmarks.peers.{module}").SOLVERS
+        except (ImportError, OSError) as reason:
+            missing.append(f"{package} is missing here and was not measured ({reason})")
+            continue
+        measured += [measure_solver(solver, problem) for solver in solvers]
+    return measured, missing
+
+
+def finite(points: list[tuple[float, float, float]]) -> list[tuple[float, float]]:
+    """CPU time [us] and error [deg] of the points that can be drawn."""
+    return [(1e6 * cost, error) for _, cost, error in points if np.isfinite(error) and error > 0.0]

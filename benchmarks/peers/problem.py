@@ -1,0 +1,132 @@
+"""The problem all solvers get, and how their answers are compared.
+
+They get more than the kernels: each design ends at the time at which the kernels found it over, so that nobody
+simulates what cannot matter, and the peak is taken from 65 output times afterwards, uncounted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+import boulder_kernels as bk
+from boulder_kernels import Constants, DesignTable
+from boulder_kernels.design import constants_of, design_at
+from boulder_kernels.dynamics import State
+
+from ..designs import HORIZON, ROTATION_LIMIT, first
+from ..literal import literal_acceleration
+
+READINGS = bk.corrected()
+OUTPUTS = 65
+"""Times at which a solver gives its state, from 0 to the end."""
+REFERENCE_STEP_S = 5e-5
+
+_compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Designs with the times at which they end.
+
+    Parameters
+    ----------
+    designs
+        SI, n rows.
+    t_end
+        End of each [s], shape (n,).
+    theta
+        Largest rotation of each in the reference [rad], shape (n,).
+    """
+
+    designs: DesignTable
+    t_end: np.ndarray
+    theta: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """How many designs."""
+        return len(self.t_end)
+
+    def first(self, count: int) -> Problem:
+        """Return the problem of the first designs only."""
+        return Problem(first(self.designs, count), self.t_end[:count].copy(), self.theta[:count].copy())
+
+    def times(self, row: int) -> np.ndarray:
+        """Output times of a design [s], shape (65,)."""
+        return np.linspace(0.0, self.t_end[row], OUTPUTS)
+
+    def constants(self, row: int, elements: int = 0) -> Constants:
+        """Constants of the motion of a design."""
+        return constants_of(design_at(self.designs, row), READINGS, elements)
+
+    def largest_error_deg(self, theta: np.ndarray) -> float:
+        """Largest error of the largest rotations [deg]; infinite where one is not a number."""
+        errors = np.degrees(np.abs(theta - self.theta))
+        return float(errors.max()) if np.isfinite(errors).all() else float("inf")
+
+
+@dataclass(frozen=True)
+class Solver:
+    """One of the solvers.
+
+    Parameters
+    ----------
+    name
+        What a table calls it.
+    designs
+        How many designs it is given: fewer to slow ones.
+    prepare
+        Makes, from the problem, the function that solves it at a tolerance; compiles what must be. The function
+        returns the states, shape (n, 65, 6).
+    tolerances
+        Relative tolerances (or steps) to try, the loosest first.
+    """
+
+    name: str
+    designs: int
+    prepare: Callable[[Problem], Callable[[float], np.ndarray]]
+    tolerances: tuple[float, ...]
+
+
+def problem_of(designs: DesignTable) -> Problem:
+    """Return the problem of some designs, by the kernels with a very small step."""
+    control = bk.Control(REFERENCE_STEP_S, HORIZON, ROTATION_LIMIT, 0, False, True, True)
+    known = bk.simulate_table(designs, READINGS, control)
+    return Problem(designs, known.t_end, known.theta_max)
+
+
+def peaks(problem: Problem, states: np.ndarray) -> np.ndarray:
+    """Largest rotation of each design [rad], from states at the output times, shape (n, 65, 6)."""
+    return np.array([_peak(problem.constants(row), problem.times(row), states[row]) for row in range(problem.size)])
+
+
+@_compiled
+def _peak(c: Constants, times: np.ndarray, states: np.ndarray) -> float:
+    """Largest |theta| of quintic polynomials through rotation, its rate and acceleration at the output times."""
+    best = abs(states[0, 2])
+    tau = np.linspace(0.0, 1.0, 41)
+    for i in range(len(times) - 1):
+        best = max(best, abs(states[i + 1, 2]))
+        if states[i, 3] * states[i + 1, 3] >= 0.0:
+            continue
+        h = times[i + 1] - times[i]
+        theta, omega, alpha = np.empty(2), np.empty(2), np.empty(2)
+        for side in range(2):
+            y = states[i + side]
+            theta[side], omega[side] = y[2], h * y[3]
+            rate = literal_acceleration(State(y[0], y[1], y[2], y[3], y[4], y[5]), READINGS, c)
+            alpha[side] = 0.5 * h * h * rate.alpha_b
+        left = theta[1] - theta[0] - omega[0] - alpha[0]
+        left_v = omega[1] - omega[0] - 2.0 * alpha[0]
+        left_a = alpha[1] - alpha[0]
+        a3 = 10.0 * left - 4.0 * left_v + left_a
+        a4 = -15.0 * left + 7.0 * left_v - 2.0 * left_a
+        a5 = 6.0 * left - 3.0 * left_v + left_a
+        for s in tau:
+            value = theta[0] + s * (omega[0] + s * (alpha[0] + s * (a3 + s * (a4 + s * a5))))
+            best = max(best, abs(value))
+    return best
