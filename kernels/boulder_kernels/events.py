@@ -60,9 +60,15 @@ KINK_TOLERANCE = 1e-3
 """The same for a kink: forces are continuous there, so the error goes with its square."""
 
 
+CONTACT_ROUNDING = 1e-15
+"""Compressions below this share of the distance the truck would cover in a second are rounding: truck and boulder that
+move on together would part and touch without end by it."""
+
+
 class GapFactors(NamedTuple):
     """What the gaps of a mode are made of; all of them are constant while the mode lasts."""
 
+    contact_0: float
     contact: float
     """Of the compression u."""
     rotation_0: float
@@ -156,6 +162,7 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
         base = float(modes.yielded_base)
         base_0, base_abs = (c.x_yield, -1.0) if modes.yielded_base == 0 else (-c.x_yield, 0.0)
     return GapFactors(
+        CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v),
         1.0 if modes.touching else -1.0,
         rotation_0,
         rotation_M,
@@ -203,7 +210,7 @@ def gaps_of(
     """
     base = A - slope_x
     return Gaps(
-        g.contact * u,
+        g.contact_0 + g.contact * u,
         g.rotation_0
         + g.rotation_M * M
         + g.rotation_abs_M * abs(M)
@@ -241,7 +248,8 @@ def gap_within(event: int, tau: float, dense: DenseOutput, g: GapFactors, switch
     y = state_at(dense, tau)
     if event == CONTACT:
         sin, versin = sine_versine(y.theta_b)
-        return g.contact * spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+        u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+        return g.contact_0 + g.contact * u
     M = 0.0
     if event == COUPLE or (event == ROTATION and needs_moment(g)):
         M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c).M

@@ -29,22 +29,20 @@ from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, Outcome, Status, no_maxima, undefined_maxima, updated_maxima
 from .readings import Readings
 from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible
-from .stability import shortened_step
+from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
 
 FULL_TURN = math.pi
 """Rotation at which a simulation without a stop ends all the same [rad]: the boulder lies upside down."""
 ATTEMPTS_PER_STEP = 4
-ATTEMPTS_SPARE = 20_000
+ATTEMPTS_SPARE = 10_000
 """A simulation gives up after so many attempts per nominal step, and these to spare for events."""
-MOST_ATTEMPTS = 2_000_000
-"""A design that may need more is refused before it starts."""
 
 
 class Control(NamedTuple):
     """How a simulation is run."""
 
     h: float
-    """Step [s]; shortened where a design needs it, see `shortened_step`."""
+    """Step [s]; shortened where a design needs it, see `boulder_kernels.stability`."""
     horizon: float
     """Longest simulated time [s]."""
     theta_limit: float
@@ -58,6 +56,9 @@ class Control(NamedTuple):
     locate_yield: bool = False
     """Whether steps are also cut where the soil reaches its ultimate resistance. The force has a mere kink there,
     spread over the depth once the boulder has turned, and locating it has not been found to pay."""
+    halved: bool = False
+    """Whether the step of every design, shortened where it must be, is halved: the finer one of the two solutions that
+    an error is estimated from."""
 
 
 class Record(NamedTuple):
@@ -215,6 +216,15 @@ def turned_back(y: State, y_end: State) -> bool:
 
 
 @kernel
+def first_step(control: Control, theta_stop: float, c: Constants) -> tuple[float, int]:
+    """Step of a design [s], and the status it is refused with or ACCEPTED."""
+    rates = rates_of(theta_stop, c)
+    h = min(control.h, stable_step(rates))
+    status = refusal(h, control.h, control.horizon, rates)
+    return 0.5 * h if control.halved else h, status
+
+
+@kernel
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact by fixed steps, each cut where a mode changes.
 
@@ -232,26 +242,38 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     Returns
     -------
     Outcome
-        Maxima from the dense output; NaN with status INVALID, STEP_BUDGET or UNSTABLE.
+        Maxima from the dense output; NaN where the status says that there is no result, see `Status`.
 
     Notes
     -----
     Within a step the modes are frozen and the right-hand side is smooth. Where a step passes an event, it is kept
     up to the event by its dense output, whose local error of order five adds once per event what every step
-    adds to the solution, so the order of the method is kept.
+    adds to the solution, so the order of the method is kept. A motion that became non-finite is simulated again by
+    shorter steps.
     """
     if design.H - design.d <= design.e_bumper:
         return failed(Status.NO_CONTACT.value)
     c = constants_of(design, readings, control.elements)
     if not is_computable(c):
         return failed(Status.INVALID.value)
-    h_full = shortened_step(control.h, c)
-    budget = attempt_budget(h_full, control.horizon)
-    if not budget <= MOST_ATTEMPTS:
-        return failed(Status.STEP_BUDGET.value)
-
-    y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
     theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
+    h, status = first_step(control, theta_stop, c)
+    if status != ACCEPTED:
+        return failed(status)
+    outcome = simulate_by_steps(h, c, readings, control, theta_stop, record)
+    while outcome.status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
+        h *= RETRY
+        outcome = simulate_by_steps(h, c, readings, control, theta_stop, record)
+    return outcome
+
+
+@kernel
+def simulate_by_steps(
+    h_full: float, c: Constants, readings: Readings, control: Control, theta_stop: float, record: Record
+) -> Outcome:
+    """Simulate one impact by steps of a given length [s]; see `simulate_design`."""
+    budget = attempt_budget(h_full, control.horizon)
+    y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
     modes = initial_modes(readings, c)
     switches = switches_of(modes, readings, c)
     factors = gap_factors(modes, c, theta_stop, control.locate_yield)

@@ -17,10 +17,10 @@ from .dormand_prince import step
 from .dynamics import Acceleration, State
 from .events import LIMIT, GapFactors, gap_factors, gaps_of, initial_modes
 from .impact import (
-    MOST_ATTEMPTS,
     Control,
     attempt_budget,
     cross_event,
+    first_step,
     horizon_status,
     is_finite,
     keep_up_to_event,
@@ -33,7 +33,7 @@ from .readings import Readings
 from .restoring import signed_arm
 from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible
 from .soil import soil_kinematics
-from .stability import shortened_step
+from .stability import ACCEPTED, MOST_STEPS, RETRY
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, contact_lever, spring_compression
 from .workspace import (
@@ -147,8 +147,27 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
 
 
 @kernel
-def start_lane(ws: np.ndarray, lane: int, table: DesignTable, row: int, readings: Readings, control: Control) -> int:
+def start_lane(
+    ws: np.ndarray,
+    lane: int,
+    table: DesignTable,
+    row: int,
+    readings: Readings,
+    control: Control,
+    longest: float = np.inf,
+) -> int:
     """Put a design into a lane.
+
+    Parameters
+    ----------
+    ws, lane
+        The workspace and the lane.
+    table, row
+        The design.
+    readings, control
+        As of `simulate_lanes`.
+    longest
+        Longest step that has not failed yet [s]; infinite at first.
 
     Returns
     -------
@@ -161,9 +180,10 @@ def start_lane(ws: np.ndarray, lane: int, table: DesignTable, row: int, readings
     c = constants_of(design, readings, 0)
     if not is_computable(c):
         return Status.INVALID.value
-    h_full = shortened_step(control.h, c)
-    if not attempt_budget(h_full, control.horizon) <= MOST_ATTEMPTS:
-        return Status.STEP_BUDGET.value
+    h_full, status = first_step(control, control.theta_limit, c)
+    if status != ACCEPTED:
+        return status
+    h_full = min(h_full, longest)
     y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
     modes = initial_modes(readings, c)
     switches = switches_of(modes, readings, c)
@@ -318,6 +338,9 @@ def simulate_lanes(table: DesignTable, readings: Readings, control: Control, out
         for lane in range(LANES):
             if field(ws, ATTENTION, 0, lane) != 0.0 and rows[lane] != EMPTY:
                 status = attend(ws, lane, readings, control)
+                h = field(ws, STEP_FULL, 0, lane)
+                if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
+                    status = start_lane(ws, lane, table, rows[lane], readings, control, RETRY * h)
                 if status != RUNNING:
                     write_lane(ws, lane, status, out, rows[lane])
                     rows[lane], row = next_design(ws, lane, row, table, readings, control, out)

@@ -33,9 +33,19 @@ class Status(IntEnum):
     UNSTABLE = 5
     """The state became non-finite."""
     STEP_BUDGET = 6
-    """The design needs more steps than are allowed."""
+    """More steps are needed than are allowed: the step asked for is too short, or the modes change without end."""
     INVALID = 7
     """A constant of the design is not finite, or not positive."""
+    STIFF_SOIL = 8
+    """The design needs more steps than are allowed: the soil springs back too fast for the boulder's mass."""
+    STIFF_VEHICLE = 9
+    """The same: the vehicle's spring is too stiff for the masses on either side."""
+    WEAK_DAMPER = 10
+    """The same: the vehicle's spring relaxes too fast against its damper."""
+    THICK_SOIL = 11
+    """The same: the drag of the soil slows the boulder too fast."""
+    LITTLE_INERTIA = 12
+    """The same: the boulder has too little inertia for the forces that turn it."""
 
 
 class Maxima(NamedTuple):

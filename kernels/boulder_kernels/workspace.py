@@ -185,33 +185,35 @@ def load_factors(ws: np.ndarray, lane: int) -> GapFactors:
         field(ws, FACTORS, 18, lane),
         field(ws, FACTORS, 19, lane),
         field(ws, FACTORS, 20, lane),
+        field(ws, FACTORS, 21, lane),
     )
 
 
 @inlined
 def store_factors(ws: np.ndarray, lane: int, g: GapFactors) -> None:
     """Put the factors of the gaps into a lane."""
-    put(ws, FACTORS, 0, lane, g.contact)
-    put(ws, FACTORS, 1, lane, g.rotation_0)
-    put(ws, FACTORS, 2, lane, g.rotation_M)
-    put(ws, FACTORS, 3, lane, g.rotation_abs_M)
-    put(ws, FACTORS, 4, lane, g.rotation_theta)
-    put(ws, FACTORS, 5, lane, g.rotation_omega)
-    put(ws, FACTORS, 6, lane, g.couple_0)
-    put(ws, FACTORS, 7, lane, g.couple_M)
-    put(ws, FACTORS, 8, lane, g.couple_abs_M)
-    put(ws, FACTORS, 9, lane, g.couple_limit)
-    put(ws, FACTORS, 10, lane, g.corner_0)
-    put(ws, FACTORS, 11, lane, g.corner_theta)
-    put(ws, FACTORS, 12, lane, g.arm_0)
-    put(ws, FACTORS, 13, lane, g.arm)
-    put(ws, FACTORS, 14, lane, g.top_0)
-    put(ws, FACTORS, 15, lane, g.top_abs)
-    put(ws, FACTORS, 16, lane, g.top)
-    put(ws, FACTORS, 17, lane, g.base_0)
-    put(ws, FACTORS, 18, lane, g.base_abs)
-    put(ws, FACTORS, 19, lane, g.base)
-    put(ws, FACTORS, 20, lane, g.limit)
+    put(ws, FACTORS, 0, lane, g.contact_0)
+    put(ws, FACTORS, 1, lane, g.contact)
+    put(ws, FACTORS, 2, lane, g.rotation_0)
+    put(ws, FACTORS, 3, lane, g.rotation_M)
+    put(ws, FACTORS, 4, lane, g.rotation_abs_M)
+    put(ws, FACTORS, 5, lane, g.rotation_theta)
+    put(ws, FACTORS, 6, lane, g.rotation_omega)
+    put(ws, FACTORS, 7, lane, g.couple_0)
+    put(ws, FACTORS, 8, lane, g.couple_M)
+    put(ws, FACTORS, 9, lane, g.couple_abs_M)
+    put(ws, FACTORS, 10, lane, g.couple_limit)
+    put(ws, FACTORS, 11, lane, g.corner_0)
+    put(ws, FACTORS, 12, lane, g.corner_theta)
+    put(ws, FACTORS, 13, lane, g.arm_0)
+    put(ws, FACTORS, 14, lane, g.arm)
+    put(ws, FACTORS, 15, lane, g.top_0)
+    put(ws, FACTORS, 16, lane, g.top_abs)
+    put(ws, FACTORS, 17, lane, g.top)
+    put(ws, FACTORS, 18, lane, g.base_0)
+    put(ws, FACTORS, 19, lane, g.base_abs)
+    put(ws, FACTORS, 20, lane, g.base)
+    put(ws, FACTORS, 21, lane, g.limit)
 
 
 @inlined
