@@ -1,0 +1,58 @@
+"""The pictures of the documentation, each drawn by the same code that users call."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from boulder_sweep import load, read, run
+from boulder_sweep.crash_tests import crash_test
+from boulder_sweep.fitting import fit_pulse, read_pulse
+from boulder_sweep.simulation import simulate
+from boulder_sweep.studies.contents import EVERY, GRID
+from boulder_sweep.studies.example_pulse import example_pulse
+from boulder_sweep.studies.readings import readings_study
+from boulder_sweep.validation import validate
+from boulder_sweep.views.readings import draw_readings
+from boulder_sweep.views.validation import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
+from boulder_sweep.views.verdict_map import draw_verdict_map
+
+FOLDER = Path("docs/images")
+STILL_AT_S = 0.06
+
+
+def draw_all(root: Path) -> list[Path]:
+    """Draw every picture of the documentation.
+
+    Parameters
+    ----------
+    root
+        Folder of the repository.
+
+    Returns
+    -------
+    list of Path
+        What was drawn.
+    """
+    folder = root / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    before = set(folder.glob("*.png"))
+    for test in ("abg", "rwg"):
+        trajectory = simulate(crash_test(test))
+        trajectory.plot(folder / f"trajectory_{test}.png")
+        trajectory.plot_energy(folder / f"energy_{test}.png")
+        trajectory.plot_side_view(folder / f"side_view_{test}.png", time_s=STILL_AT_S)
+    found = validate()
+    draw_rigid_wall(found.wall, folder / "figure_10_rigid_wall.png")
+    draw_convergence(found.convergence, folder / "convergence.png")
+    for test, (_, name) in FIGURES.items():
+        draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, folder / name)
+    draw_readings(readings_study(root / GRID, EVERY), folder / "readings.png")
+    with tempfile.TemporaryDirectory() as scratch:
+        pulse = Path(scratch) / "pulse.csv"
+        pulse.write_text(example_pulse(), encoding="utf-8")
+        fit_pulse(read_pulse(pulse), 6800.0).plot(folder / "vehicle_fit.png")
+        sweep = load(root / GRID)
+        run(sweep, Path(scratch) / "grid.sweep")
+        draw_verdict_map(read(Path(scratch) / "grid.sweep"), folder / "m30_sizing.png", title=sweep.name)
+    return sorted(before | set(folder.glob("*.png")))
