@@ -42,9 +42,15 @@ PENETRATION_LIMITS_M = {"P1": 1.0, "P2": 7.0, "P3": 30.0}
 """Largest penetration of each rating [m] (ASTM F2656)."""
 
 NEWTON_PER_KILONEWTON = 1000.0
+_TOO_FAST = "(more time steps than allowed; a shorter solver.step allows more)"
 STATUS_REASONS = {
     Status.UNSTABLE: "the motion grew without bound in the time step used: ask for a finer accuracy",
-    Status.STEP_BUDGET: "too stiff: the design needs more time steps than are allowed",
+    Status.STEP_BUDGET: "the time step asked for is too short for the horizon, or contact and rest alternate without end",
+    Status.STIFF_SOIL: f"the soil is too stiff for the mass of the boulder {_TOO_FAST}",
+    Status.STIFF_VEHICLE: f"the vehicle's spring is too stiff for the mass of vehicle or boulder {_TOO_FAST}",
+    Status.WEAK_DAMPER: f"the vehicle's damper is too weak for its spring {_TOO_FAST}",
+    Status.THICK_SOIL: f"the drag of the soil is too large for the mass of the boulder {_TOO_FAST}",
+    Status.LITTLE_INERTIA: f"the boulder is too light or too thin for the forces that turn it {_TOO_FAST}",
     Status.INVALID: "a constant of the design (mass, inertia or stiffness) is zero, negative or not finite",
 }
 """Why a row that the kernels gave up has no result."""
