@@ -45,7 +45,7 @@ NEWTON_PER_KILONEWTON = 1000.0
 _TOO_FAST = "(more time steps than allowed; a shorter solver.step allows more)"
 STATUS_REASONS = {
     Status.UNSTABLE: "the motion grew without bound in the time step used: ask for a finer accuracy",
-    Status.STEP_BUDGET: "the time step asked for is too short for the horizon, or contact and rest alternate without end",
+    Status.STEP_BUDGET: "the time step asked for is too short for the horizon, or the modes change without end",
     Status.STIFF_SOIL: f"the soil is too stiff for the mass of the boulder {_TOO_FAST}",
     Status.STIFF_VEHICLE: f"the vehicle's spring is too stiff for the mass of vehicle or boulder {_TOO_FAST}",
     Status.WEAK_DAMPER: f"the vehicle's damper is too weak for its spring {_TOO_FAST}",
