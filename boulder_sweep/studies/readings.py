@@ -133,11 +133,10 @@ class ReadingsStudy:
 
     def grid_table(self) -> Table:
         """What every reading does to the designs that pass."""
-        table = Table(("readings", "designs that pass", "share", "pass only with it", "pass only without it"))
+        table = Table(("readings", "designs that pass", "pass only with it", "pass only without it"))
         for row in self.rows:
-            gained, lost = self.changed(row) if row.switch else (0, 0)
-            moved = (f"{gained:,}", f"{lost:,}") if row.switch else ("", "")
-            table.add(row.label, f"{int(row.passes.sum()):,}", f"{row.share:.2%}", *moved)
+            moved = [f"{count / self.designs:.1%}" for count in self.changed(row)] if row.switch else ["", ""]
+            table.add(row.label, f"{row.share:.1%}", *moved)
         return table
 
     def deciding(self) -> list[tuple[str, int]]:

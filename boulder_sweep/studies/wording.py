@@ -37,9 +37,10 @@ def readings_words(study: ReadingsStudy) -> str:
     (most, changes), (second, second_changes), (least, least_changes) = deciding[0], deciding[1], deciding[-1]
     gained, _ = study.changed(study.row("corrected", most))
     return _points(
-        f"**`{most}` decides most verdicts.** Read as printed, everything else corrected, it changes {changes:,} of "
-        f"{study.designs:,} ({changes / study.designs:.1%}), {gained:,} of them to a pass. `{second}` comes next with "
-        f"{second_changes:,}; `{least}` is the least with {least_changes:,}.",
+        f"**`{most}` decides most verdicts.** Read as printed, everything else corrected, it changes "
+        f"{changes / study.designs:.1%} of {study.designs:,} designs between pass and no pass, {gained / changes:.0%} "
+        f"of them to a pass. `{second}` comes next with {second_changes / study.designs:.1%}; `{least}` is the least "
+        f"with {least_changes / study.designs:.1%}.",
         _arm_words(study),
         _preset_words(printed, corrected, study.designs),
         _strictness_words(study),
@@ -62,8 +63,8 @@ def _preset_words(printed: ReadingRow, corrected: ReadingRow, designs: int) -> s
     lost = int((corrected.passes & ~printed.passes).sum())
     return (
         f"The presets pass about as many designs, {printed.share:.1%} as printed and {corrected.share:.1%} corrected, "
-        f"because the misprints partly cancel; but they are not the same designs. {unsafe:,} pass as printed and not "
-        f"corrected ({unsafe / designs:.1%} of all), {lost:,} corrected and not as printed."
+        f"because the misprints partly cancel; but they are not the same designs. {unsafe / designs:.1%} of all pass "
+        f"as printed and not corrected, {lost / designs:.1%} corrected and not as printed."
     )
 
 

@@ -43,6 +43,7 @@ def draw_readings(study: ReadingsStudy, path: str | Path) -> None:
                     xytext=(3, 0),
                     textcoords="offset points",
                     va="center",
+                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
                     fontsize=8,
                 )
             axes.set_xlim(0.0, 1.14 * max(*values, LIMIT_DEG))
