@@ -136,6 +136,7 @@ def closed_form(k: Kinematics, c: Constants) -> Reaction:
     r_1 = min(max(-below * inverse_s, 0.0), 1.0)
     r_2 = min(max(above * inverse_s, 0.0), 1.0)
     r_0 = min(max(B * inverse_p, 0.0), 1.0)
+    s, p = k.slope_x, k.slope_v  # zero again where they are: without displacement there is no force at all
 
     a_1, a_2 = r_1 * r_1, r_2 * r_2
     b_1, b_2 = a_1 * r_1, a_2 * r_2
@@ -194,6 +195,7 @@ def soil_potential(A: float, slope_x: float, c: Constants) -> Potential:
     below, above = y - A, y + A
     r_1 = min(max(-below * inverse_s, 0.0), 1.0)
     r_2 = min(max(above * inverse_s, 0.0), 1.0)
+    s = slope_x
     a_1, a_2 = r_1 * r_1, r_2 * r_2
     b_1, b_2 = a_1 * r_1, a_2 * r_2
     spring = 0.5 * (below * a_1 + above * a_2 - y) + (1.0 / 3.0) * s * (b_1 - b_2)
