@@ -50,8 +50,8 @@ class Problem:
         """Best of a grid of vehicles; the response is proportional to the speed, which so follows from each."""
         last = float(self.pulse.time_s[-1])
         best, found = math.inf, np.zeros(3)
-        for rate in np.geomspace(0.1, 200.0, 61) / last:
-            for ratio in np.geomspace(*RATIO_BOUNDS, 41):
+        for rate in np.geomspace(0.1, 200.0, 31) / last:
+            for ratio in np.geomspace(*RATIO_BOUNDS, 21):
                 unit = RigidWall(self.mass_kg, 1.0, self.mass_kg * rate**2, ratio * rate * self.mass_kg)
                 shape, data = [], []
                 for name, values in self.pulse.signals.items():
