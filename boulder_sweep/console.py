@@ -122,10 +122,27 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
     lines += verdict_lines(summary.reasons, summary.rows)
     lines += [
         "",
+        *accuracy_lines(summary.accuracy),
         f"table  {summary.out} ({_counted(summary.parts, 'file')}, {size(summary.bytes)})",
         f"open   pandas.read_parquet({str(summary.out)!r}), or boulder_sweep.read({str(summary.out)!r})",
     ]
     return lines
+
+
+def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
+    """Return how accurately a sweep was computed; nothing where its table does not say."""
+    if not accuracy:
+        return []
+    steps = f"step {1e3 * accuracy['step_s']:g} ms"
+    if accuracy["reported_step_s"] != accuracy["step_s"]:
+        steps += f" and {1e3 * accuracy['reported_step_s']:g} ms"
+    found = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
+    if "pilot_designs" not in accuracy:
+        return [found]
+    reached = (
+        f"{accuracy['estimated_error_p99_9_deg']:g} deg in 99.9 % of a pilot's {accuracy['pilot_designs']:,} designs"
+    )
+    return [found, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
 def dry_run_lines(sweep: Sweep, out: Path, effort: Estimate) -> list[str]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 
-from .accuracy import step_for
+from .accuracy import accuracy_of
 from .judged import OUTCOME_COLUMNS, Judged, joined, not_computed
 from .verdict import Limits, judge
 
@@ -173,13 +173,13 @@ def readings_of(sweep: Sweep) -> Readings:
 
 def control_of(sweep: Sweep) -> Control:
     """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate."""
-    solver = sweep.solver
+    accuracy = accuracy_of(sweep)
     return Control(
-        h=step_for(solver),
-        horizon=float(solver.horizon_s),
+        h=accuracy.step_s,
+        horizon=float(sweep.solver.horizon_s),
         theta_limit=math.radians(sweep.criterion.max_rotation_deg),
         elements=int(sweep.model.soil_elements),
-        error_estimate=solver.step_s is None and solver.accuracy != "fast",
+        error_estimate=accuracy.error_estimate,
     )
 
 

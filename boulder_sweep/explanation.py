@@ -117,7 +117,9 @@ def explain(out: str | Path, design_id: int) -> Explanation:
         inputs=inputs,
         stored={name: values[name] for name in OUTCOME_COLUMNS},
         recomputed={name: again[name] for name in OUTCOME_COLUMNS},
-        changed=tuple(differences(there, identity(there["settings"], there["readings"], there["control"]))),
+        changed=tuple(
+            differences(there, identity(*(there[part] for part in ("settings", "readings", "control", "accuracy"))))
+        ),
         trajectory=simulate(sweep) if computable else None,
     )
 

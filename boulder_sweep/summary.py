@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +57,8 @@ class Summary:
         Workers.
     parts, bytes
         Files of the table and their size.
+    accuracy
+        What accuracy was asked for, the step chosen for it, and the estimated error that a pilot found.
     notes
         What the user should know: damaged parts that were computed again, workers that died.
     """
@@ -71,6 +73,7 @@ class Summary:
     backend: str
     parts: int
     bytes: int
+    accuracy: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @property
@@ -151,5 +154,6 @@ def summary_of(
         backend=backend,
         parts=len(manifest.parts),
         bytes=sum(part.bytes for part in manifest.parts.values()),
+        accuracy=manifest.identity.get("accuracy", {}),
         notes=tuple(notes),
     )

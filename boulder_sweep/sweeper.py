@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .accuracy import accuracy_of
 from .backends import available_cores
 from .collector import COMMIT_EVERY_S
 from .commands import repeat_command
@@ -187,4 +188,5 @@ def _check_rows(sweep: Sweep) -> None:
 
 def _identity(sweep: Sweep, evaluation: Evaluation) -> dict[str, object]:
     """Return what all rows of a sweep's table have in common."""
-    return identity(sweep.resolved(), evaluation.readings._asdict(), evaluation.control._asdict())
+    control, accuracy = evaluation.control._asdict(), accuracy_of(sweep).to_dict()
+    return identity(sweep.resolved(), evaluation.readings._asdict(), control, accuracy)

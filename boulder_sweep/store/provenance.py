@@ -26,7 +26,7 @@ PREFIX = "boulder_sweep."
 """Beginning of the names of this package's entries in the metadata of a file."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
-_DECIDING_SOURCES = ("accuracy.py", "designs.py", "evaluation.py", "verdict.py")
+_DECIDING_SOURCES = ("accuracy.py", "designs.py", "evaluation.py", "pilot.py", "sampling.py", "verdict.py")
 """Modules beside the kernels whose code decides what stands in a row."""
 
 
@@ -40,7 +40,12 @@ def sha256_of(content: Any) -> str:
     return hashlib.sha256(canonical(content).encode()).hexdigest()
 
 
-def identity(settings: Mapping[str, Any], readings: Mapping[str, Any], control: Mapping[str, Any]) -> dict[str, Any]:
+def identity(
+    settings: Mapping[str, Any],
+    readings: Mapping[str, Any],
+    control: Mapping[str, Any],
+    accuracy: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """Collect what rows of one table have in common.
 
     Parameters
@@ -51,17 +56,20 @@ def identity(settings: Mapping[str, Any], readings: Mapping[str, Any], control: 
         Which formulas are read as printed.
     control
         How the motion is integrated: step, horizon, limit, soil elements.
+    accuracy
+        What accuracy was asked for, the step chosen for it, and the estimated error that a pilot found.
 
     Returns
     -------
     dict
-        Plain data with the keys ``settings``, ``readings``, ``control``, ``versions``, ``settings_sha256``,
-        ``kernels_sha256``, ``rules_sha256``.
+        Plain data with the keys ``settings``, ``readings``, ``control``, ``accuracy``, ``versions``,
+        ``settings_sha256``, ``kernels_sha256``, ``rules_sha256``.
     """
     found = {
         "settings": settings,
         "readings": readings,
         "control": control,
+        "accuracy": accuracy or {},
         "versions": versions(),
         "settings_sha256": sha256_of(settings),
         "kernels_sha256": kernels_sha256(),

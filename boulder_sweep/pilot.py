@@ -1,0 +1,105 @@
+"""A few designs of a sweep simulated first, to find the step that gives the accuracy asked for."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, simulate_table
+
+from .accuracy import LADDER_S, Accuracy
+from .evaluation import design_table, readings_of
+from .sampling import sampled_rows
+
+if TYPE_CHECKING:
+    from .settings import Sweep
+
+DESIGNS = 4096
+"""Designs of a pilot with the soil in closed form."""
+FEWEST_DESIGNS = 256
+"""And at least, with any number of soil elements."""
+ELEMENTS_AS_FAST = 16
+"""Number of soil elements that take about the time of the closed form."""
+QUANTILE = 0.999
+"""Share of the designs whose estimated error shall be no larger than what was asked for."""
+AT_ONCE = 256
+"""Designs simulated at once: an interruption waits for so many."""
+
+
+@lru_cache(maxsize=8)
+def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
+    """Choose the step of a sweep by a pilot on a sample of its designs.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    wanted_deg
+        Error of the rotation admitted [deg], in `QUANTILE` of the designs.
+
+    Returns
+    -------
+    Accuracy
+        The longest step of `LADDER_S` that meets it or, where none does, the one that comes nearest.
+    """
+    table, readings = sampled_table(sweep, pilot_size(sweep.model.soil_elements)), readings_of(sweep)
+    found: list[tuple[float, float]] = []
+    for step in LADDER_S:
+        control = Control(
+            step,
+            sweep.solver.horizon_s,
+            math.radians(sweep.criterion.max_rotation_deg),
+            sweep.model.soil_elements,
+            True,
+        )
+        # Rounded so that another processor, off in the last bits, finds the same.
+        achieved = float(f"{estimated_error_deg(table, readings, control):.3g}")
+        found.append((achieved, step))
+        if achieved <= wanted_deg:
+            break
+    achieved, step = min(found, key=lambda pair: pair[0])
+    return Accuracy(
+        asked=f"{wanted_deg:g} deg",
+        step_s=step,
+        error_estimate=True,
+        achieved_deg=achieved,
+        pilot_designs=table.L.size,
+        met=achieved <= wanted_deg,
+    )
+
+
+def pilot_size(elements: int) -> int:
+    """Return how many designs a pilot has, by the number of soil elements (0: closed form)."""
+    return max(FEWEST_DESIGNS, DESIGNS * ELEMENTS_AS_FAST // max(elements, ELEMENTS_AS_FAST))
+
+
+def sampled_table(sweep: Sweep, count: int) -> DesignTable:
+    """Return about so many designs of a sweep that can be computed, in the units of the kernels."""
+    blocks = [sweep.block(row, row + 1) for row in sampled_rows(sweep, count).tolist()]
+    tables = [design_table(block) for block in blocks if not block.reasons.any]
+    if not tables:
+        return DesignTable(*(np.empty(0) for _ in DesignTable._fields))
+    return DesignTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
+
+
+def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+    """Simulate a table in pieces short enough for an interruption to wait for."""
+    pieces = [
+        simulate_table(DesignTable(*(column[at : at + AT_ONCE] for column in table)), readings, control)
+        for at in range(0, table.L.size, AT_ONCE)
+    ]
+    if not pieces:
+        return simulate_table(table, readings, control)
+    return OutcomeTable(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+
+
+def estimated_error_deg(table: DesignTable, readings: Readings, control: Control) -> float:
+    """Quantile of the estimated errors of the rotation [deg] where the limit was not reached; 0 where it always was."""
+    outcomes = simulated(table, readings, control)
+    counts = ~np.isnan(outcomes.theta_error) & (outcomes.status != Status.LIMIT)
+    if not counts.any():
+        return 0.0
+    return math.degrees(float(np.quantile(outcomes.theta_error[counts], QUANTILE, method="higher")))
