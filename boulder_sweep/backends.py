@@ -102,13 +102,19 @@ class Backend:
             ):
                 yield parallel
 
-    def kill_workers(self) -> None:
-        """End worker processes of this machine now, whatever they are doing."""
+    def kill_workers(self, *, wait: bool = True) -> None:
+        """End worker processes of this machine, whatever they are doing.
+
+        Parameters
+        ----------
+        wait
+            Whether to return only when they have ended.
+        """
         if self.name == "loky":
             from joblib.externals.loky import get_reusable_executor
 
             with suppress(Exception):  # they may be dying already
-                get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
+                get_reusable_executor(reuse=True).shutdown(wait=wait, kill_workers=True)
 
     def abandon(self) -> None:
         """End the workers in the middle of their work, and let nobody complain about that."""
@@ -116,7 +122,7 @@ class Backend:
             logger = logging.getLogger(name)
             self._levels.setdefault(name, logger.level)
             logger.setLevel(logging.CRITICAL)
-        self.kill_workers()
+        self.kill_workers(wait=False)
 
     def close(self) -> None:
         """Let all workers go."""

@@ -39,6 +39,13 @@ def test_pieces_joined_are_the_whole_wherever_it_is_cut(whole, data):
     assert equal(joined(pieces), whole)
 
 
+def test_words_are_sorted_whatever_the_order_of_the_rows():
+    words = tuple(f"why {place}" for place in (5, 3, 9, 1, 7, 0, 2, 8, 6, 4))
+    row = joined([not_computed(words, np.arange(10)), not_computed(words[::-1], np.arange(10))])
+    assert row.reasons == (*REASONS, *sorted(words))
+    assert [row.reasons[code] for code in row.reason] == [*words, *words[::-1]]
+
+
 def test_words_that_no_row_uses_are_dropped():
     row = not_computed(("b", "a", "c"), np.array([1]))
     assert joined([row]).reasons == (*REASONS, "a")

@@ -85,8 +85,9 @@ def test_rows_under_way_stay_within_bounds():
     assert most <= 2
 
 
+@pytest.mark.parametrize("size", [1, 32])
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_a_block_that_raises_once_is_tried_again(jobs):
+def test_a_block_that_raises_once_is_tried_again(jobs, size):
     raised = []
 
     def flaky(block):
@@ -95,11 +96,11 @@ def test_a_block_that_raises_once_is_tried_again(jobs):
             raise MemoryError("just now")
         return good(block)
 
-    margin, verdict, _, problem, _ = work_off(flaky, jobs=jobs)
+    margin, verdict, _, problem, _ = work_off(flaky, rows=200, jobs=jobs, size=size)
     assert problem is None
     assert len(raised) == 1
     assert (verdict == 0).all()
-    assert np.array_equal(margin, np.arange(1000.0))
+    assert np.array_equal(margin, np.arange(200.0))
 
 
 @pytest.mark.parametrize("size", [1, 32, 999])
