@@ -28,21 +28,29 @@ from .impact import (
     turned_back,
 )
 from .modes import Modes, Switches, switches_of
-from .outcomes import Maxima, OutcomeTable, Status, compression_rate, no_maxima
+from .outcomes import (
+    Compression,
+    Maxima,
+    OutcomeTable,
+    Status,
+    compression_at,
+    compression_of,
+    highest_compression,
+    no_maxima,
+)
 from .readings import Readings
 from .restoring import signed_arm
 from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible
 from .soil import soil_kinematics
 from .stability import ACCEPTED, MOST_STEPS, RETRY
 from .trigonometry import sine_versine
-from .vehicle import contact_displacement, contact_lever, spring_compression
 from .workspace import (
     ATTEMPTS_LEFT,
     ATTENTION,
     BARRIER,
+    COMPRESSION,
     LANES,
     MAXIMA,
-    RATE,
     SIZE,
     STEP,
     STEP_FULL,
@@ -92,22 +100,22 @@ def attempt_steps(ws: np.ndarray) -> None:
 
 @kernel
 def take_over_steps(ws: np.ndarray, horizon: float) -> None:
-    """Take over the steps that meet no event, set no peak inside and do not reach the horizon [s]; mark the others."""
+    """Take over the steps that meet no event, turn nowhere and do not reach the horizon [s]; mark the others."""
     for lane in range(LANES):
         c = load_constants(ws, lane)
         s = load_switches(ws, lane)
         y, y_end = load_state(ws, lane), load_end_state(ws, lane)
         k_end = load_end(ws, lane)
         sin, versin = sine_versine(y_end.theta_b)
-        u = spring_compression(y_end.x_v, y_end.v_v, contact_displacement(y_end.x_b, sin, versin, c), c)
-        rate = y_end.v_v - y_end.v_b - y_end.omega_b * contact_lever(sin, versin, c) - c.tau_v * s.k_truck * u
+        start = Compression(field(ws, COMPRESSION, 0, lane), field(ws, COMPRESSION, 1, lane))
+        end = compression_of(y_end, sin, versin, s, c)
         k = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
         gaps = gaps_of(
             k.A,
             k.slope_x,
             y_end.theta_b,
             y_end.omega_b,
-            u,
+            end.u,
             k_end.M,
             signed_arm(sin, versin, c),
             load_factors(ws, lane),
@@ -126,24 +134,24 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
             & (y.omega_b * y_end.omega_b >= 0.0)
             & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
             & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
-            & ((field(ws, RATE, 0, lane) <= 0.0) | (rate >= 0.0))
             & (h < horizon - t)
             & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, 0, lane)))
         )
-        F_v = s.k_contact * u
+        u, _ = highest_compression(start, end, h)
         t_next = t + h
         put(ws, ATTENTION, 0, lane, 0.0 if plain else 1.0)
         put(ws, ATTEMPTS_LEFT, 0, lane, field(ws, ATTEMPTS_LEFT, 0, lane) - 1.0)
         if plain:
             store_state(ws, lane, y_end)
             store_start(ws, lane, k_end)
-            put(ws, RATE, 0, lane, rate)
+            put(ws, COMPRESSION, 0, lane, end.u)
+            put(ws, COMPRESSION, 1, lane, end.rate)
             put(ws, TIME, 0, lane, t_next)
             put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t_next))
             put(ws, MAXIMA, 0, lane, max(field(ws, MAXIMA, 0, lane), abs(y_end.theta_b)))
             put(ws, MAXIMA, 1, lane, max(field(ws, MAXIMA, 1, lane), y_end.x_b))
             put(ws, MAXIMA, 2, lane, max(field(ws, MAXIMA, 2, lane), y_end.x_v))
-            put(ws, MAXIMA, 3, lane, max(field(ws, MAXIMA, 3, lane), F_v))
+            put(ws, MAXIMA, 3, lane, max(field(ws, MAXIMA, 3, lane), s.k_contact * u))
 
 
 @kernel
@@ -207,7 +215,9 @@ def set_motion(
     store_start(ws, lane, k1)
     put(ws, TIME, 0, lane, t)
     put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t))
-    put(ws, RATE, 0, lane, compression_rate(y, switches, c))
+    start = compression_at(y, switches, c)
+    put(ws, COMPRESSION, 0, lane, start.u)
+    put(ws, COMPRESSION, 1, lane, start.rate)
 
 
 @inlined

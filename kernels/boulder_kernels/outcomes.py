@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -131,43 +132,48 @@ def turning_point(q: Track, tau_end: float) -> float:
     return tau
 
 
+class Compression(NamedTuple):
+    """Compression of the vehicle's spring."""
+
+    u: float
+    """Compression [m]."""
+    rate: float
+    """Its rate [m/s]; the contact force peaks where it is zero."""
+
+
 @inlined
-def compression_rate(y: State, s: Switches, c: Constants) -> float:
-    """Rate of the compression of the vehicle's spring [m/s]; the contact force peaks where it is zero."""
-    sin, versin = sine_versine(y.theta_b)
+def compression_of(y: State, sin: float, versin: float, s: Switches, c: Constants) -> Compression:
+    """Compression of the vehicle's spring at a state with these sine and versine."""
     u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
-    return y.v_v - y.v_b - y.omega_b * contact_lever(sin, versin, c) - c.tau_v * s.k_truck * u
+    rate = y.v_v - y.v_b - y.omega_b * contact_lever(sin, versin, c) - c.tau_v * s.k_truck * u
+    return Compression(u, rate)
 
 
 @inlined
-def force_at(y: State, s: Switches, c: Constants) -> float:
-    """Contact force at a state [N]."""
+def compression_at(y: State, s: Switches, c: Constants) -> Compression:
+    """Compression of the vehicle's spring at a state."""
     sin, versin = sine_versine(y.theta_b)
-    return s.k_contact * spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+    return compression_of(y, sin, versin, s, c)
 
 
-@kernel
-def force_peak(dense: DenseOutput, tau_end: float, r: float, r_end: float, s: Switches, c: Constants) -> float:
-    """Fraction of a step at which the contact force peaks.
+@inlined
+def highest_compression(start: Compression, end: Compression, h: float) -> tuple[float, float]:
+    """Largest compression in a step of length h [s], by the cubic through both of its ends.
 
-    Parameters
-    ----------
-    dense, s, c
-        The step.
-    tau_end
-        Fraction of the step before which the peak lies.
-    r, r_end
-        Rate of the compression at its start, positive, and at tau_end, negative [m/s].
+    Returns
+    -------
+    u, tau
+        The compression [m] and the fraction of the step at which it is reached: inside where the rate goes
+        from positive to negative, else at the end. No branch, so that a loop over lanes stays vectorised.
     """
-    bracket = Bracket(0.0, r, tau_end, r_end, 0)
-    tau = tau_end
-    for _ in range(ITERATIONS):
-        before = tau
-        tau = next_guess(bracket)
-        if abs(tau - before) < PEAK_TOLERANCE:
-            break
-        bracket = narrowed(bracket, tau, compression_rate(state_at(dense, tau), s, c))
-    return tau
+    c_1, slope_end = h * start.rate, h * end.rate
+    rise = end.u - start.u
+    c_2 = 3.0 * rise - 2.0 * c_1 - slope_end
+    c_3 = c_1 + slope_end - 2.0 * rise
+    peaks = (start.rate > 0.0) & (end.rate < 0.0)
+    # The root of c_1 + 2 c_2 tau + 3 c_3 tau^2 at which the slope changes from plus to minus.
+    tau = c_1 / (math.sqrt(max(c_2 * c_2 - 3.0 * c_3 * c_1, 0.0)) - c_2) if peaks else 1.0
+    return (start.u + tau * (c_1 + tau * (c_2 + tau * c_3)) if peaks else end.u), tau
 
 
 @inlined
@@ -210,10 +216,7 @@ def updated_maxima(
     if dense.truck.x1 > 0.0 > y_end.v_v:
         tau = turning_point(dense.truck, tau_end)
         x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
-    F_v, t_F_v = grown(m.F_v, m.t_F_v, force_at(y_end, s, c), t_end)
-    if s.k_contact > 0.0:
-        r, r_end = compression_rate(state_at(dense, 0.0), s, c), compression_rate(y_end, s, c)
-        if r > 0.0 > r_end:
-            tau = force_peak(dense, tau_end, r, r_end, s, c)
-            F_v, t_F_v = grown(F_v, t_F_v, force_at(state_at(dense, tau), s, c), t + tau * h)
+    part = tau_end * h
+    u, tau = highest_compression(compression_at(state_at(dense, 0.0), s, c), compression_at(y_end, s, c), part)
+    F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + tau * part)
     return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v)

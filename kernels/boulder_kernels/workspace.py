@@ -30,7 +30,7 @@ _FIELDS = {
     "step": 1,
     "step_full": 1,
     "time": 1,
-    "rate": 1,
+    "compression": 2,
     "barrier": 1,
     "maxima": 4,
     "attention": 1,
@@ -57,8 +57,8 @@ STEP = _offset("step")
 STEP_FULL = _offset("step_full")
 """Length of a step that nothing shortens [s]."""
 TIME = _offset("time")
-RATE = _offset("rate")
-"""Rate of the compression of the vehicle's spring at the start of the step [m/s]."""
+COMPRESSION = _offset("compression")
+"""Compression of the vehicle's spring at the start of the step [m], and its rate [m/s]."""
 BARRIER = _offset("barrier")
 """Energy below which the motion has settled [J], see `boulder_kernels.settling`."""
 MAXIMA = _offset("maxima")
