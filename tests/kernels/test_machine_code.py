@@ -1,0 +1,105 @@
+"""The code that the compiler made of the lanes: vectors as wide as the processor has, and no number on its own."""
+
+import platform
+import re
+from collections import Counter
+
+import llvmlite.binding
+import numba
+import numpy as np
+import pytest
+
+import boulder_kernels as bk
+from boulder_kernels.lanes import attempt_steps, take_over_steps
+from boulder_kernels.workspace import SIZE
+
+from .samples import control, random_designs, table_of
+
+pytestmark = pytest.mark.compiled
+
+CALL = re.compile(r"^\s*(call|bl)\w*\s.*(sine_versine|acceleration|closed_form|soil)", re.MULTILINE)
+PACKED = re.compile(r"^\s*(v?\w+pd)\b.*%(zmm|ymm|xmm)", re.MULTILINE)
+FUSED = re.compile(r"fn?m(add|sub)")
+SCALAR = re.compile(r"^\s*v?(add|sub|mul|div|f?n?madd\w*|f?n?msub\w*|max|min|sqrt)sd\b", re.MULTILINE)
+
+
+def makes_use_of(feature: str) -> bool:
+    """Whether code is made for processors with a feature: the host's, unless the user has named others."""
+    if numba.config.CPU_FEATURES is not None:
+        return f"+{feature}" in numba.config.CPU_FEATURES
+    return numba.config.CPU_NAME is None and llvmlite.binding.get_host_cpu_features().get(feature, False)
+
+
+def widest() -> str:
+    """Widest registers the code is to use, or none where the processor is of another kind."""
+    if platform.machine() not in ("x86_64", "AMD64"):
+        return ""
+    if makes_use_of("avx512f") and "-prefer-256-bit" in (numba.config.CPU_FEATURES or ""):
+        return "zmm"
+    return "ymm" if makes_use_of("avx2") else "xmm"
+
+
+def assembly(kernel, *arguments: object) -> str:
+    """Machine code of a kernel for the types of these arguments.
+
+    Code that comes out of the cache has no listing, so it is compiled afresh.
+    """
+    options = {name: value for name, value in kernel.targetoptions.items() if name not in ("nopython", "cache")}
+    fresh = numba.njit(**options)(kernel.py_func)
+    fresh(*arguments)
+    return "\n".join(fresh.inspect_asm().values())
+
+
+def widths(code: str) -> Counter[str]:
+    """How many packed instructions on doubles there are by kind and register."""
+    return Counter(f"{'fma' if FUSED.search(op) else op.removeprefix('v')[:3]} {register}"
+                   for op, register in PACKED.findall(code))  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def step_code() -> str:
+    return assembly(attempt_steps, np.zeros(SIZE))
+
+
+@pytest.fixture(scope="module")
+def take_over_code() -> str:
+    return assembly(take_over_steps, np.zeros(SIZE), 1.0)
+
+
+def test_steps_are_vectorised(step_code: str) -> None:
+    """Hundreds of operations on whole registers a step, multiply-adds fused where there are such.
+
+    On processors of another kind, where instructions have other names: no call is left in the loop.
+    """
+    assert not CALL.search(step_code)
+    found, register = widths(step_code), widest()
+    if register:
+        assert found[f"fma {register}" if makes_use_of("fma") else f"mul {register}"] > 300
+        assert found[f"div {register}"] >= 6
+
+
+def test_no_scalar_arithmetic_in_the_steps(step_code: str) -> None:
+    """No division, nor any other operation, that is done for one lane at a time."""
+    assert [match.group(0).strip() for match in SCALAR.finditer(step_code)] == []
+
+
+def test_taking_over_is_vectorised(take_over_code: str) -> None:
+    assert not CALL.search(take_over_code)
+    found, register = widths(take_over_code), widest()
+    if register and register != "xmm":
+        assert found[f"fma {register}"] > 20
+
+
+def test_wide_vectors_are_asked_for() -> None:
+    """On processors that have them, unless the user has said otherwise."""
+    if llvmlite.binding.get_host_cpu_features().get("avx512f") and numba.config.CPU_NAME is None:
+        assert numba.config.CPU_FEATURES is not None
+
+
+def test_kernels_leave_the_interpreter_lock_free() -> None:
+    """All kernels are compiled without the interpreter: they run side by side in threads."""
+    table = table_of(random_designs(2, seed=141))
+    bk.simulate_table(table, bk.corrected(), control(8e-3, 0.1, 0.3, stop_at_limit=True))
+    assert len(bk.simulate_table.nopython_signatures) == len(bk.simulate_table.signatures) > 0
+    for kernel in (bk.simulate_table, bk.simulate_design, attempt_steps, take_over_steps):
+        assert kernel.targetoptions["nogil"]
