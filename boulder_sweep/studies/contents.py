@@ -43,7 +43,8 @@ def _validation() -> Validation:
 
 
 @cache
-def _readings(root: Path) -> ReadingsStudy:
+def readings_of_grid(root: Path) -> ReadingsStudy:
+    """Return the readings study of the documentation."""
     return readings_study(root / GRID, EVERY)
 
 
@@ -78,15 +79,15 @@ def _rigid_wall(_: Path) -> str:
 
 
 def _readings_crash_tests(root: Path) -> str:
-    return _readings(root).crash_test_table().markdown()
+    return readings_of_grid(root).crash_test_table().markdown()
 
 
 def _readings_grid(root: Path) -> str:
-    return _readings(root).grid_table().markdown()
+    return readings_of_grid(root).grid_table().markdown()
 
 
 def _readings_words(root: Path) -> str:
-    return readings_words(_readings(root))
+    return readings_words(readings_of_grid(root))
 
 
 def _balance_table(_: Path) -> str:

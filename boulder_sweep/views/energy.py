@@ -24,8 +24,8 @@ LAYERS = (
     ("soil_drag_J", "soil: drag (lost)", GREEN),
     ("soil_elastic_J", "soil: springs", YELLOW),
     ("gravity_J", "weight of the boulder lifted", PURPLE),
-    ("boulder_angular_J", "boulder turning", SKY),
     ("boulder_linear_J", "boulder moving", BLUE),
+    ("boulder_angular_J", "boulder turning", SKY),
     ("vehicle_kinetic_J", "vehicle moving", LIGHT_GREY),
 )
 """What is stacked, from below: first what is lost for good, last what the vehicle still has."""

@@ -162,7 +162,8 @@ def label(name: str) -> str:
         "subgrade_reaction_MN_m3": "subgrade reaction β",
     }
     unit = unit_of(name)
-    plain = words.get(name) or name.removesuffix("_" + BY_NAME[name].unit.replace("/", "_")).replace("_", " ")
+    suffix = "_" + BY_NAME[name].unit.replace("/", "_").replace("*", "_").replace("^", "")
+    plain = words.get(name) or name.removesuffix(suffix).replace("_", " ")
     return f"{plain} [{unit}]" if unit else plain
 
 

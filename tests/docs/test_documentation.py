@@ -1,0 +1,99 @@
+"""The documentation says what the commands give: every computed number, every picture, every link."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from boulder_sweep.studies.__main__ import PULSE, main
+from boulder_sweep.studies.contents import CONTENTS, EVERY, GRID, compute, readings_of_grid
+from boulder_sweep.studies.documents import blocks, differences, pages
+from boulder_sweep.studies.energy import AUDIT_DESIGNS
+from boulder_sweep.studies.example_pulse import NOISE_G, NOISE_MM, example_pulse
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+MOST_BYTES = 200_000
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)#]+)(#[^)]*)?\)")
+
+
+def page(name: str) -> str:
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def test_no_number_has_drifted() -> None:
+    """Write them anew with ``python -m boulder_sweep.studies``."""
+    assert differences(ROOT, compute(ROOT)) == []
+
+
+def test_example_pulse_is_what_the_command_writes() -> None:
+    assert (ROOT / PULSE).read_text(encoding="utf-8") == example_pulse()
+
+
+def test_every_study_stands_on_a_page() -> None:
+    assert sorted(block.name for block in blocks(ROOT)) == sorted(CONTENTS)
+
+
+def test_numbers_in_prose_are_those_of_the_studies() -> None:
+    assert f"Every {EVERY}th design" in page("readings.md")
+    assert str(GRID) in page("readings.md")
+    assert f"{AUDIT_DESIGNS} random designs" in page("energy.md")
+    assert f"{NOISE_MM:g} mm and {NOISE_G:g} g" in page("vehicle.md")
+
+
+def test_conclusions_in_prose_hold() -> None:
+    study = readings_of_grid(ROOT)
+    assert all(row.abg_verdict == "fail, overturns" for row in study.rows)
+    assert all(row.rwg_rotation_deg < 20.0 for row in study.rows)
+    switch, _ = study.deciding()[0]
+    gained, lost = study.changed(study.row("corrected", switch))
+    assert switch == "impact_arm", "readings.md calls the arm the largest of the errors"
+    assert gained > 100 * lost, "and on the unsafe side"
+
+
+def test_links_and_pictures_are_there() -> None:
+    for file in pages(ROOT):
+        for target, _ in LINK.findall(file.read_text(encoding="utf-8")):
+            assert (file.parent / target).exists(), f"{file.name} points to {target}"
+
+
+def test_pictures_are_small_and_used() -> None:
+    text = "".join(file.read_text(encoding="utf-8") for file in (*pages(ROOT), ROOT / "README.md"))
+    pictures = list((DOCS / "images").iterdir())
+    assert pictures
+    for picture in pictures:
+        assert picture.suffix == ".png"
+        assert picture.stat().st_size < MOST_BYTES, picture.name
+        assert f"images/{picture.name}" in text, f"{picture.name} is on no page"
+
+
+def test_every_page_is_in_the_index() -> None:
+    for file in pages(ROOT):
+        if file.name != "README.md":
+            assert f"({file.name})" in page("README.md")
+
+
+def test_commands_of_the_pages_exist() -> None:
+    from boulder_sweep.cli import cli
+
+    for file in pages(ROOT):
+        for command in re.findall(r"^\$ sweep (\S+)", file.read_text(encoding="utf-8"), re.MULTILINE):
+            assert command in cli.commands, f"{file.name}: sweep {command}"
+
+
+def test_command_prints_blocks(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    assert main(["rigid-wall"]) == 0
+    assert "0.8267 m" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as stop:
+        main(["no-such-block"])
+    assert stop.value.code == 2
+
+
+def test_command_needs_the_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stop:
+        main(["--check"])
+    assert stop.value.code == 2

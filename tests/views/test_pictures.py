@@ -1,0 +1,121 @@
+"""Every picture is drawn, is the same when drawn again, and is refused in words where it cannot be."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from PIL import Image
+
+from boulder_sweep.crash_tests import crash_test
+from boulder_sweep.simulation import simulate
+from boulder_sweep.trajectory import Trajectory
+from boulder_sweep.views.energy import LAYERS
+from boulder_sweep.views.figures import PictureError, checked_kind
+from boulder_sweep.views.verdict_map import CLASSES
+
+Draw = Callable[[Trajectory, Path], None]
+
+DRAWERS: dict[str, Draw] = {
+    "history": lambda trajectory, path: trajectory.plot(path),
+    "energy": lambda trajectory, path: trajectory.plot_energy(path),
+    "side view": lambda trajectory, path: trajectory.plot_side_view(path, time_s=0.05),
+}
+
+
+def picture(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def has_colour(image: np.ndarray, colour: str, least: int = 30) -> bool:
+    wanted = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+    return int((np.abs(image - wanted).max(axis=2) <= 3).sum()) >= least
+
+
+@pytest.mark.parametrize("name", DRAWERS)
+def test_picture_is_drawn_and_is_the_same_again(held: Trajectory, tmp_path: Path, name: str) -> None:
+    for file in ("one.png", "two.png"):
+        DRAWERS[name](held, tmp_path / file)
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
+    image = picture(tmp_path / "one.png")
+    assert image.shape[0] > 300
+    assert image.shape[1] > 700
+    assert has_colour(image, "#D55E00")
+
+
+def test_time_after_the_limit_is_shaded(held: Trajectory, overturned: Trajectory, tmp_path: Path) -> None:
+    held.plot(tmp_path / "held.png")
+    overturned.plot(tmp_path / "overturned.png")
+    assert not has_colour(picture(tmp_path / "held.png"), "#F3E7DF")
+    assert has_colour(picture(tmp_path / "overturned.png"), "#F3E7DF", least=20_000)
+
+
+def test_printed_readings_show_what_comes_out_of_nothing(held: Trajectory, tmp_path: Path) -> None:
+    with matplotlib.rc_context({"svg.fonttype": "none"}):  # text as text
+        simulate(crash_test("abg"), readings="as_printed").plot_energy(tmp_path / "printed.svg")
+        held.plot_energy(tmp_path / "corrected.svg")
+    assert "out of nothing" in (tmp_path / "printed.svg").read_text(encoding="utf-8")
+    assert "out of nothing" not in (tmp_path / "corrected.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("kind", [".svg", ".pdf"])
+def test_other_kinds(held: Trajectory, tmp_path: Path, kind: str) -> None:
+    held.plot(tmp_path / f"picture{kind}")
+    start = (tmp_path / f"picture{kind}").read_bytes()[:200]
+    assert start.startswith(b"%PDF") if kind == ".pdf" else b"svg" in start or b"<?xml" in start
+
+
+@pytest.mark.parametrize("name", DRAWERS)
+def test_nothing_to_draw_is_said(tmp_path: Path, name: str) -> None:
+    low = simulate(crash_test("rwg").constants | {"boulder_height_m": 2.5})
+    with pytest.raises(PictureError, match="the truck passes over the boulder"):
+        DRAWERS[name](low, tmp_path / "picture.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("picture.jpeg", r"must end in \.png, \.svg, \.pdf"),
+        ("picture", "must end in"),
+        ("missing/picture.png", "does not exist"),
+    ],
+)
+def test_wrong_names_are_refused(held: Trajectory, tmp_path: Path, file: str, message: str) -> None:
+    with pytest.raises(PictureError, match=message):
+        held.plot(tmp_path / file)
+
+
+def test_a_folder_in_the_way_is_said(held: Trajectory, tmp_path: Path) -> None:
+    (tmp_path / "picture.png").mkdir()
+    with pytest.raises(PictureError, match="cannot be written"):
+        held.plot(tmp_path / "picture.png")
+
+
+def test_missing_matplotlib_is_said(held: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "matplotlib" else found(name))
+    with pytest.raises(PictureError, match=r"pip install 'boulder-sweep\[plot\]'"):
+        held.plot(tmp_path / "picture.png")
+
+
+def test_endings_in_capitals_are_fine(tmp_path: Path) -> None:
+    assert checked_kind(tmp_path / "A.PNG") == tmp_path / "A.PNG"
+
+
+def brightness(colour: str) -> float:
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return 0.299 * red + 0.587 * green + 0.114 * blue
+
+
+def test_colours_differ_in_brightness_too() -> None:
+    """For who sees no red, and for who prints in grey: layers that touch, and all verdicts of a map."""
+    layers = [brightness(colour) for _, _, colour in LAYERS]
+    assert min(abs(one - other) for one, other in itertools.pairwise(layers)) > 30
+    verdicts = [brightness(colour) for _, colour, _ in CLASSES]
+    assert min(abs(one - other) for one, other in itertools.combinations(verdicts, 2)) > 10
