@@ -45,7 +45,8 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     Accuracy
         The longest step of `LADDER_S` that meets it or, where none does, the one that comes nearest.
     """
-    table, readings = sampled_table(sweep, pilot_size(sweep.model.soil_elements)), readings_of(sweep)
+    table, _ = sampled_columns(sweep, pilot_size(sweep.model.soil_elements))
+    readings = readings_of(sweep)
     found: list[tuple[float, float]] = []
     for step in LADDER_S:
         control = Control(
@@ -76,13 +77,15 @@ def pilot_size(elements: int) -> int:
     return max(FEWEST_DESIGNS, DESIGNS * ELEMENTS_AS_FAST // max(elements, ELEMENTS_AS_FAST))
 
 
-def sampled_table(sweep: Sweep, count: int) -> DesignTable:
-    """Return about so many designs of a sweep that can be computed, in the units of the kernels."""
+def sampled_columns(sweep: Sweep, count: int) -> tuple[DesignTable, np.ndarray]:
+    """Return about so many designs of a sweep that can be computed, in the units of the kernels, and bed offsets."""
     blocks = [sweep.block(row, row + 1) for row in sampled_rows(sweep, count).tolist()]
-    tables = [design_table(block) for block in blocks if not block.reasons.any]
-    if not tables:
-        return DesignTable(*(np.empty(0) for _ in DesignTable._fields))
-    return DesignTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
+    blocks = [block for block in blocks if not block.reasons.any]
+    if not blocks:
+        return DesignTable(*(np.empty(0) for _ in DesignTable._fields)), np.empty(0)
+    tables = [design_table(block) for block in blocks]
+    table = DesignTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
+    return table, np.concatenate([block.columns["bed_offset_m"].to_numpy() for block in blocks])
 
 
 def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:

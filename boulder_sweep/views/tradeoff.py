@@ -1,0 +1,96 @@
+"""Work against precision: the error of a sample over the CPU time per design, with what no other way beats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .figures import AMBER, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from boulder_sweep.tradeoff import Tradeoff
+    from boulder_sweep.tradeoff_points import Point
+
+LEAST_DEG = 1e-9
+"""Errors below it are drawn there: no axis of logarithms has a zero [deg]."""
+COLOURS = (ORANGE, AMBER, PURPLE, GREY, SKY)
+MARKERS = "^vDPX"
+WORDS = {"as_printed": "as printed", "corrected": "corrected", "mixed": "readings of the file"}
+
+
+def draw_tradeoff(found: Tradeoff, path: str | Path) -> None:
+    """Draw a panel for each reading.
+
+    Parameters
+    ----------
+    found
+        What was measured.
+    path
+        Picture to write.
+    """
+    names = list(dict.fromkeys(point.way.readings for point in found.points))
+    with figure(path, 5.4 * len(names), 5.0) as fig:
+        panels = fig.subplots(1, len(names), sharey=True, squeeze=False)[0]
+        for axes, name in zip(panels, names, strict=True):
+            _panel(axes, [point for point in found.points if point.way.readings == name])
+            own = " (this file)" if name == found.own_readings else ""
+            axes.set_title(f"{WORDS.get(name, name)}{own}")
+            axes.set_xlabel("CPU time per design, one core [µs]")
+        panels[0].set_ylabel("error of the largest rotation [deg]\n99 % of designs; thin line up to the largest")
+        handles, labels = panels[0].get_legend_handles_labels()
+        fig.legend(handles, labels, loc="outside lower center", ncols=2 * len(names))
+
+
+def _panel(axes: Axes, points: list[Point]) -> None:
+    """Draw the ways of one reading."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.margins(x=0.12)
+    front = sorted((p for p in points if p.pareto), key=lambda p: p.cpu_us)
+    axes.plot(
+        [p.cpu_us for p in front],
+        [max(p.rotation_p99_deg, LEAST_DEG) for p in front],
+        color=LIGHT_GREY,
+        linewidth=7.0,
+        solid_capstyle="round",
+        zorder=1,
+        label="no other way is cheaper and better",
+    )
+    groups = dict.fromkeys((p.way.soil_elements, p.way.error_estimate) for p in points)
+    sums = iter(zip(COLOURS, MARKERS, strict=True))
+    for elements, estimate in groups:
+        if elements:
+            colour, marker = next(sums)
+            words = f"sums over {elements} elements"
+        else:
+            colour, marker = (GREEN, "s") if estimate else (BLUE, "o")
+            words = "closed form, error for each design" if estimate else "closed form"
+        these = [p for p in points if (p.way.soil_elements, p.way.error_estimate) == (elements, estimate)]
+        _way(axes, these, colour, marker, words)
+
+
+def _way(axes: Axes, points: list[Point], colour: str, marker: str, words: str) -> None:
+    """Draw one way over its steps."""
+    cost = [p.cpu_us for p in points]
+    usual = [max(p.rotation_p99_deg, LEAST_DEG) for p in points]
+    largest = [max(p.rotation_max_deg, LEAST_DEG) for p in points]
+    axes.plot(cost, usual, marker=marker, color=colour, markersize=4.5, linewidth=1.2, label=words, zorder=3)
+    axes.vlines(cost, usual, largest, color=colour, linewidth=0.8, alpha=0.6, zorder=2)
+    if points[0].way.soil_elements:
+        return
+    for point, x, y in zip(points, cost, usual, strict=True):
+        left = not point.way.error_estimate
+        text = point.accuracy or (f"{point.way.step_ms:g} ms" if left else "")
+        axes.annotate(
+            text,
+            (x, y),
+            xytext=(-6 if left else 6, -2 if left else 2),
+            textcoords="offset points",
+            ha="right" if left else "left",
+            va="top" if left else "bottom",
+            fontsize=7.5,
+            fontweight="bold" if point.accuracy else "normal",
+            color=colour,
+        )
