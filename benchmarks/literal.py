@@ -13,11 +13,9 @@ import numba
 import numpy as np
 
 from boulder_kernels import Constants, DesignTable, Readings
-from boulder_kernels.dense_output import dense_output
+from boulder_kernels.dense_output import Track, displacement_at, slope_at, track
 from boulder_kernels.design import constants_of, design_at
 from boulder_kernels.dynamics import Acceleration, State
-from boulder_kernels.modes import Switches
-from boulder_kernels.outcomes import Maxima, no_maxima, updated_maxima
 from boulder_kernels.restoring import printed_restoring_moment
 from boulder_kernels.soil import soil_kinematics, soil_reaction
 from boulder_kernels.tableau import STAGES, A
@@ -75,20 +73,45 @@ def literal_step(y: State, k1: Acceleration, h: float, readings: Readings, c: Co
 
 
 @_compiled
-def literal_maxima(c: Constants, readings: Readings, h_full: float, t_end: float, theta_limit: float) -> Maxima:
-    """Simulate one impact by fixed steps [s] up to a time [s] or to the limit of rotation [rad]."""
+def highest(q: Track) -> float:
+    """Largest displacement in a step: at its ends, or where a rising track turns inside."""
+    end = displacement_at(q, 1.0)
+    slope_end = slope_at(q, 1.0)
+    if not q.x1 > 0.0 > slope_end:
+        return max(q.x0, end)
+    tau = q.x1 / (q.x1 - slope_end)
+    for _ in range(4):  # Newton's method from the chord
+        bend = 2.0 * q.x2 + tau * (6.0 * q.x3 + tau * (12.0 * q.x4 + tau * 20.0 * q.x5))
+        tau = min(max(tau - slope_at(q, tau) / bend, 0.0), 1.0)
+    return max(displacement_at(q, tau), max(q.x0, end))
+
+
+@_compiled
+def literal_maxima(
+    c: Constants, readings: Readings, h_full: float, t_end: float, theta_limit: float
+) -> tuple[float, float, float]:
+    """Simulate one impact by fixed steps [s] up to a time [s] or to the limit of rotation [rad].
+
+    Returns
+    -------
+    theta, x_b, x_v
+        Largest |rotation| [rad], displacement of the boulder and of the truck [m].
+    """
     y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
     k = literal_acceleration(y, readings, c)
-    m = no_maxima()
-    contact = Switches(1.0, 0.0, 0.0, c.k_v, c.k_m)
+    theta, x_b, x_v = 0.0, 0.0, 0.0
     t = 0.0
-    while t < t_end and m.theta < theta_limit:
+    while t < t_end and theta < theta_limit:
         h = min(h_full, t_end - t)
         y_end, k_end = literal_step(y, k, h, readings, c)
-        m = updated_maxima(m, t, h, 1.0, y_end, dense_output(y, k, y_end, k_end, h), contact, c)
+        forward = track(h, y.theta_b, y.omega_b, k.alpha_b, y_end.theta_b, y_end.omega_b, k_end.alpha_b)
+        back = Track(-forward.x0, -forward.x1, -forward.x2, -forward.x3, -forward.x4, -forward.x5)
+        theta = max(theta, highest(forward), highest(back))
+        x_b = max(x_b, highest(track(h, y.x_b, y.v_b, k.a_b, y_end.x_b, y_end.v_b, k_end.a_b)))
+        x_v = max(x_v, highest(track(h, y.x_v, y.v_v, k.a_v, y_end.x_v, y_end.v_v, k_end.a_v)))
         t = t + h if h == h_full else t_end
         y, k = y_end, k_end
-    return m
+    return theta, x_b, x_v
 
 
 @_compiled
@@ -113,6 +136,6 @@ def literal_table(
     n = table.L.size
     theta, x_b, x_v = np.zeros(n), np.zeros(n), np.zeros(n)
     for row in range(n):
-        m = literal_maxima(constants_of(design_at(table, row), readings, 0), readings, h, t_end[row], theta_limit)
-        theta[row], x_b[row], x_v[row] = m.theta, m.x_b, m.x_v
+        c = constants_of(design_at(table, row), readings, 0)
+        theta[row], x_b[row], x_v[row] = literal_maxima(c, readings, h, t_end[row], theta_limit)
     return theta, x_b, x_v
