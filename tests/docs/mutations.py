@@ -1,0 +1,73 @@
+"""Equations broken on purpose, one at a time: the place, what stands there, and what is put in its stead."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Mutation(NamedTuple):
+    """One broken equation."""
+
+    equations: tuple[int, ...]
+    """Whose tests in the register must notice."""
+    file: str
+    old: str
+    new: str
+
+
+_DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/soil.py"
+_VEHICLE, _RESTORING = "kernels/boulder_kernels/vehicle.py", "kernels/boulder_kernels/restoring.py"
+_DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
+_WALL, _TRAJECTORY = "boulder_sweep/rigid_wall.py", "boulder_sweep/trajectory.py"
+
+MUTATIONS = (
+    Mutation((1,), _DESIGN, "return 0.25 * math.pi + 0.5 * phi", "return 0.25 * math.pi - 0.5 * phi"),
+    Mutation((2,), _DESIGN, "* (design.d - element_depth(", "* (design.d + element_depth("),
+    Mutation((3,), _DESIGN, "(soil.mass * design.L + m_b * 0.5 * design.L)", "(soil.mass * design.L + m_b * design.L)"),
+    Mutation((4,), _DESIGN, "(soil.first + m_b * 0.5 * design.H)", "(soil.first - m_b * 0.5 * design.H)"),
+    Mutation((5, 6), _DESIGN, "else design.e + half_element - z_0", "else design.e - z_0"),
+    Mutation((5, 6), _DESIGN, "h = design.e + z_0 if", "h = design.e - z_0 if"),
+    Mutation((7, 8), _SOIL, "q = c.l_n * sin - c.z_0 * cos", "q = c.l_n * sin + c.z_0 * cos"),
+    Mutation((9,), _DESIGN, "min(H - d, e_hood) + e_bumper", "min(H - d, e_hood) - e_bumper"),
+    Mutation((10,), _DYNAMICS, "(soil.F + F_v) * c.inverse_m_eff", "(soil.F - F_v) * c.inverse_m_eff"),
+    Mutation((11,), _DYNAMICS, "M = soil.M + F_v * contact_lever", "M = -soil.M + F_v * contact_lever"),
+    Mutation((12,), _DESIGN, "m_eff = m_b + soil.mass", "m_eff = m_b"),
+    Mutation((13,), _DESIGN, "(c_y * c_y + l_n * l_n) * soil.mass", "(c_y * c_y - l_n * l_n) * soil.mass"),
+    Mutation((14,), _DESIGN, "l_n = design.L - c_x", "l_n = c_x"),
+    Mutation((15,), _DESIGN, "return design.rho_b * design.L", "return 1.01 * design.rho_b * design.L"),
+    Mutation((16,), _DESIGN, "own *= 0.25", "own *= 0.5"),
+    Mutation((17,), _DYNAMICS, "-s.k_truck * u,", "s.k_truck * u,"),
+    Mutation((19, 20), _SOIL, "F_n = -(", "F_n = +("),
+    Mutation((20,), _SOIL, "M -= F_n * (k.lever_d * ratio + k.q)", "M -= F_n * (k.lever_d * ratio - k.q)"),
+    Mutation((19, 20), _SOIL, "(below * b_1 + above * b_2 - y)", "(below * b_1 + above * b_2 + y)"),
+    Mutation((19,), _SOIL, "drag = BB * (2.0 * r_0 - 1.0)", "drag = BB * (2.0 * r_0 + 1.0)"),
+    Mutation((21, 26, 28), _SOIL, "min(max(displacement, -c.x_yield), c.x_yield)", "min(displacement, c.x_yield)"),
+    Mutation((22,), _SOIL, "x_b - c.l_n * versin + c.z_0 * sin", "x_b + c.l_n * versin + c.z_0 * sin"),
+    Mutation((24,), _DESIGN, "return 1e6 * design.beta * design.W", "return 1e6 * design.beta"),
+    Mutation((24,), _DESIGN, "return (n - 0.5) * d / elements", "return n * d / elements"),
+    Mutation((25,), _DESIGN, "return d / math.tan(phi)", "return d * math.tan(phi)"),
+    Mutation((27,), _DESIGN, "passive_pressure_coefficient(phi) ** 2", "passive_pressure_coefficient(phi)"),
+    Mutation((28,), _DESIGN, "design.rho_s, design.K_epsilon) * design.W", "design.rho_s, 1.0) * design.W"),
+    Mutation((34, 36), _SOIL, "velocity * abs(velocity)", "velocity * velocity"),
+    Mutation((35,), _SOIL, "v_b - omega_b * q", "v_b + omega_b * q"),
+    Mutation(
+        (37,), _RESTORING, "c.C_cos - c.C_cos * versin + c.C_sin * sin", "c.C_cos - c.C_cos * versin - c.C_sin * sin"
+    ),
+    Mutation((38, 39), _RESTORING, "if omega_b <= 0.0:", "if omega_b < -1e9:"),
+    Mutation((39,), _RESTORING, "return -corner * min(", "return corner * min("),
+    Mutation((39,), _MODES, "net = 1.0 - modes.corner", "net = 1.0 + modes.corner"),
+    Mutation((37, 39), _RESTORING, "switches.couple_sin * sin", "switches.couple_sin * sin * sin"),
+    Mutation((40, 45), _VEHICLE, "x_v - x_c - c.tau_v * (c.v_0 - v_v)", "x_v - x_c - c.tau_v * c.v_0"),
+    Mutation((41, 46, 47), _VEHICLE, "return c.k_v * u", "return c.k_m * u"),
+    Mutation((45,), _VEHICLE, "-k_v / c_v * a_v - k_v / m_v", "-k_v / c_v * a_v + k_v / m_v"),
+    Mutation((45, 48), _VEHICLE, "return c.h - c.h * versin + c.g_x * sin", "return c.h - c.h * versin - c.g_x * sin"),
+    Mutation(
+        (47,), _MODES, "if modes.touching or not readings.separation_released else 0.0", "if modes.touching else 0.0"
+    ),
+    Mutation((49,), _WALL, "x = m / c * (v_0 - v) + v_0 * odd", "x = m / c * (v_0 - v)"),
+    Mutation((50,), _WALL, "(a * a + b * b) / (-2.0 * a)", "(a * a - b * b) / (-2.0 * a)"),
+    Mutation((51,), _WALL, "return -2.0 * a * damper, damper", "return -a * damper, damper"),
+    Mutation((52,), _DYNAMICS, "s.net * M + couple_moment", "M + couple_moment"),
+    Mutation((53, 54, 55), _TRAJECTORY, "+ up * np.sin(theta)", "- up * np.sin(theta)"),
+    Mutation((53, 54, 55), _TRAJECTORY, "x_b - along *", "x_b + along *"),
+)
