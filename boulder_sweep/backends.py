@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
+import shutil
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import Any
 
+from .processes import Work, begin_worker, new_exchange
+
 BACKENDS = ("threading", "loky", "dask")
-_LOOK_FOR_PARENT_S = 0.2
 _CONNECT_S = "10s"
+_PATIENCE_S = 1.0
 _COMPLAINERS = ("concurrent.futures", "distributed", "distributed.worker.state_machine")
 """Loggers that report cancelled work as if it were a mistake."""
 
@@ -62,22 +63,23 @@ class Backend:
             raise BackendError(f"a scheduler address needs the backend dask, not {name}")
         self.name = name
         self.jobs = jobs
+        self.in_processes = name == "loky" and jobs > 1
+        """Whether blocks are computed by other processes of this machine; a single one would be this one."""
+        self.exchange = new_exchange() if self.in_processes else None
+        """Folder through which those hand over their results."""
         self._levels: dict[str, int] = {}
         self._client = _dask_client(jobs, scheduler) if name == "dask" else None
         if self._client is not None and scheduler is not None:
             self.jobs = max(sum(self._client.nthreads().values()), 1)
 
-    @property
-    def shares_memory(self) -> bool:
-        """Whether workers see this process' objects, so that nothing has to be sent."""
-        return self.name == "threading"
-
     @contextmanager
-    def pool(self, jobs: int | None = None) -> Iterator[Any]:
+    def pool(self, work: Work, jobs: int | None = None) -> Iterator[Any]:
         """Give a `joblib.Parallel` that yields results in the order in which they are ready.
 
         Parameters
         ----------
+        work
+            What worker processes are told once, when they begin.
         jobs
             How many workers; as many as the backend has by default.
         """
@@ -89,8 +91,8 @@ class Backend:
             "batch_size": 1,
             "pre_dispatch": "2*n_jobs",
         }
-        if self.name == "loky":
-            settings |= {"max_nbytes": None, "initializer": _guard, "initargs": (os.getpid(),)}
+        if self.in_processes:
+            settings |= {"max_nbytes": None, "initializer": begin_worker, "initargs": (os.getpid(), work)}
         if self._client is None:
             settings["backend"] = self.name
             with joblib.Parallel(**settings) as parallel:
@@ -102,19 +104,19 @@ class Backend:
             ):
                 yield parallel
 
-    def kill_workers(self, *, wait: bool = True) -> None:
+    def kill_workers(self, patience_s: float) -> None:
         """End worker processes of this machine, whatever they are doing.
 
         Parameters
         ----------
-        wait
-            Whether to return only when they have ended.
+        patience_s
+            How long to wait for that; it goes on without waiting afterwards [s].
         """
-        if self.name == "loky":
-            from joblib.externals.loky import get_reusable_executor
-
-            with suppress(Exception):  # they may be dying already
-                get_reusable_executor(reuse=True).shutdown(wait=wait, kill_workers=True)
+        if self.in_processes:
+            # Beside this thread, because new workers may just be starting, which cannot be hurried.
+            killing = threading.Thread(target=_kill_processes, name="killing workers", daemon=True)
+            killing.start()
+            killing.join(patience_s)
 
     def abandon(self) -> None:
         """End the workers in the middle of their work, and let nobody complain about that."""
@@ -122,17 +124,27 @@ class Backend:
             logger = logging.getLogger(name)
             self._levels.setdefault(name, logger.level)
             logger.setLevel(logging.CRITICAL)
-        self.kill_workers(wait=False)
+        self.kill_workers(patience_s=0.0)
 
     def close(self) -> None:
         """Let all workers go."""
-        self.kill_workers()
+        self.kill_workers(_PATIENCE_S)
         if self._client is not None:
             self._client.close()
             self._client = None
+        if self.exchange is not None:
+            shutil.rmtree(self.exchange, ignore_errors=True)
         for name, level in self._levels.items():
             logging.getLogger(name).setLevel(level)
         self._levels.clear()
+
+
+def _kill_processes() -> None:
+    """End the worker processes that joblib keeps."""
+    from joblib.externals.loky import get_reusable_executor
+
+    with suppress(Exception):  # they may be dying already
+        get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
 
 def _dask_client(jobs: int, scheduler: str | None) -> Any:
@@ -167,15 +179,3 @@ def _what_computes() -> tuple[dict[str, str], str, str]:
     from boulder_sweep.store.provenance import kernels_sha256, rules_sha256, versions
 
     return versions(), kernels_sha256(), rules_sha256()
-
-
-def _guard(parent: int) -> None:
-    """Make a worker process ignore Ctrl-C, which is its parent's to handle, and end when its parent does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_LOOK_FOR_PARENT_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, name="parent watch", daemon=True).start()

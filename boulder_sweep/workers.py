@@ -10,7 +10,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,18 +19,31 @@ import numpy as np
 from .admission import Admission
 from .backends import Backend
 from .judged import Judged, not_computed
+from .processes import (
+    Evaluate,
+    Failure,
+    MakeBlock,
+    NoRoom,
+    Outcome,
+    Parcel,
+    Work,
+    compute,
+    compute_here,
+    one_line,
+    opened,
+)
+from .store.errors import WriteError
 
 if TYPE_CHECKING:
     from .designs import DesignBlock
 
-MakeBlock = Callable[[int, int], "DesignBlock"]
-Evaluate = Callable[["DesignBlock"], Judged]
 _TRIES = 2
 _RAISES_BUDGET = 5_000
 """Failed tries after which blocks are no longer halved: then something is wrong with all of them."""
 _DEATHS_BUDGET = 50
 """Dead workers after which blocks are no longer halved, since each costs a second."""
-_LONGEST_REASON = 200
+_DEATHS_AT_FIRST = 10
+"""Dead workers after which the run ends if none has ever computed a block."""
 
 
 class Piece(NamedTuple):
@@ -45,12 +58,6 @@ class Ended(NamedTuple):
 
     problem: BaseException | None
     """What went wrong, if anything did."""
-
-
-class _Failure(NamedTuple):
-    """A block raised."""
-
-    text: str
 
 
 @dataclass(frozen=True)
@@ -96,8 +103,7 @@ class Workers(threading.Thread):
         self.results: queue.SimpleQueue[Piece | Ended] = queue.SimpleQueue()
         self.notes: list[str] = []
         self._backend = backend
-        self._evaluate = evaluate
-        self._make_block = make_block
+        self._work = Work(evaluate, make_block, backend.exchange)
         self._ranges = ranges
         self._next: tuple[int, int] | None = None
         self._admission = admission
@@ -126,12 +132,14 @@ class Workers(threading.Thread):
     def _run_pool(self) -> None:
         """Compute with one pool until all is done or the pool breaks."""
         try:
-            with self._backend.pool() as parallel:
+            with self._backend.pool(self._work) as parallel:
                 while not self._stopped.is_set() and not self._done():
                     for task, outcome in parallel(self._calls()):
                         self._receive(task, outcome)
                     if not self._again:
                         self._admission.wait(0.05)
+        except WriteError:
+            raise
         except Exception as problem:
             if self._stopped.is_set() or not self._under_way:
                 raise
@@ -164,18 +172,24 @@ class Workers(threading.Thread):
         """Return a call that computes a task."""
         import joblib
 
-        if self._backend.shares_memory:
-            return joblib.delayed(_make_and_compute)(self._stopped, self._evaluate, self._make_block, task)
+        if self._backend.in_processes:
+            return joblib.delayed(_in_a_process)(task)
+        if self._backend.name != "dask":
+            return joblib.delayed(_in_a_thread)(self._stopped, self._work, task)
         try:
-            block = self._make_block(task.start, task.stop)
+            block = self._work.make_block(task.start, task.stop)
         except Exception as problem:
-            return joblib.delayed(_return)(task, _Failure(_text(problem)))
-        return joblib.delayed(_compute)(self._evaluate, block, task)
+            return joblib.delayed(_passed_on)(task, Failure(one_line(problem)))
+        return joblib.delayed(_elsewhere)(self._work.evaluate, block, task)
 
-    def _receive(self, task: _Task, outcome: Judged | _Failure | None) -> None:
+    def _receive(self, task: _Task, outcome: Outcome) -> None:
         """Pass a result on, or see to a failure."""
         if self._under_way.pop(task.start, None) is None or outcome is None:
             return
+        if isinstance(outcome, NoRoom):
+            raise WriteError(f"a worker cannot hand over its result: {outcome.text}")
+        if isinstance(outcome, Parcel):
+            outcome = opened(outcome)
         if isinstance(outcome, Judged):
             self._succeeded = True
             self.results.put(Piece(task.start, outcome))
@@ -190,7 +204,7 @@ class Workers(threading.Thread):
 
     def _mend(self, problem: Exception) -> None:
         """Compute what was under way when a worker died, every block with a worker of its own."""
-        self.notes.append(f"a worker ended unexpectedly ({_text(problem)}); its rows were computed again")
+        self.notes.append(f"a worker ended unexpectedly ({one_line(problem)}); its rows were computed again")
         self._deaths += 1
         suspects = sorted(self._under_way.values(), key=lambda task: task.start, reverse=True)
         self._under_way.clear()
@@ -198,21 +212,23 @@ class Workers(threading.Thread):
             task = suspects.pop()
             try:
                 # Two workers, because one would be this very process.
-                with self._backend.pool(jobs=2) as parallel:
+                with self._backend.pool(self._work, jobs=2) as parallel:
                     self._under_way[task.start] = task
                     for done, outcome in parallel([self._call(task)]):
                         self._receive(done, outcome)
+            except WriteError:
+                raise
             except Exception as again:
                 if self._stopped.is_set():
                     raise
                 self._deaths += 1
-                del self._under_way[task.start]
-                if self._deaths >= _DEATHS_BUDGET and not self._succeeded:
+                self._under_way.pop(task.start, None)
+                if self._deaths >= _DEATHS_AT_FIRST and not self._succeeded:
                     raise RuntimeError("no worker survives its first block") from again
                 if task.stop - task.start > 1 and self._deaths < _DEATHS_BUDGET:
                     suspects.extend(reversed(task.halves()))
                 else:
-                    self._give_up(task, f"the worker that computed this design ended: {_text(again)}")
+                    self._give_up(task, f"the worker that computed this design ended: {one_line(again)}")
 
     def _give_up(self, task: _Task, reason: str) -> None:
         """Let the rows of a task be errors."""
@@ -220,33 +236,23 @@ class Workers(threading.Thread):
         self.results.put(Piece(task.start, not_computed((reason,), codes)))
 
 
-def _make_and_compute(
-    stopped: threading.Event, evaluate: Evaluate, make_block: MakeBlock, task: _Task
-) -> tuple[_Task, Judged | _Failure | None]:
+def _in_a_thread(stopped: threading.Event, work: Work, task: _Task) -> tuple[_Task, Outcome]:
     """Compute a task in a thread of this process."""
     if stopped.is_set():
         return task, None
-    try:
-        return task, evaluate(make_block(task.start, task.stop))
-    except Exception as problem:
-        return task, _Failure(_text(problem))
+    return task, compute(work.evaluate, work.make_block, task.start, task.stop)
 
 
-def _compute(evaluate: Evaluate, block: DesignBlock, task: _Task) -> tuple[_Task, Judged | _Failure]:
-    """Compute a task in another process."""
-    try:
-        return task, evaluate(block)
-    except Exception as problem:
-        return task, _Failure(_text(problem))
+def _in_a_process(task: _Task) -> tuple[_Task, Outcome]:
+    """Compute a task in a process that knows its work."""
+    return task, compute_here(task.start, task.stop)
 
 
-def _return(task: _Task, failure: _Failure) -> tuple[_Task, _Failure]:
-    """Pass a failure through the pool."""
-    return task, failure
+def _elsewhere(evaluate: Evaluate, block: DesignBlock, task: _Task) -> tuple[_Task, Outcome]:
+    """Compute a task on another machine, which gets the block itself."""
+    return task, compute(evaluate, lambda start, stop: block, task.start, task.stop)
 
 
-def _text(problem: BaseException) -> str:
-    """One line for a problem."""
-    words = " ".join(str(problem).split())
-    text = f"{type(problem).__name__}: {words}" if words else type(problem).__name__
-    return text if len(text) <= _LONGEST_REASON else f"{text[: _LONGEST_REASON - 3]}..."
+def _passed_on(task: _Task, outcome: Outcome) -> tuple[_Task, Outcome]:
+    """Pass what is known already through the pool."""
+    return task, outcome

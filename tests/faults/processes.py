@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 import uuid
 from pathlib import Path
@@ -53,11 +54,16 @@ class Driver:
         return self.process.returncode, last, complaints
 
     def left_behind(self, patience: float = 3.0) -> list[str]:
-        """Command lines of processes with the mark that are still alive after a while."""
+        """Processes with the mark that are still alive after a while, and folders in memory that are still there."""
         end = time.monotonic() + patience
-        while (alive := _marked(self.mark)) and time.monotonic() < end:
+        while (left := _marked(self.mark) + self._folders()) and time.monotonic() < end:
             time.sleep(0.05)
-        return alive
+        return left
+
+    def _folders(self) -> list[str]:
+        """Folders in memory that the process made."""
+        places = [Path("/dev/shm"), Path(tempfile.gettempdir())]
+        return [str(path) for place in places for path in place.glob(f"boulder-sweep-{self.process.pid}-*")]
 
 
 def run_driver(out: Path, *options: str, **environment: str) -> tuple[int, dict[str, Any], str]:
