@@ -50,7 +50,7 @@ def _row(each: Measured, kernels: Measured) -> list[str]:
         best = min(each.points, key=lambda point: point[2])
         return [each.name, str(each.designs), "none", f"{significant(best[2])} deg at best", "", "not comparable"]
     tolerance, cost, error = own
-    shown = f"{1e3 * tolerance:g} ms" if each is kernels else f"{tolerance:.0e}"
+    shown = f"{1e3 * tolerance:.2g} ms" if each.in_steps else f"{tolerance:.0e}"
     return [
         each.name,
         str(each.designs),

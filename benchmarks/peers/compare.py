@@ -42,12 +42,15 @@ class Measured:
         Tolerance, CPU time of a design [s], largest error [deg]; in the order tried.
     problem
         Why there is no more; empty where there is nothing to say.
+    in_steps
+        Whether the tolerances are steps [s].
     """
 
     name: str
     designs: int
     points: list[tuple[float, float, float]] = field(default_factory=list)
     problem: str = ""
+    in_steps: bool = False
 
     @property
     def chosen(self) -> tuple[float, float, float] | None:
@@ -62,7 +65,7 @@ class Measured:
 
 def measure_kernels(problem: Problem) -> Measured:
     """The lanes of this project; their sample is the whole problem."""
-    measured = Measured("boulder-sweep, lanes", problem.size)
+    measured = Measured("boulder-sweep, lanes", problem.size, in_steps=True)
     bk.simulate_table(problem.designs, READINGS, bk.Control(0.01, HORIZON, ROTATION_LIMIT, 0, False))
     for step in KERNEL_STEPS_S:
         control = bk.Control(step, HORIZON, ROTATION_LIMIT, 0, False)
@@ -85,7 +88,7 @@ def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measured
         How many tolerances more, to see that the accuracy stays.
     """
     own = problem.first(min(solver.designs, problem.size))
-    measured = Measured(solver.name, own.size)
+    measured = Measured(solver.name, own.size, in_steps=solver.in_steps)
     solve = solver.prepare(own)
     solve(solver.tolerances[0])
     enough = 0

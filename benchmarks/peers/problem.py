@@ -84,12 +84,15 @@ class Solver:
         returns the states, shape (n, 65, 6).
     tolerances
         Relative tolerances (or steps) to try, the loosest first.
+    in_steps
+        Whether they are longest steps [s].
     """
 
     name: str
     designs: int
     prepare: Callable[[Problem], Callable[[float], np.ndarray]]
     tolerances: tuple[float, ...]
+    in_steps: bool = False
 
 
 def problem_of(designs: DesignTable) -> Problem:
