@@ -98,12 +98,24 @@ class Run:
             raise
         finally:
             self.notes += workers.notes if workers is not None else []
-        self._folder.close("finished")
 
-    def end(self) -> None:
-        """Let the workers go."""
+    def end(self, how: str) -> int:
+        """Let folder and workers go.
+
+        Parameters
+        ----------
+        how
+            ``finished``, or what stopped the run.
+
+        Returns
+        -------
+        int
+            Rows that are safe.
+        """
+        self._folder.close(how)
         if self._backend is not None:
             self._backend.close()
+        return self._folder.manifest.rows_done
 
     def _look_after(self, workers: Workers | None, collector: Collector, progress: Report | None) -> None:
         """Pass results on until everything is written."""

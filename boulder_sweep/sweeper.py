@@ -102,27 +102,26 @@ def run(
     begun = time.monotonic()
     out = Path(out)
     _check_rows(sweep)
-    evaluation = evaluation_of(sweep, simulate)
     again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
-    manifest = Manifest(_identity(sweep, evaluation), sweep.n_designs, rows_per_part, again)
     jobs = jobs or available_cores()
-    session = new_session(command or "boulder_sweep.run", jobs, backend)
+    whole: Run | None = None
     with Signals() as signals:
-        folder = open_output(out, manifest, session, resume=resume, overwrite=overwrite)
-        whole = Run(sweep, evaluation, folder, signals)
         try:
+            evaluation = evaluation_of(sweep, simulate)
+            manifest = Manifest(_identity(sweep, evaluation), sweep.n_designs, rows_per_part, again)
+            session = new_session(command or "boulder_sweep.run", jobs, backend)
+            folder = open_output(out, manifest, session, resume=resume, overwrite=overwrite)
+            whole = Run(sweep, evaluation, folder, signals)
             whole.prepare(backend, jobs, scheduler, force)
             whole.compute(progress, commit_every_s)
         except Interrupted as stop:
-            folder.close(f"interrupted by signal {stop.signum}")
-            done = folder.manifest.rows_done
+            done = whole.end(f"interrupted by signal {stop.signum}") if whole else 0
             raise Interrupted(stop.signum, done, sweep.n_designs, again) from None
         except BaseException as problem:
-            folder.close(f"stopped by {type(problem).__name__}: {problem}")
+            if whole:
+                whole.end(f"stopped by {type(problem).__name__}: {problem}")
             raise
-        finally:
-            whole.end()
-        folder.close("finished")
+        whole.end("finished")
     return summary_of(
         out,
         folder.manifest,
