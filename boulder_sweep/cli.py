@@ -193,7 +193,7 @@ def simulate(
         result.animate(animate)
     values = result.summary()
     click.echo(json.dumps(values) if as_json else "\n".join(console.value_lines(values)))
-    return 0
+    return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0
 
 
 @cli.command(short_help="Show how far a run got and how to go on.", epilog=STATUS_EXAMPLES)

@@ -83,7 +83,10 @@ class EnergyLedger:
     @property
     def largest_residual(self) -> float:
         """Largest residual as a fraction of the energy at first touch; NaN without samples."""
-        return float(np.abs(self.residual_J).max() / self.initial) if len(self.time_s) else float("nan")
+        if len(self.time_s) == 0:
+            return float("nan")
+        largest = float(np.abs(self.residual_J).max())
+        return largest / self.initial if largest > 0.0 else 0.0
 
 
 def forces_along(record: Record, design: Design, readings: Readings, c: Constants) -> dict[str, np.ndarray]:

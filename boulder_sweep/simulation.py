@@ -58,7 +58,8 @@ def simulate(
     ----------
     design : Sweep, path, or mapping
         A sweep, a file of settings, or one design by the names and units of the table's input columns (a row
-        of a result table will do; ``embedment_ratio`` may stand in for ``embedment_depth_m``).
+        of a result table will do; ``embedment_ratio`` may stand in for ``embedment_depth_m``). What else decides a
+        verdict then has the defaults of a file: 20 deg, P1, corrected readings, balanced accuracy, 1 s.
     design_id : int
         Number of the design within the sweep.
     readings : str or ReadingChoice, optional

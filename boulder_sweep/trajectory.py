@@ -170,7 +170,9 @@ class Trajectory:
         Returns
         -------
         dict
-            Plain data; None where there is no value. The readings and the representation of the soil close it.
+            Plain data; None where there is no value. ``energy_residual`` is what the energy ledger fails to account
+            for, at most, as a share of the energy at first touch: a check of this very simulation. The readings and
+            the representation of the soil close it.
         """
         found: dict[str, Any] = {"name": self.name, "design_id": self.design_id}
         for name in OUTCOME_COLUMNS:
@@ -185,6 +187,7 @@ class Trajectory:
                 key, field = _PEAK_TIMES[name]
                 found[key] = _plain(getattr(self.motion.outcome.maxima, field))
         model = self.settings["model"]
+        found["energy_residual"] = _plain(self.energy().largest_residual)
         return found | {"preset": model["preset"], "readings": model["readings"], "soil": model["soil"]}
 
     def columns(self, *, energy: bool = False) -> dict[str, np.ndarray]:

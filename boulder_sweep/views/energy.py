@@ -78,7 +78,7 @@ def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
             fontsize=8.5,
         )
         axes.set_xlim(0.0, float(time[-1]))
-        axes.set_ylim(1.05 * float(below.min()), 1.09 * max(float(above.max()), ledger.initial / 1e3))
+        figures.limit_y(axes, 1.05 * float(below.min()), 1.09 * max(float(above.max()), ledger.initial / 1e3))
         axes.grid(visible=False)
         _mark_limit(axes, trajectory)
         axes.set_xlabel("time since first touch [s]")

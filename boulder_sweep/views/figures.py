@@ -113,6 +113,11 @@ def save(fig: Figure, target: Path) -> None:
         raise PictureError(f"{target} cannot be written: {problem.strerror or problem}") from problem
 
 
+def limit_y(axes: Axes, low: float, high: float) -> None:
+    """Set the range of the vertical axis; some range also where nothing moves."""
+    axes.set_ylim(low, high if high > low else low + 1.0)
+
+
 def mark_peak(axes: Axes, time: float, value: float, text: str, colour: str, *, below: bool = False) -> None:
     """Mark a peak with a dot and its value: above or below it, on the side where there is room."""
     axes.plot([time], [value], "o", color=colour, markersize=4.5, zorder=5, clip_on=False)

@@ -92,7 +92,7 @@ def _force(axes: Axes, trajectory: Trajectory) -> None:
     axes.plot(trajectory.time_s, soil, color=GREEN, linestyle="--", label="soil against boulder")
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     top = max(float(soil.max()), float(trajectory.contact_force_N.max() / 1e3))
-    axes.set_ylim(min(1.15 * float(soil.min()), -0.05 * top), 1.36 * top)
+    figures.limit_y(axes, min(1.15 * float(soil.min()), -0.05 * top), 1.36 * top)
     axes.set_title("Horizontal forces")
     axes.set_ylabel("force [kN]")
     axes.legend(loc="upper left", ncols=2)

@@ -47,6 +47,7 @@ def test_summary_of_the_crash_tests(trajectories: Trajectories, key: tuple[str, 
     assert found["time_to_limit_s"] == (None if reached is None else pytest.approx(reached, abs=6e-5))
     assert (found["verdict"], found["reason"]) == (("fail", "overturns") if key[0] == "abg" else ("pass", ""))
     assert found["preset"] == key[1]
+    assert 0.0 < found["energy_residual"] < 1e-7
     assert list(found["readings"]) == ["inertia", "impact_arm", "contact", "restoring", "separation"]
     assert set(OUTCOME_COLUMNS) < set(found)
     json.dumps(found, allow_nan=False)
@@ -125,6 +126,7 @@ def test_arrays_have_one_value_per_sample(trajectories: Trajectories) -> None:
 
 def test_maxima_do_not_depend_on_the_samples() -> None:
     coarse, fine = (simulate(crash_test("rwg"), sample_s=dt).summary() for dt in (0.05, 0.0005))
+    assert coarse.pop("energy_residual") <= fine.pop("energy_residual")  # the largest over the samples there are
     assert coarse == fine
 
 
@@ -234,3 +236,33 @@ def test_crash_tests_are_those_of_the_settings_files() -> None:
         file = boulder_sweep.load(CONFIGS / f"{test}.yaml").resolved()
         assert crash_test(test).resolved()["inputs"] == file["inputs"]
         assert file["solver"]["horizon_s"] == crash_test(test).solver.horizon_s
+
+
+EXTREMES = {
+    "at rest": {"impact_speed_m_s": 0.0},
+    "a touch": {"impact_speed_m_s": 1e-3},
+    "thrown over": {"boulder_density_kg_m3": 300.0, "impact_speed_m_s": 60.0},
+    "a splinter": {"boulder_length_m": 0.01, "boulder_width_m": 0.01},
+    "a mountain": {"boulder_density_kg_m3": 1e9},
+    "a rigid damper": {"vehicle_damper_N_s_m": 1e12},
+    "on the ground": {"embedment_depth_m": 1e-3},
+    "in mud": {"subgrade_reaction_MN_m3": 1e-3},
+}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("name", EXTREMES)
+def test_extremes_have_a_history_that_adds_up(name: str, preset: str) -> None:
+    found = simulate(crash_test("rwg").constants | EXTREMES[name], readings=preset, horizon_s=0.5)
+    assert found.verdict in ("pass", "fail", "undecided")
+    for values in found.columns(energy=True).values():
+        assert values.dtype == object or np.isfinite(values).all()
+    assert found.energy().largest_residual < 1e-4
+    json.dumps(found.summary(), allow_nan=False)
+
+
+def test_a_design_that_cannot_be_integrated_says_why() -> None:
+    found = simulate(crash_test("rwg").constants | {"vehicle_damper_N_s_m": 1.0})
+    assert (found.verdict, len(found)) == ("error", 0)
+    assert "damper" in found.reason
+    assert found.summary()["max_rotation_deg"] is None

@@ -70,6 +70,14 @@ def test_other_kinds(held: Trajectory, tmp_path: Path, kind: str) -> None:
     assert start.startswith(b"%PDF") if kind == ".pdf" else b"svg" in start or b"<?xml" in start
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("speed", [0.0, 1e-3])
+@pytest.mark.parametrize("name", DRAWERS)
+def test_hardly_any_motion_is_drawn_too(tmp_path: Path, name: str, speed: float) -> None:
+    DRAWERS[name](simulate(crash_test("rwg").constants | {"impact_speed_m_s": speed}), tmp_path / "still.png")
+    assert (tmp_path / "still.png").stat().st_size > 10_000
+
+
 @pytest.mark.parametrize("name", DRAWERS)
 def test_nothing_to_draw_is_said(tmp_path: Path, name: str) -> None:
     low = simulate(crash_test("rwg").constants | {"boulder_height_m": 2.5})
