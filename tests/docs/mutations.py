@@ -39,7 +39,7 @@ MUTATIONS = (
     Mutation((17,), _DYNAMICS, "-s.k_truck * u,", "s.k_truck * u,"),
     Mutation((19, 20), _SOIL, "F_n = -(", "F_n = +("),
     Mutation((20,), _SOIL, "M -= F_n * (k.lever_d * ratio + k.q)", "M -= F_n * (k.lever_d * ratio - k.q)"),
-    Mutation((19, 20), _SOIL, "spring_r = (1.0 / 3.0) * (below", "spring_r = (2.0 / 3.0) * (below"),
+    Mutation((19, 20), _SOIL, "pressed_r = c.K_soil * spring_r + R", "pressed_r = c.K_soil * spring_r - R"),
     Mutation((19,), _SOIL, "drag = BB * (2.0 * r_0 - 1.0)", "drag = BB * (2.0 * r_0 + 1.0)"),
     Mutation((21, 26, 28), _SOIL, "min(max(displacement, -c.x_yield), c.x_yield)", "min(displacement, c.x_yield)"),
     Mutation((22,), _SOIL, "x_b - c.l_n * versin + c.z_0 * sin", "x_b + c.l_n * versin + c.z_0 * sin"),
