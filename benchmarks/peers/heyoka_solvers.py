@@ -20,8 +20,8 @@ LONGEST_STEPS_S = tuple(4e-3 * 2.0 ** (-0.5 * k) for k in range(14))
 SERIES_TOLERANCE = 1e-7
 LANES = 8
 TINY = 1e-6
-"""Slope of the soil's motion over the depth below which it counts as this [m], [m/s]. Smaller, and the series of a break
-point that passes through the soil at once have no radius of convergence left."""
+"""Slope of the soil's motion over the depth below which it counts as this [m], [m/s]. Smaller, and the series of a
+break point that passes through the soil at once has no radius of convergence left."""
 
 
 def _clipped(x: Any, low: Any, high: Any) -> Any:
