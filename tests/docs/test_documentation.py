@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from boulder_sweep.studies.contents import CONTENTS, EVERY, GRID, compute, readi
 from boulder_sweep.studies.documents import blocks, differences, pages
 from boulder_sweep.studies.energy import AUDIT_DESIGNS
 from boulder_sweep.studies.example_pulse import NOISE_G, NOISE_MM, example_pulse
+from boulder_sweep.studies.pictures import draw_all
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -97,3 +99,11 @@ def test_command_needs_the_repository(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(SystemExit) as stop:
         main(["--check"])
     assert stop.value.code == 2
+
+
+@pytest.mark.slow
+def test_pictures_are_drawn_by_the_command(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    drawn = draw_all(tmp_path)
+    assert all(path.stat().st_size < MOST_BYTES for path in drawn)
+    assert {path.name for path in drawn} <= {path.name for path in (DOCS / "images").iterdir()}
