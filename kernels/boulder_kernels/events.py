@@ -189,7 +189,14 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
 
 @inlined
 def gaps_of(
-    A: float, slope_x: float, theta_b: float, omega_b: float, u: float, M: float, arm: float, g: GapFactors
+    A: float,
+    slope_x: float,
+    theta_b: float,
+    omega_b: float,
+    u: float,
+    M: float,
+    arm: float,
+    g: GapFactors,
 ) -> Gaps:
     """Gaps of all events.
 
@@ -241,7 +248,14 @@ def needs_moment(g: GapFactors) -> bool:
 
 
 @inlined
-def gap_within(event: int, tau: float, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants) -> float:
+def gap_within(
+    event: int,
+    tau: float,
+    dense: DenseOutput,
+    g: GapFactors,
+    switches: Switches,
+    c: Constants,
+) -> float:
     """Gap of one event at the fraction tau of a step."""
     if event == LIMIT:
         return g.limit - abs(displacement_at(dense.rotation, tau))
@@ -307,7 +321,13 @@ def locate(
 
 @inlined
 def first_event(
-    start: Gaps, end: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
+    start: Gaps,
+    end: Gaps,
+    dense: DenseOutput,
+    g: GapFactors,
+    switches: Switches,
+    c: Constants,
+    yielding: bool,
 ) -> tuple[int, float]:
     """Earliest event of a step, and the fraction of the step at which it happens.
 
@@ -317,6 +337,8 @@ def first_event(
         Gaps at the start and at the end of the step.
     dense, g, switches, c
         The step.
+    yielding
+        Whether to look for YIELD_TOP and YIELD_BASE, or for all others.
 
     Returns
     -------
@@ -325,7 +347,7 @@ def first_event(
     """
     first, earliest = -1, 1.0
     for event in range(EVENTS):
-        if end[event] < 0.0:
+        if end[event] < 0.0 and (event in (YIELD_TOP, YIELD_BASE)) == yielding:
             tau = locate(event, start[event], end[event], dense, g, switches, c)
             if first < 0 or tau < earliest:
                 first, earliest = event, tau
@@ -358,9 +380,9 @@ def initial_modes(readings: Readings, c: Constants) -> Modes:
 
 
 @kernel
-def crossed_yield(yielded: int, displacement: float) -> int:
-    """Mode of the soil after it passed its yield displacement one way or the other."""
-    if yielded != 0:
+def yield_mode(displacement: float, c: Constants) -> int:
+    """Mode of the soil at a displacement [m]: 0 below its ultimate resistance, 1 at it forwards, -1 backwards."""
+    if abs(displacement) <= c.x_yield:
         return 0
     return 1 if displacement > 0.0 else -1
 
@@ -413,9 +435,7 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
     elif event == ARM:
         arm = -arm
     elif event == YIELD_TOP or event == YIELD_BASE:
+        # Both, since all of the soil yields at once under a boulder that has not turned.
         k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
-        if event == YIELD_TOP:
-            top = crossed_yield(top, k.A)
-        else:
-            base = crossed_yield(base, k.A - k.slope_x)
+        top, base = yield_mode(k.A, c), yield_mode(k.A - k.slope_x, c)
     return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(turning, touching, corner, arm, top, base)

@@ -17,6 +17,7 @@ from .dormand_prince import step
 from .dynamics import Acceleration, State
 from .events import LIMIT, GapFactors, gap_factors, gaps_of, initial_modes
 from .impact import (
+    SHORTEN,
     Control,
     attempt_budget,
     cross_event,
@@ -40,7 +41,13 @@ from .outcomes import (
 )
 from .readings import Readings
 from .restoring import signed_arm
-from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible
+from .settling import (
+    NO_PROOF,
+    barrier_energy,
+    boulder_energy,
+    inside_maxima,
+    proof_is_possible,
+)
 from .soil import soil_kinematics
 from .stability import ACCEPTED, MOST_STEPS, RETRY
 from .trigonometry import sine_versine
@@ -208,7 +215,14 @@ def start_lane(
 
 @inlined
 def set_motion(
-    ws: np.ndarray, lane: int, t: float, y: State, k1: Acceleration, switches: Switches, c: Constants, horizon: float
+    ws: np.ndarray,
+    lane: int,
+    t: float,
+    y: State,
+    k1: Acceleration,
+    switches: Switches,
+    c: Constants,
+    horizon: float,
 ) -> None:
     """Put the start of the next step into a lane."""
     store_state(ws, lane, y)
@@ -246,11 +260,28 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
         return Status.UNSTABLE.value
     if field(ws, ATTEMPTS_LEFT, 0, lane) < 0.0:
         return Status.STEP_BUDGET.value
-    y_start, k_start, k_end = load_state(ws, lane), load_start(ws, lane), load_end(ws, lane)
+    y_start, k_start, k_end = (
+        load_state(ws, lane),
+        load_start(ws, lane),
+        load_end(ws, lane),
+    )
     dense = dense_output(y_start, k_start, y_end, k_end, h)
     event, tau, y, m = keep_up_to_event(
-        t, h, y_start, k_start.M, y_end, k_end.M, dense, factors, switches, load_maxima(ws, lane), c
+        t,
+        h,
+        y_start,
+        k_start.M,
+        y_end,
+        k_end.M,
+        dense,
+        factors,
+        switches,
+        load_maxima(ws, lane),
+        c,
     )
+    if event == SHORTEN:
+        put(ws, STEP, 0, lane, tau * h)
+        return RUNNING
     last = h >= control.horizon - t
     t = control.horizon if last and event < 0 else t + tau * h
     put(ws, TIME, 0, lane, t)
@@ -269,7 +300,14 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
     k1 = k_end
     if event >= 0:
         y, modes, switches, factors, k1 = cross_event(
-            event, y, load_modes(ws, lane), switches, readings, control.theta_limit, control.locate_yield, c
+            event,
+            y,
+            load_modes(ws, lane),
+            switches,
+            readings,
+            control.theta_limit,
+            control.locate_yield,
+            c,
         )
         set_modes(ws, lane, modes, switches, factors)
     set_motion(ws, lane, t, y, k1, switches, c, control.horizon)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .dense_output import DenseOutput, Track, displacement_at, slope_at, state_at
+from .dense_output import DenseOutput, Track, displacement_at, slope_at
 from .design import Constants
 from .dynamics import State
 from .modes import Switches
@@ -186,7 +186,15 @@ def grown(best: float, t_best: float, value: float, t: float) -> tuple[float, fl
 
 @inlined
 def updated_maxima(
-    m: Maxima, t: float, h: float, tau_end: float, y_end: State, dense: DenseOutput, s: Switches, c: Constants
+    m: Maxima,
+    t: float,
+    h: float,
+    tau_end: float,
+    y: State,
+    y_end: State,
+    dense: DenseOutput,
+    s: Switches,
+    c: Constants,
 ) -> Maxima:
     """Maxima after a step, from its end and from the turning points inside, by the dense output.
 
@@ -198,8 +206,8 @@ def updated_maxima(
         Start [s] and length [s] of the step.
     tau_end
         Fraction of the step that was kept.
-    y_end
-        State there.
+    y, y_end
+        State at the start, and where the step was cut.
     dense, s, c
         The step.
     """
@@ -217,6 +225,6 @@ def updated_maxima(
         tau = turning_point(dense.truck, tau_end)
         x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
     part = tau_end * h
-    u, tau = highest_compression(compression_at(state_at(dense, 0.0), s, c), compression_at(y_end, s, c), part)
+    u, tau = highest_compression(compression_at(y, s, c), compression_at(y_end, s, c), part)
     F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + tau * part)
     return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v)
