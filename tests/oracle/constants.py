@@ -120,9 +120,7 @@ def constants(inputs: Inputs, readings: Readings, elements: int | None = None) -
     else:
         own = m_b / 12 * (H**2 + L**2)  # a solid box about its own centre
     J_b = own + m_b * ((c_y - H / 2) ** 2 + (c_x - L / 2) ** 2)  # Eq 16, second term
-    J_soil = (
-        soil_moment(inputs, elements, 2, about=c_y) + M_soil * l_n**2
-    )  # the sum in Eq 13; d_n = c_y - height
+    J_soil = soil_moment(inputs, elements, 2, about=c_y) + M_soil * l_n**2  # the sum in Eq 13; d_n = c_y - height
 
     h_e = 0.0 if elements is None else d / elements
     d_1 = h_e / 2 - (d - c_y)  # depth of the first (top) element below the centre of mass; negative above it

@@ -130,9 +130,7 @@ def _contact_watch(impact: Problem, modes: Modes, contact_at_release: float) -> 
     if modes.contact == "clipped":
         return Watch("force returns", lambda y: float(y[6]), lambda y: (touching, y))
     if impact.readings.separation == "printed":
-        return Watch(
-            "force clipped", lambda y: -float(y[6]), lambda y: (replace(modes, contact="clipped"), y)
-        )
+        return Watch("force clipped", lambda y: -float(y[6]), lambda y: (replace(modes, contact="clipped"), y))
     coasting = replace(modes, contact="coasting")
     return Watch("contact lost", lambda y: -float(y[6]), lambda y: (coasting, unloaded(y)))
 

@@ -104,9 +104,7 @@ class _Runner:
 
     def _rate(self, _t: float, y: Array) -> Array:
         load = loads(self.impact, y, self.modes)
-        return np.concatenate(
-            (rate_under(self.impact, y, self.modes, load), path_rates(self.impact, y, load))
-        )
+        return np.concatenate((rate_under(self.impact, y, self.modes, load), path_rates(self.impact, y, load)))
 
     def _beyond_limit(self, y: Array) -> bool:
         return self.rotation_limit is not None and abs(float(y[2])) >= self.rotation_limit
@@ -173,9 +171,7 @@ class _Runner:
         if kink_values is not None and kink_signs is not None:
             turned = np.sign(kink_values(dense(after))) * kink_signs < 0
             for i in np.flatnonzero(turned):
-                found.append(
-                    (_locate(_along(dense, _component(kink_values, kink_signs, int(i))), before, after), None)
-                )
+                found.append((_locate(_along(dense, _component(kink_values, kink_signs, int(i))), before, after), None))
         time, first = min(found, key=lambda item: item[0])
         self._keep(time, dense)
         self.y = np.array(dense(time))

@@ -32,9 +32,7 @@ def test_limit_of_many_elements(inputs: Inputs) -> None:
     lumped = constants(inputs, CORRECTED)
     M = inputs.rho_s * inputs.W * tan(lumped.theta_w) * inputs.d**2 / 2
     assert lumped.M_soil == pytest.approx(M, rel=1e-13)
-    assert lumped.c_y == pytest.approx(
-        (M * 2 * inputs.d / 3 + lumped.m_b * inputs.H / 2) / lumped.m_eff, rel=1e-13
-    )
+    assert lumped.c_y == pytest.approx((M * 2 * inputs.d / 3 + lumped.m_b * inputs.H / 2) / lumped.m_eff, rel=1e-13)
     exact = M * ((2 * inputs.d / 3 - lumped.c_y) ** 2 + inputs.d**2 / 18 + lumped.l_n**2)
     assert lumped.J_soil == pytest.approx(exact, rel=1e-12)
 

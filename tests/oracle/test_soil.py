@@ -155,18 +155,14 @@ def test_gravity_couple(inputs, tipping: float) -> None:
     assert gravity_couple(inputs, lumped, 0.9 * tip, 1.0) < 0 < gravity_couple(inputs, lumped, 1.1 * tip, 1.0)
     for theta in (-0.9, -0.1, 0.1, 0.5, 1.5):
         side = np.sign(theta)
-        slope = (
-            gravity_energy(inputs, lumped, theta + 1e-6) - gravity_energy(inputs, lumped, theta - 1e-6)
-        ) / 2e-6
+        slope = (gravity_energy(inputs, lumped, theta + 1e-6) - gravity_energy(inputs, lumped, theta - 1e-6)) / 2e-6
         assert gravity_couple(inputs, lumped, theta, side) == pytest.approx(-slope, rel=1e-6)
 
 
 def test_printed_restoring_moment() -> None:
     lumped = constants(RWG, AS_PRINTED)
     limit = printed_limit(lumped, 0.0)
-    assert limit == pytest.approx(
-        lumped.m_b * GRAVITY * lumped.c_y, rel=1e-12
-    )  # a vertical arm, as it stands
+    assert limit == pytest.approx(lumped.m_b * GRAVITY * lumped.c_y, rel=1e-12)  # a vertical arm, as it stands
     assert printed_forward(limit, 1.0, 0.5 * limit) == -0.5 * limit
     assert printed_forward(limit, 1.0, 2 * limit) == -limit
     assert printed_forward(limit, 1.0, -0.5 * limit) == 0.5 * limit
