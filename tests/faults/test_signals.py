@@ -35,7 +35,7 @@ SOON = 5.0
 def test_a_run_stops_soon_keeps_what_is_done_and_says_how_to_go_on(tmp_path, backend, number, code):
     out = tmp_path / "out"
     driver = Driver(out, *SLOW, "--backend", backend)
-    driver.wait_for_rows()
+    driver.wait_for_rows(10_000)  # so many that the first ones must be among them
     begun = time.monotonic()
     driver.signal(number, group=backend == "loky")  # as Ctrl-C does, workers included
     returned, told, complaints = driver.end()
