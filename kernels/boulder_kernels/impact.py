@@ -220,10 +220,9 @@ def keep_up_to_event(
     event, tau = first_event(start, end, dense, factors, switches, c, False)
     if min(end.top, end.base) < 0.0:
         kink, tau_kink = first_event(start, end, dense, factors, switches, c, True)
-        # Another event that comes at once needs no shorter step: next to nothing of this one is kept.
-        earliest = min(tau, tau_kink)
-        if tau_kink > AT_ONCE and AT_ONCE < earliest < LANDED:
-            return SHORTEN, min(BEYOND * earliest, 1.0), y, m
+        # Where another event comes at once, next to nothing of the step is kept, and it need not be shorter.
+        if min(tau, tau_kink) > AT_ONCE and min(tau, tau_kink) < LANDED:
+            return SHORTEN, min(BEYOND * min(tau, tau_kink), 1.0), y, m
         if event < 0:
             event = kink
     if tau < 1.0:
