@@ -97,7 +97,7 @@ def gravity_starts() -> dict[str, tuple[Start, float, set[int]]]:
         return Start(c, readings, with_compression(y, u, c), modes(turning, touching))
 
     return {
-        "the weight is overcome": (start(c, State(0, 0, 0, 0, 0, 14.5), 0.0, SEATED, True), 0.05, {ROTATION}),
+        "the weight is overcome": (start(c, State(0.0, 0.0, 0.0, 0.0, 0.0, 14.5), 0.0, SEATED, True), 0.05, {ROTATION}),
         "forward, then back": (start(soft, back, 0.1, TURNING_FORWARD, True), 0.05, {ROTATION}),
         "contact lost": (start(soft, forward, 0.03, TURNING_FORWARD, True), 0.05, {CONTACT}),
         "contact regained": (
