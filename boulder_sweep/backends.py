@@ -126,14 +126,18 @@ class Backend:
             logger.setLevel(logging.CRITICAL)
         self.kill_workers(patience_s=0.0)
 
+    def remove_exchange(self) -> None:
+        """Remove the folder through which worker processes hand over their results."""
+        if self.exchange is not None:
+            shutil.rmtree(self.exchange, ignore_errors=True)
+
     def close(self) -> None:
         """Let all workers go."""
         self.kill_workers(_PATIENCE_S)
         if self._client is not None:
             self._client.close()
             self._client = None
-        if self.exchange is not None:
-            shutil.rmtree(self.exchange, ignore_errors=True)
+        self.remove_exchange()
         for name, level in self._levels.items():
             logging.getLogger(name).setLevel(level)
         self._levels.clear()

@@ -53,6 +53,7 @@ class Run:
         to_compute = self._sweep.n_designs - self._rows_before
         try:
             self._backend = Backend(backend, jobs, scheduler)
+            self._signals.last_act = self._backend.remove_exchange
             if to_compute:
                 self._evaluation.warm_up()
                 rows = self._sweep.n_designs
