@@ -104,7 +104,7 @@ def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:
 
 def coverage_table(found: list[Coverage]) -> Table:
     """Return the entries as a table."""
-    head = ("designs", "readings", "accuracy", "steps [ms]", "rotation covered", "largest miss [°]")
+    head: tuple[str, ...] = ("designs", "readings", "accuracy", "steps [ms]", "rotation covered", "largest miss [°]")
     head += (
         "movement covered",
         "rotation: 99.9 %, largest [°]",
