@@ -33,9 +33,9 @@ def main() -> int:
     poor = [c for c in found if min(c.rotation, c.displacement) < LEAST]
     wrong = [c for c in found if c.flips]
     for c in poor:
-        print(f"only {min(c.rotation, c.displacement):.2%}: {c.designs}, {c.readings}, {1e3 * c.step_s:g} ms")
+        print(f"only {min(c.rotation, c.displacement):.2%}: {c.designs}, {c.readings}, {1e3 * c.steps.step_s:g} ms")
     for c in wrong:
-        print(f"{c.flips} wrong verdicts: {c.designs}, {c.readings}, {1e3 * c.step_s:g} ms")
+        print(f"{c.flips} wrong verdicts: {c.designs}, {c.readings}, {1e3 * c.steps.step_s:g} ms")
     if not poor and not wrong:
         print(f"every estimate holds for {LEAST:.0%} of the designs or more, and no verdict is wrong")
     return 1 if poor or wrong else 0

@@ -136,6 +136,8 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
     steps = f"step {1e3 * accuracy['step_s']:g} ms"
     if accuracy["reported_step_s"] != accuracy["step_s"]:
         steps += f" and {1e3 * accuracy['reported_step_s']:g} ms"
+    if accuracy["yield_located"]:
+        steps += ", yield located"
     found = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
     if "pilot_designs" not in accuracy:
         return [found]

@@ -175,11 +175,12 @@ def control_of(sweep: Sweep) -> Control:
     """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate."""
     accuracy = accuracy_of(sweep)
     return Control(
-        h=accuracy.step_s,
+        h=accuracy.steps.step_s,
         horizon=float(sweep.solver.horizon_s),
         theta_limit=math.radians(sweep.criterion.max_rotation_deg),
         elements=int(sweep.model.soil_elements),
         error_estimate=accuracy.error_estimate,
+        locate_yield=accuracy.steps.locate_yield,
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, simulate_table
 
-from .accuracy import LADDER_S, Accuracy
+from .accuracy import LADDER, Accuracy
 from .evaluation import design_table, readings_of
 from .sampling import sampled_rows
 
@@ -43,28 +43,30 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     Returns
     -------
     Accuracy
-        The longest step of `LADDER_S` that meets it or, where none does, the one that comes nearest.
+        The first steps of `LADDER` that meet it or, where none does, those that come nearest.
     """
     table, _ = sampled_columns(sweep, pilot_size(sweep.model.soil_elements))
     readings = readings_of(sweep)
-    found: list[tuple[float, float]] = []
-    for step in LADDER_S:
+    found: list[tuple[float, int]] = []
+    limit = math.radians(sweep.criterion.max_rotation_deg)
+    for rung, steps in enumerate(LADDER):
         control = Control(
-            step,
+            steps.step_s,
             sweep.solver.horizon_s,
-            math.radians(sweep.criterion.max_rotation_deg),
+            limit,
             sweep.model.soil_elements,
-            True,
+            error_estimate=True,
+            locate_yield=steps.locate_yield,
         )
         # Rounded so that another processor, off in the last bits, finds the same.
         achieved = float(f"{estimated_error_deg(table, readings, control):.3g}")
-        found.append((achieved, step))
+        found.append((achieved, rung))
         if achieved <= wanted_deg:
             break
-    achieved, step = min(found, key=lambda pair: pair[0])
+    achieved, rung = min(found)
     return Accuracy(
         asked=f"{wanted_deg:g} deg",
-        step_s=step,
+        steps=LADDER[rung],
         error_estimate=True,
         achieved_deg=achieved,
         pilot_designs=table.L.size,

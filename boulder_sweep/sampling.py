@@ -33,7 +33,7 @@ def sampled_rows(sweep: Sweep, count: int) -> np.ndarray:
     lengths = sweep.plan.lengths
     if sweep.n_designs <= count:
         return np.arange(sweep.n_designs)
-    places = _corners(lengths)[:count]
+    places = _corners(lengths, min(count, MOST_CORNERS))
     spread = _spread(lengths, count - len(places))
     rows = np.concatenate([np.array(places, dtype=np.int64).reshape(-1, len(lengths)), spread]) @ np.array(
         sweep.plan.strides, dtype=np.int64
@@ -41,17 +41,17 @@ def sampled_rows(sweep: Sweep, count: int) -> np.ndarray:
     return np.unique(rows)
 
 
-def _corners(lengths: tuple[int, ...]) -> list[tuple[int, ...]]:
+def _corners(lengths: tuple[int, ...], most: int) -> list[tuple[int, ...]]:
     """Places of the corners; where they are too many, both ends and those one axis away from either."""
     ends = [(0, length - 1) if length > 1 else (0,) for length in lengths]
-    if math.prod(len(pair) for pair in ends) <= MOST_CORNERS:
+    if math.prod(len(pair) for pair in ends) <= most:
         return list(product(*ends))
     first, last = tuple(pair[0] for pair in ends), tuple(pair[-1] for pair in ends)
     found = [first, last]
     for axis in range(len(ends)):
         found.append((*first[:axis], last[axis], *first[axis + 1 :]))
         found.append((*last[:axis], first[axis], *last[axis + 1 :]))
-    return found[:MOST_CORNERS]
+    return found[:most]
 
 
 def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:

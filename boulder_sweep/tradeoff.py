@@ -16,32 +16,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, as_printed, corrected
+from boulder_kernels import OutcomeTable, Readings, as_printed, corrected
 
-from .accuracy import STEPS_PRINTED_S, STEPS_S
+from .accuracy import STEPS, STEPS_PRINTED, Steps
 from .evaluation import readings_of
-from .pilot import sampled_columns, simulated
-from .tradeoff_points import Point, Way, compared, mark_front
-from .verdict import Limits, judge
+from .pilot import sampled_columns
+from .tradeoff_points import Point, Way, mark_front
+from .tradeoff_sample import Sample
+from .verdict import Limits
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from .judged import Judged
     from .settings import Sweep
 
 DESIGNS = 4096
 """Designs of the sample."""
-FEWEST_DESIGNS = 64
-"""Those of them, at least, that are simulated with sums over elements, which take a thousand times as long."""
-ELEMENTS_AS_FAST = 16
 STEPS_MS = (16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
-STEPS_WITH_ERROR_MS = (12.0, 8.0, 6.0, 4.0, 2.0, 1.0)
+STEPS_LOCATED_MS = (8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
+STEPS_WITH_ERROR_MS = (12.0, 8.0, 6.0, 4.0, 2.0)
 STEPS_OF_SUMS_MS = (12.0, 4.0, 2.0)
 ELEMENTS = (50, 200, 1000, 5000)
 REFERENCE_STEP_S = 5e-5
 SECONDS = 60.0
-_SHORTEST_TIMING_S = 0.05
 TARGETS_DEG = (0.1, 0.01, 1e-3, 1e-4, 1e-5)
 
 Told = Callable[[str], None]
@@ -76,11 +73,21 @@ class Tradeoff:
         return self.sweep.model.preset
 
     def best(self, wanted_deg: float, *, error_estimate: bool) -> Point | None:
-        """Return the cheapest way with the readings of the sweep whose largest error keeps to an angle [deg]."""
+        """Return the cheapest way with the readings of the sweep whose largest error keeps to an angle [deg].
+
+        Parameters
+        ----------
+        wanted_deg
+            The angle.
+        error_estimate
+            Whether to look among the ways with an error for every design, or among plain steps.
+        """
         fit = [
             point
             for point in self._own()
-            if point.way.error_estimate == error_estimate and point.rotation_max_deg <= wanted_deg and not point.flips
+            if (point.way.error_estimate if error_estimate else point.way.is_plain)
+            and point.rotation_max_deg <= wanted_deg
+            and not point.flips
         ]
         return min(fit, key=lambda point: point.cpu_us, default=None)
 
@@ -95,7 +102,7 @@ class Tradeoff:
             by_words.setdefault(self._advice(target), []).append(f"{target:g}")
         found = [f"For {' or '.join(values)} deg {advice}." for advice, values in by_words.items()]
         sums = [p for p in self._own() if p.way.soil_elements == max(ELEMENTS)]
-        closed = {p.way.step_ms: p.cpu_us for p in self._own() if not p.way.soil_elements and not p.way.error_estimate}
+        closed = {p.way.step_ms: p.cpu_us for p in self._own() if p.way.is_plain}
         if sums:
             ratio = sums[0].cpu_us / closed[sums[0].way.step_ms]
             found.append(
@@ -189,7 +196,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
         if time.monotonic() - begun > seconds:
             left_out += _ways(name)
             continue
-        sample = _Sample(table, bed_offset, readings, limits, sweep.solver.horizon_s)
+        sample = Sample(table, bed_offset, readings, limits, sweep.solver.horizon_s)
         if tell is not None:
             tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, {table.L.size:,} designs")
         known = sample.solve(REFERENCE_STEP_S, locate_yield=True)
@@ -206,67 +213,22 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
     return Tradeoff(sweep, tuple(points), references, tuple(left_out))
 
 
-class _Sample:
-    """The designs that all ways simulate."""
-
-    def __init__(
-        self, table: DesignTable, bed_offset: np.ndarray, readings: Readings, limits: Limits, horizon: float
-    ) -> None:
-        self.table, self.bed_offset = table, bed_offset
-        self.readings, self.limits, self.horizon = readings, limits, horizon
-
-    def solve(
-        self, step_s: float, elements: int = 0, *, error_estimate: bool = False, locate_yield: bool = False
-    ) -> OutcomeTable:
-        """Simulate the designs."""
-        control = Control(step_s, self.horizon, self.limits.rotation, elements, error_estimate, True, locate_yield)
-        return simulated(self.table, self.readings, control)
-
-    def judged(self, outcomes: OutcomeTable) -> Judged:
-        """Return their verdicts."""
-        return judge(outcomes, self.table.L, self.bed_offset, self.limits)
-
-    def measured(self, way: Way, known: OutcomeTable, accuracy: str) -> Point:
-        """Simulate the designs in one way, long enough to time it, and compare."""
-        rows = _part(self.table.L.size, way.soil_elements)
-        fewer = _Sample(_rows(self.table, rows), self.bed_offset[rows], self.readings, self.limits, self.horizon)
-        spent, best = 0.0, math.inf
-        fewer.first().solve(1e-3 * way.step_ms, way.soil_elements)  # compiles, and fills the caches
-        while spent < _SHORTEST_TIMING_S:
-            begun = time.thread_time()
-            out = fewer.solve(1e-3 * way.step_ms, way.soil_elements, error_estimate=way.error_estimate)
-            took = time.thread_time() - begun
-            spent, best = spent + took, min(best, took)
-        ref = OutcomeTable(*(column[rows] for column in known))
-        return compared(way, accuracy, 1e6 * best / len(rows), (out, fewer.judged(out)), (ref, fewer.judged(ref)))
-
-    def first(self) -> _Sample:
-        """Return a sample of the first design alone."""
-        return _Sample(_rows(self.table, np.arange(1)), self.bed_offset[:1], self.readings, self.limits, self.horizon)
-
-
 def _ways(readings: str) -> Iterator[Way]:
     """Yield the ways of simulating, cheap ones first."""
-    yield from (Way(readings, 0, step, False) for step in STEPS_MS)
-    yield from (Way(readings, 0, step, True) for step in STEPS_WITH_ERROR_MS)
-    yield from (Way(readings, elements, step, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
-
-
-def _part(count: int, elements: int) -> np.ndarray:
-    """Rows of the sample that are simulated with so many elements, spread evenly."""
-    wanted = count if not elements else max(FEWEST_DESIGNS, count * ELEMENTS_AS_FAST // elements)
-    return np.unique(np.linspace(0, count - 1, min(wanted, count)).astype(np.int64))
-
-
-def _rows(table: DesignTable, rows: np.ndarray) -> DesignTable:
-    return DesignTable(*(np.ascontiguousarray(column[rows]) for column in table))
+    yield from (Way(readings, 0, step, False, False) for step in STEPS_MS)
+    yield from (Way(readings, 0, step, True, False) for step in STEPS_LOCATED_MS)
+    yield from (Way(readings, 0, step, False, True) for step in STEPS_WITH_ERROR_MS)
+    yield from (Way(readings, 0, step, True, True) for step in STEPS_LOCATED_MS)
+    yield from (Way(readings, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
 
 
 def _name_of(way: Way, readings: Readings) -> str:
     """Name of the accuracy that a way stands for, or nothing."""
-    steps = STEPS_S if readings.restoring_gravity else STEPS_PRINTED_S
-    for name, step in steps.items():
-        if not way.soil_elements and math.isclose(step, 1e-3 * way.step_ms) and way.error_estimate == (name != "fast"):
+    if way.soil_elements:
+        return ""
+    own = Steps(1e-3 * way.step_ms, way.locate_yield)
+    for name, steps in (STEPS if readings.restoring_gravity else STEPS_PRINTED).items():
+        if steps == own and way.error_estimate == (name != "fast"):
             return name
     return ""
 

@@ -29,8 +29,15 @@ class Way(NamedTuple):
     soil_elements: int
     """N; 0 for the closed form."""
     step_ms: float
+    locate_yield: bool
+    """Whether steps end where the soil yields."""
     error_estimate: bool
     """Whether a second solution by half the step is reported, and its difference from the first as the error."""
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is what a file gets with ``solver: {step: ...}`` and the soil in closed form."""
+        return not (self.soil_elements or self.locate_yield or self.error_estimate)
 
     @property
     def soil(self) -> str:
@@ -40,7 +47,8 @@ class Way(NamedTuple):
     @property
     def steps(self) -> str:
         """Steps in words."""
-        return f"{self.step_ms:g} + {0.5 * self.step_ms:g} ms" if self.error_estimate else f"{self.step_ms:g} ms"
+        steps = f"{self.step_ms:g} + {0.5 * self.step_ms:g} ms" if self.error_estimate else f"{self.step_ms:g} ms"
+        return f"{steps}, yield located" if self.locate_yield else steps
 
 
 @dataclass

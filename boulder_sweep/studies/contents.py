@@ -8,6 +8,9 @@ from pathlib import Path
 
 from boulder_sweep.crash_tests import rigid_wall_test
 from boulder_sweep.studies import energy
+from boulder_sweep.studies.coverage import coverage_table, coverages, grid_table, random_table
+from boulder_sweep.studies.extremes import admitted_table, refusal_table
+from boulder_sweep.studies.knife_edge import knife_edge_words
 from boulder_sweep.studies.readings import ReadingsStudy, readings_study
 from boulder_sweep.studies.statements import statement_table
 from boulder_sweep.studies.table import Table
@@ -106,6 +109,23 @@ def _fit(_: Path) -> str:
     return fit_text()
 
 
+def _coverage(root: Path) -> str:
+    tables = {"random": random_table(6000, 1), "M30 grid": grid_table(root / GRID, 2048)}
+    return coverage_table(list(coverages(tables))).markdown()
+
+
+def _knife_edge(_: Path) -> str:
+    return knife_edge_words()
+
+
+def _admitted_box(_: Path) -> str:
+    return admitted_table().markdown()
+
+
+def _refusals(_: Path) -> str:
+    return refusal_table().markdown()
+
+
 CONTENTS: dict[str, Callable[[Path], str]] = {
     "validation-table": _validation_table,
     "statements": _statements,
@@ -119,5 +139,9 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "energy-words": _balance_words,
     "energy-audit": _audit,
     "vehicle-fit": _fit,
+    "coverage": _coverage,
+    "knife-edge": _knife_edge,
+    "admitted-box": _admitted_box,
+    "refusals": _refusals,
 }
 """Function of every block by its name."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
-from boulder_sweep.accuracy import LADDER_S, STEPS_PRINTED_S, STEPS_S
+from boulder_sweep.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps
 from boulder_sweep.pilot import sampled_columns
 from boulder_sweep.settings import load
 from boulder_sweep.studies.random_designs import random_designs
@@ -22,8 +22,8 @@ HORIZON_S = 1.0
 REFERENCE_STEP_S = 5e-5
 ROUNDING_RAD, ROUNDING_M = 1e-11, 1e-11
 """Errors below these are rounding, of the reference as well."""
-NUMBERS_S = (LADDER_S[0], 0.001, 0.00025)
-"""Steps that an accuracy given as a number may come to."""
+NUMBERS = tuple(steps for steps in LADDER if steps.step_s in (0.012, 0.006, 0.001, 0.00025))
+"""Some of those that an accuracy given as a number may come to."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Coverage:
         Which designs.
     readings, accuracy : str
         How they were read, and what was asked for.
-    step_s : float
-        Longer one of the two steps [s].
+    steps : Steps
+        The longer one of the two, and whether the yield is located.
     standing : int
         Designs that turn no further than the limit.
     rotation : float
@@ -59,7 +59,7 @@ class Coverage:
     designs: str
     readings: str
     accuracy: str
-    step_s: float
+    steps: Steps
     standing: int
     rotation: float
     displacement: float
@@ -93,17 +93,16 @@ def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:
     """
     for designs, table in tables.items():
         for preset, readings in PRESETS.items():
-            known = _solved(table, readings, REFERENCE_STEP_S, estimate=False, locate_yield=True)
-            named = STEPS_S if readings.restoring_gravity else STEPS_PRINTED_S
-            steps = {name: named[name] for name in ("balanced", "fine")} | {"a number": 0.0}
-            for accuracy, step in steps.items():
-                for h in (step,) if step else NUMBERS_S:
-                    found = _solved(table, readings, h, estimate=True)
-                    yield _compared(designs, preset, accuracy, h, found, known)
+            known = _solved(table, readings, Steps(REFERENCE_STEP_S, locate_yield=True), estimate=False)
+            named = STEPS if readings.restoring_gravity else STEPS_PRINTED
+            ways = [(name, named[name]) for name in ("balanced", "fine")] + [("a number", steps) for steps in NUMBERS]
+            for accuracy, steps in ways:
+                found = _solved(table, readings, steps, estimate=True)
+                yield _compared(designs, preset, accuracy, steps, found, known)
 
 
 def coverage_table(found: list[Coverage]) -> Table:
-    """Return the entries as a table."""
+    """Return the entries as a table; a star marks steps that end where the soil yields."""
     head: tuple[str, ...] = ("designs", "readings", "accuracy", "steps [ms]", "rotation covered", "largest miss [°]")
     head += (
         "movement covered",
@@ -118,7 +117,7 @@ def coverage_table(found: list[Coverage]) -> Table:
             c.designs,
             c.readings,
             c.accuracy,
-            f"{1e3 * c.step_s:g} + {0.5e3 * c.step_s:g}",
+            f"{1e3 * c.steps.step_s:g} + {0.5e3 * c.steps.step_s:g}{' *' if c.steps.locate_yield else ''}",
             f"{c.rotation:.1%} of {c.standing}",
             f"{c.largest_miss_deg:.0e}" if c.largest_miss_deg else "none",
             f"{c.displacement:.1%}",
@@ -130,15 +129,14 @@ def coverage_table(found: list[Coverage]) -> Table:
     return table
 
 
-def _solved(
-    table: DesignTable, readings: Readings, step_s: float, *, estimate: bool, locate_yield: bool = False
-) -> OutcomeTable:
+def _solved(table: DesignTable, readings: Readings, steps: Steps, *, estimate: bool) -> OutcomeTable:
     """Simulate a table of designs."""
-    return simulate_table(table, readings, Control(step_s, HORIZON_S, LIMIT, 0, estimate, True, locate_yield))
+    control = Control(steps.step_s, HORIZON_S, LIMIT, 0, estimate, True, steps.locate_yield)
+    return simulate_table(table, readings, control)
 
 
 def _compared(
-    designs: str, readings: str, accuracy: str, step_s: float, found: OutcomeTable, known: OutcomeTable
+    designs: str, readings: str, accuracy: str, steps: Steps, found: OutcomeTable, known: OutcomeTable
 ) -> Coverage:
     """Compare estimated with true errors."""
     computed = np.isfinite(found.theta_max) & np.isfinite(known.theta_max)
@@ -156,7 +154,7 @@ def _compared(
         designs=designs,
         readings=readings,
         accuracy=accuracy,
-        step_s=step_s,
+        steps=steps,
         standing=int(standing.sum()),
         rotation=1.0 - float(missed.sum() / max(standing.sum(), 1)),
         displacement=1.0 - float(missed_x.sum() / max(alike.sum(), 1)),

@@ -92,10 +92,10 @@ def _show(found: Tradeoff) -> None:
     ):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
-    before = ("", 0, False)
+    before = ("", 0, False, False)
     for point in found.points:
         way = point.way
-        group = (way.readings, way.soil_elements, way.error_estimate)
+        group = (way.readings, way.soil_elements, way.error_estimate, way.locate_yield)
         if group != before and before[0]:
             table.add_section()
         before = group

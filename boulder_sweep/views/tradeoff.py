@@ -13,10 +13,12 @@ if TYPE_CHECKING:
     from boulder_sweep.tradeoff import Tradeoff
     from boulder_sweep.tradeoff_points import Point
 
-LEAST_DEG = 1e-9
+LEAST_DEG = 1e-11
 """Errors below it are drawn there: no axis of logarithms has a zero [deg]."""
 COLOURS = (ORANGE, AMBER, PURPLE, GREY, SKY)
 MARKERS = "^vDPX"
+NAMED_STEPS_MS = {False: (16.0, 8.0), True: (2.0, 1.0, 0.5)}
+"""Steps named beside their points, plain and located: where the lines do not cross."""
 WORDS = {"as_printed": "as printed", "corrected": "corrected", "mixed": "readings of the file"}
 
 
@@ -58,16 +60,18 @@ def _panel(axes: Axes, points: list[Point]) -> None:
         zorder=1,
         label="no other way is cheaper and better",
     )
-    groups = dict.fromkeys((p.way.soil_elements, p.way.error_estimate) for p in points)
+    groups = dict.fromkeys((p.way.soil_elements, p.way.error_estimate, p.way.locate_yield) for p in points)
     sums = iter(zip(COLOURS, MARKERS, strict=True))
-    for elements, estimate in groups:
+    for group in groups:
+        elements, estimate, located = group
         if elements:
             colour, marker = next(sums)
             words = f"sums over {elements} elements"
         else:
             colour, marker = (GREEN, "s") if estimate else (BLUE, "o")
-            words = "closed form, error for each design" if estimate else "closed form"
-        these = [p for p in points if (p.way.soil_elements, p.way.error_estimate) == (elements, estimate)]
+            words = "error for each design" if estimate else "closed form"
+            words += ", yield located" if located else ""
+        these = [p for p in points if (p.way.soil_elements, p.way.error_estimate, p.way.locate_yield) == group]
         _way(axes, these, colour, marker, words)
 
 
@@ -76,13 +80,24 @@ def _way(axes: Axes, points: list[Point], colour: str, marker: str, words: str) 
     cost = [p.cpu_us for p in points]
     usual = [max(p.rotation_p99_deg, LEAST_DEG) for p in points]
     largest = [max(p.rotation_max_deg, LEAST_DEG) for p in points]
-    axes.plot(cost, usual, marker=marker, color=colour, markersize=4.5, linewidth=1.2, label=words, zorder=3)
+    located = points[0].way.locate_yield
+    axes.plot(
+        cost,
+        usual,
+        marker=marker,
+        color=colour,
+        markersize=4.5,
+        markerfacecolor="white" if located else colour,
+        linewidth=1.2,
+        linestyle="--" if located else "-",
+        label=words,
+        zorder=3,
+    )
     axes.vlines(cost, usual, largest, color=colour, linewidth=0.8, alpha=0.6, zorder=2)
-    if points[0].way.soil_elements:
-        return
     for point, x, y in zip(points, cost, usual, strict=True):
         left = not point.way.error_estimate
-        text = point.accuracy or (f"{point.way.step_ms:g} ms" if left else "")
+        shown = left and point.way.step_ms in NAMED_STEPS_MS[located]
+        text = point.accuracy or (f"{point.way.step_ms:g} ms" if shown else "")
         axes.annotate(
             text,
             (x, y),

@@ -1,0 +1,173 @@
+"""Would single precision pay? ``python -m benchmarks.single_precision``: the same kernels compiled on 32-bit floats.
+
+The sources of the kernels are loaded a second time with every literal rounded to single precision and the lanes in a
+32-bit workspace, twice as many of them in the same registers. The constants of a design and its stable step are still
+worked out in double precision, once. Both precisions simulate the same designs; errors are against a far finer solution
+in double precision. Compiling takes more than a minute: nothing is kept.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+
+import boulder_kernels as bk
+from boulder_kernels import lanes as double_lanes
+from boulder_kernels.table import empty_outcomes
+
+from .accuracy import control, reference_of
+from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, sample
+from .points import Peaks, point_of
+from .report import Table, significant
+from .timing import machine, timed, versions
+
+PACKAGE = "boulder_kernels_single"
+SOURCES = Path(bk.__file__).parent
+KEPT = ("design", "readings", "stability")
+"""Modules that stay in double precision: what is worked out once per design."""
+ORDER = (
+    *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "soil", "tableau"),
+    *("dynamics", "dense_output", "dormand_prince", "outcomes", "events", "energy", "settling", "workspace", "impact"),
+    "lanes",
+)
+CHANGES = {
+    # Its square must not be zero.
+    "soil": (("TINY = 1e-30", "TINY = 1e-15"), ("    if c.elements > 0:\n        return element_sums(k, c)\n", "")),
+    "workspace": (("LANES = 16", "LANES = 32"),),
+    "lanes": (("np.zeros(SIZE)", "np.zeros(SIZE, np.float32)"),),
+}
+STEPS_MS = (16.0, 12.0, 8.0, 4.0, 2.0, 1.0)
+
+
+class _Rounded(ast.NodeTransformer):
+    """Puts every literal, infinity, NaN and pi through ``_single``."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        return self._single(node) if isinstance(node.value, float) else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        if ast.unparse(node) in ("np.inf", "np.nan", "math.pi"):
+            return self._single(node)
+        self.generic_visit(node)  # the result of a call may have literals among its arguments
+        return node
+
+    @staticmethod
+    def _single(node: ast.expr) -> ast.expr:
+        return ast.copy_location(ast.Call(ast.Name("_single", ast.Load()), [node], []), node)
+
+
+def load_single_precision() -> types.ModuleType:
+    """Return the module of the lanes, to be compiled in single precision."""
+    package = types.ModuleType(PACKAGE)
+    package.__path__ = []
+    sys.modules[PACKAGE] = package
+    _add("_jit", _decorators())
+    for name in ORDER:
+        _add(name, sys.modules[f"boulder_kernels.{name}"] if name in KEPT else _translated(name))
+    return sys.modules[f"{PACKAGE}.lanes"]
+
+
+def _add(name: str, module: types.ModuleType) -> None:
+    sys.modules[f"{PACKAGE}.{name}"] = module
+    setattr(sys.modules[PACKAGE], name, module)
+
+
+def _decorators() -> types.ModuleType:
+    """Return the decorators of the kernels, without their folder of compiled code."""
+
+    def decorator(fastmath: set[str], *, inline: bool = False) -> Callable[[Any], Any]:
+        return lambda f: numba.njit(nogil=True, error_model="numpy", fastmath=fastmath, forceinline=inline)(f)
+
+    module: Any = types.ModuleType(f"{PACKAGE}._jit")
+    module.kernel = decorator({"contract", "nsz"})
+    module.inlined = decorator({"contract", "nsz"}, inline=True)
+    module.exact_kernel = decorator({"nsz"})
+    module.summing_kernel = decorator({"contract", "nsz", "reassoc"})
+    return module
+
+
+def _translated(name: str) -> types.ModuleType:
+    """Execute the source of a module with its literals in single precision."""
+    file = SOURCES / f"{name}.py"
+    source = file.read_text()
+    for before, after in CHANGES.get(name, ()):
+        if before not in source:
+            raise RuntimeError(f"{file.name} no longer holds {before!r}")
+        source = source.replace(before, after)
+    tree = ast.parse(source)
+    # The tableau checks itself by exact fractions; only what comes out of it is rounded.
+    tree = tree if name == "tableau" else _Rounded().visit(tree)
+    module: Any = types.ModuleType(f"{PACKAGE}.{name}")
+    module.__package__, module._single = PACKAGE, np.float32
+    sys.modules[module.__name__] = module
+    with np.errstate(over="ignore"):  # 1e300 stands for never, and infinity does so as well
+        exec(compile(ast.fix_missing_locations(tree), str(file), "exec"), module.__dict__)
+    if name == "tableau":
+        module.C = tuple(np.float32(value) for value in module.C)
+        module.A, module.AA = (tuple(tuple(np.float32(v) for v in row) for row in m) for m in (module.A, module.AA))
+    return module
+
+
+def single_control(step_ms: float) -> bk.Control:
+    """How designs are simulated in single precision."""
+    single: Any = np.float32
+    return bk.Control(single(1e-3 * step_ms), single(HORIZON), single(ROTATION_LIMIT), 0, False)
+
+
+def simulated(lanes: Any, designs: bk.DesignTable, how: bk.Control) -> bk.OutcomeTable:
+    """Simulate designs in lanes of either precision."""
+    out = empty_outcomes(designs.L.size)
+    lanes.simulate_lanes(designs, bk.corrected(), how, out)
+    return out
+
+
+def measure(count: int = DESIGNS, repeats: int = 4) -> Table:
+    """Time both precisions on the same designs and compare their errors."""
+    designs = sample(count)
+    known = Peaks.of(reference_of(designs, bk.corrected()))
+    lanes = load_single_precision()
+    table = Table(
+        "single-precision",
+        "Single against double precision, readings `corrected`",
+        f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {count} random designs; CPU time of one thread",
+        ["step", "single", "double", "ratio", "rotation, single: max, 99 % [deg]", "rotation, double: max, 99 % [deg]"],
+    )
+    for step_ms in STEPS_MS:
+        ways = ((lanes, single_control(step_ms)), (double_lanes, control(1e-3 * step_ms)))
+        simulated(*_first(ways[0], designs))
+        cells, costs = [], []
+        for way, how in ways:
+            out, seconds = timed(lambda way=way, how=how: simulated(way, designs, how), repeats)
+            costs.append(1e6 * seconds / count)
+            point = point_of("corrected", "lanes", 1e-3 * step_ms, costs[-1], Peaks.of(out), known)
+            cells.append(f"{significant(point.theta_max_deg)}, {significant(point.theta_p99_deg)}")
+        ratio = f"{costs[0] / costs[1]:.2f}"
+        table.rows.append([f"{step_ms:g} ms", *(f"{cost:.2f} us" for cost in costs), ratio, *cells])
+    code = "".join(lanes.attempt_steps.inspect_asm().values())
+    packed = [len(re.findall(rf"\bv\w+p{kind}\s", code)) for kind in "sd"]
+    table.notes.append(f"Packed instructions of a step: {packed[0]} single, {packed[1]} double.")
+    return table
+
+
+def _first(way: tuple[Any, bk.Control], designs: bk.DesignTable) -> tuple[Any, bk.DesignTable, bk.Control]:
+    """One design, to compile with."""
+    return way[0], bk.DesignTable(*(column[:1] for column in designs)), way[1]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.single_precision", description=__doc__)
+    parser.add_argument("--designs", type=int, default=DESIGNS, help="size of the sample (default %(default)s)")
+    print(measure(parser.parse_args().designs).markdown())
+
+
+if __name__ == "__main__":
+    main()

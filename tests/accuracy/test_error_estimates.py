@@ -1,0 +1,64 @@
+"""What a row says of its own error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boulder_kernels import OutcomeTable, Status, simulate_table
+from boulder_kernels.table import empty_outcomes, estimate_errors
+from boulder_sweep.studies.coverage import coverages, grid_table, random_table
+from boulder_sweep.verdict import Limits, judge
+from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
+
+GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
+
+
+def test_estimates_cover_99_per_cent_and_no_verdict_is_wrong() -> None:
+    """A small edition of ``python -m benchmarks.coverage``."""
+    for found in coverages({"random": random_table(1500, 21), "grid": grid_table(GRID, 1000)}):
+        assert min(found.rotation, found.displacement) >= 0.99, found
+        assert found.flips == 0, found
+
+
+def test_named_accuracies_keep_their_promises_on_the_grid() -> None:
+    """2000 rows: 0.01 deg and 0.1 mm for balanced, 1e-5 deg for fine."""
+    for found in coverages({"grid": grid_table(GRID, 2000)}):
+        if found.readings == "corrected" and found.accuracy == "balanced":
+            assert found.largest_deg <= 0.01
+            assert found.largest_m <= 1e-4
+        if found.readings == "corrected" and found.accuracy == "fine":
+            assert found.largest_deg <= 1e-5
+
+
+def outcomes(status: list[int], theta: list[float]) -> OutcomeTable:
+    out = empty_outcomes(len(status))
+    out.status[:] = status
+    for column in (out.theta_max, out.x_b_max, out.x_v_max, out.F_v_max, out.t_limit, out.t_end):
+        column[:] = theta
+    return out
+
+
+def test_where_only_one_solution_reached_the_limit_the_error_is_infinite() -> None:
+    limit, settled = Status.LIMIT.value, Status.SETTLED.value
+    coarse = outcomes([limit, settled, limit, settled], [0.35, 0.2, 0.35, np.nan])
+    fine = outcomes([settled, limit, limit, settled], [0.34, 0.35, 0.35, 0.3])
+    estimate_errors(coarse, fine, rows(box_table(4, 0), slice(None)))
+    assert np.isinf(fine.theta_error[[0, 1, 3]]).all()
+    assert np.isinf(fine.x_error[[0, 1, 3]]).all()
+    assert fine.theta_error[2] == 0.0
+
+
+@pytest.mark.parametrize(("error", "verdict"), [(0.001, 0), (0.01, 2), (np.inf, 2), (np.nan, 0)])
+def test_nearer_to_the_limit_than_the_error_is_undecided(error: float, verdict: int) -> None:
+    out = outcomes([Status.SETTLED.value], [LIMIT - 0.005])
+    out.x_v_max[:], out.theta_error[:], out.x_error[:] = 0.5, error, 0.0
+    assert judge(out, np.array([1.65]), np.array([2.9]), Limits(LIMIT, "P1")).verdict[0] == verdict
+
+
+def test_no_estimate_unless_asked_for() -> None:
+    out = simulate_table(random_table(20, 1), PRESETS["corrected"], how())
+    assert np.isnan(out.theta_error).all()
+    assert np.isnan(out.x_error).all()
