@@ -123,7 +123,7 @@ class Started:
             used.ru_utime + used.ru_stime,
             record["kernel_cpu_s"],
             record["first_block_s"],
-            used.ru_maxrss * 1024,
+            record["peak_bytes"],
         )
 
 

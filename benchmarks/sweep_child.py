@@ -39,6 +39,7 @@ class KernelClock:
 def main() -> None:
     begun, record = float(sys.argv[1]), Path(sys.argv[2])
     from boulder_sweep import cli, evaluation
+    from boulder_sweep.limits import peak_memory
 
     clock = KernelClock(evaluation.simulate_table)
     vars(evaluation)["simulate_table"] = clock
@@ -47,7 +48,8 @@ def main() -> None:
     except SystemExit as end:
         code = end.code
     first = None if clock.first_block is None else clock.first_block - begun
-    record.write_text(json.dumps({"kernel_cpu_s": clock.seconds, "first_block_s": first}))
+    found = {"kernel_cpu_s": clock.seconds, "first_block_s": first, "peak_bytes": peak_memory()}
+    record.write_text(json.dumps(found))
     sys.exit(code)
 
 

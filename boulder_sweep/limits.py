@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -172,7 +173,7 @@ def estimated(
     per_block = rows_per_block(sample.seconds_per_row, rows_to_compute, jobs)
     seconds = rows_to_compute * sample.seconds_per_row / jobs
     parts = max(-(-rows_to_compute // rows_per_part), int(seconds / COMMIT_EVERY_S))
-    memory = _BYTES_UNDER_WAY * rows_under_way(per_block, jobs, rows_per_part) + _resident_bytes()
+    memory = _BYTES_UNDER_WAY * rows_under_way(per_block, jobs, rows_per_part) + peak_memory()
     if worker_processes:
         memory += jobs * _WORKER_PROCESS_BYTES
     return Estimate(
@@ -225,9 +226,18 @@ def _disk_free(out: Path) -> int:
     return shutil.disk_usage(place).free
 
 
-def _resident_bytes() -> int:
-    """Memory this process has used at most so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+def peak_memory() -> int:
+    """Return the memory that this process has used at most so far [bytes].
+
+    Where Linux tells it of this program alone, that is taken: what `getrusage` gives is never less than the process had
+    that started this one, a notebook with large tables for instance.
+    """
+    try:
+        status = Path("/proc/self/status").read_text()
+        return int(status.split("VmHWM:")[1].split()[0]) * 1024
+    except (OSError, IndexError):
+        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return most if sys.platform == "darwin" else most * 1024
 
 
 def _memory_free() -> int | None:
@@ -242,4 +252,4 @@ def _memory_free() -> int | None:
             free = min(free, int(Path(name).read_text()))
         except (OSError, ValueError):  # no such group, or "max"
             continue
-    return free + _resident_bytes()
+    return free + peak_memory()

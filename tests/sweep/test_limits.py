@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tracemalloc
 from dataclasses import replace
 
@@ -17,6 +19,7 @@ from boulder_sweep.limits import (
     Sample,
     blocks,
     estimated,
+    peak_memory,
     rows_per_block,
     rows_under_way,
     size_text,
@@ -152,3 +155,23 @@ def test_an_estimate_of_ten_to_the_twelve_is_exact_in_rows():
     found = estimate(grid(**HUGE), simulate=plausible)
     assert found.rows == found.rows_to_compute == 10**12
     assert found.memory_bytes < 2e9
+
+
+_LARGE_PARENT = """
+import subprocess, sys
+large = bytearray(b"1") * 600_000_000
+subprocess.run([sys.executable, "-c", "from boulder_sweep.limits import peak_memory; print(peak_memory())"], check=True)
+"""
+
+
+def test_memory_of_the_process_that_started_this_one_does_not_count():
+    """A notebook with large tables starts a sweep: an estimate shall not take the notebook's memory for the sweep's."""
+    output = subprocess.run([sys.executable, "-u", "-c", _LARGE_PARENT], check=True, capture_output=True, text=True)
+    assert 10_000_000 < int(output.stdout.split()[-1]) < 500_000_000
+
+
+def test_memory_grows_with_what_is_held():
+    before = peak_memory()
+    held = bytearray(b"1") * 200_000_000
+    assert peak_memory() >= before
+    assert peak_memory() > len(held)

@@ -257,7 +257,8 @@ def test_a_run_outside_the_main_thread(tmp_path):
 
 
 _MEMORY = """
-import resource, sys, tempfile
+import sys, tempfile
+from boulder_sweep.limits import peak_memory
 from tests.sweep.grids import grid_of, settled
 from boulder_sweep.sweeper import run
 if __name__ == "__main__":
@@ -265,7 +266,7 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         sweep = grid_of(1000, width=f"{{from: 1 m, to: 2 m, count: {rows // 1000}}}")
         assert run(sweep, folder + "/out", jobs=2, simulate=settled).rows == rows
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
+    print(peak_memory() >> 20)
 """
 
 
