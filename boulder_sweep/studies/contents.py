@@ -110,7 +110,7 @@ def _fit(_: Path) -> str:
 
 
 def _coverage(root: Path) -> str:
-    tables = {"random": random_table(6000, 1), "M30 grid": grid_table(root / GRID, 2048)}
+    tables = {"random": random_table(16_384, 1), "M30 grid": grid_table(root / GRID, 8192)}
     return coverage_table(list(coverages(tables))).markdown()
 
 

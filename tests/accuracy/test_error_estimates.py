@@ -45,7 +45,7 @@ def test_where_only_one_solution_reached_the_limit_the_error_is_infinite() -> No
     limit, settled = Status.LIMIT.value, Status.SETTLED.value
     coarse = outcomes([limit, settled, limit, settled], [0.35, 0.2, 0.35, np.nan])
     fine = outcomes([settled, limit, limit, settled], [0.34, 0.35, 0.35, 0.3])
-    estimate_errors(coarse, fine, rows(box_table(4, 0), slice(None)))
+    estimate_errors(coarse, fine, rows(box_table(4, 0), slice(None)), 3.0)
     assert np.isinf(fine.theta_error[[0, 1, 3]]).all()
     assert np.isinf(fine.x_error[[0, 1, 3]]).all()
     assert fine.theta_error[2] == 0.0
