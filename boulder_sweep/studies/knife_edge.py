@@ -170,12 +170,13 @@ def draw_knife_edge(path: str | Path) -> None:
         below = found.speeds_m_s <= found.edge_m_s
         for part, label in ((below, "restoring: printed"), (~below, None)):
             left.plot(found.speeds_m_s[part], found.rotations_deg[part], color=ORANGE, label=label)
-        left.plot(found.speeds_m_s, gravity, color=BLUE, label="restoring: gravity, else as printed")
+        left.plot(found.speeds_m_s, gravity, color=BLUE, label="restoring: gravity,\nelse as printed")
         left.axvline(found.edge_m_s, color=GREY, linewidth=0.8, linestyle=":")
         left.set_title("One design, the truck a little faster or slower")
         left.set_xlabel("speed of impact [m/s]")
         left.set_ylabel("largest rotation [deg]")
-        left.legend(loc="upper right")
+        # In the band that no curve enters: the printed one stays above it on either side of its jump.
+        left.legend(loc="center left", bbox_to_anchor=(0.0, 0.43))
         times, (before, after) = histories(found)
         right.plot(times, before, color=ORANGE, label=f"{found.edge_m_s:.2f} m/s")
         faster = f"faster by less than {_power(found.width_m_s)} m/s"

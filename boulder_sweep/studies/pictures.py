@@ -11,6 +11,7 @@ from boulder_sweep.fitting import fit_pulse, read_pulse
 from boulder_sweep.simulation import simulate
 from boulder_sweep.studies.contents import EVERY, GRID
 from boulder_sweep.studies.example_pulse import example_pulse
+from boulder_sweep.studies.knife_edge import draw_knife_edge
 from boulder_sweep.studies.readings import readings_study
 from boulder_sweep.validation import validate
 from boulder_sweep.views.readings import draw_readings
@@ -36,23 +37,29 @@ def draw_all(root: Path) -> list[Path]:
     """
     folder = root / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    before = set(folder.glob("*.png"))
+    drawn: list[Path] = []
+
+    def named(name: str) -> Path:
+        drawn.append(folder / name)
+        return drawn[-1]
+
     for test in ("abg", "rwg"):
         trajectory = simulate(crash_test(test))
-        trajectory.plot(folder / f"trajectory_{test}.png")
-        trajectory.plot_energy(folder / f"energy_{test}.png")
-        trajectory.plot_side_view(folder / f"side_view_{test}.png", time_s=STILL_AT_S)
+        trajectory.plot(named(f"trajectory_{test}.png"))
+        trajectory.plot_energy(named(f"energy_{test}.png"))
+        trajectory.plot_side_view(named(f"side_view_{test}.png"), time_s=STILL_AT_S)
     found = validate()
-    draw_rigid_wall(found.wall, folder / "figure_10_rigid_wall.png")
-    draw_convergence(found.convergence, folder / "convergence.png")
+    draw_rigid_wall(found.wall, named("figure_10_rigid_wall.png"))
+    draw_convergence(found.convergence, named("convergence.png"))
     for test, (_, name) in FIGURES.items():
-        draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, folder / name)
-    draw_readings(readings_study(root / GRID, EVERY), folder / "readings.png")
+        draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, named(name))
+    draw_readings(readings_study(root / GRID, EVERY), named("readings.png"))
+    draw_knife_edge(named("knife_edge.png"))
     with tempfile.TemporaryDirectory() as scratch:
         pulse = Path(scratch) / "pulse.csv"
         pulse.write_text(example_pulse(), encoding="utf-8")
-        fit_pulse(read_pulse(pulse), 6800.0).plot(folder / "vehicle_fit.png")
+        fit_pulse(read_pulse(pulse), 6800.0).plot(named("vehicle_fit.png"))
         sweep = load(root / GRID)
         run(sweep, Path(scratch) / "grid.sweep")
-        draw_verdict_map(read(Path(scratch) / "grid.sweep"), folder / "m30_sizing.png", title=sweep.name)
-    return sorted(before | set(folder.glob("*.png")))
+        draw_verdict_map(read(Path(scratch) / "grid.sweep"), named("m30_sizing.png"), title=sweep.name)
+    return sorted(drawn)

@@ -48,7 +48,8 @@ def draw_readings(study: ReadingsStudy, path: str | Path) -> None:
                 )
             axes.set_xlim(0.0, 1.14 * max(*values, LIMIT_DEG))
             axes.grid(axis="y", visible=False)
-        rotation.axvline(LIMIT_DEG, color=BLACK, linewidth=1.0, linestyle=":")
+        # Below the numbers, whose white ground keeps it off them.
+        rotation.axvline(LIMIT_DEG, color=BLACK, linewidth=1.0, linestyle=":", zorder=1.5)
         rotation.set_yticks(places, labels)
         for tick, row in zip(rotation.get_yticklabels(), study.rows, strict=True):
             tick.set_fontweight("normal" if row.switch else "bold")

@@ -52,6 +52,7 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
             below.set_ylabel(f"residual [{unit}]")
             below.set_xlabel("time since first touch [s]")
             below.set_xlim(0.0, float(fine[-1]))
+            below.locator_params(axis="x", nbins=5)  # more numbers run into one another
         grid[0, 0].legend(loc="best")
         fig.suptitle(fit_line(fit), x=0.01, ha="left", fontsize=10.5, fontweight="bold")
         if fit.warnings:

@@ -106,4 +106,4 @@ def test_pictures_are_drawn_by_the_command(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     drawn = draw_all(tmp_path)
     assert all(path.stat().st_size < MOST_BYTES for path in drawn)
-    assert {path.name for path in drawn} <= {path.name for path in (DOCS / "images").iterdir()}
+    assert {path.name for path in drawn} == {path.name for path in (DOCS / "images").iterdir()}
