@@ -19,9 +19,11 @@ from .evaluation import Evaluation
 from .settings import Sweep
 from .settings.model import Criterion, Model, ReadingChoice, SolverSettings
 from .simulation import simulate
+from .store.errors import OtherVersionError
 from .store.manifest import load as load_manifest
 from .store.provenance import differences, identity
 from .store.reader import read_row
+from .store.records import version_of
 from .store.schema import part_table
 from .verdict import Limits
 
@@ -104,8 +106,13 @@ def explain(out: str | Path, design_id: int) -> Explanation:
     row = read_row(folder, design_id)
     values = row.to_pylist()[0]
     inputs = {name: values[name] for name in INPUT_COLUMNS}
-    control, readings = Control(**there["control"]), Readings(**there["readings"])
-    sweep = _one_design(there["settings"], inputs, control)
+    try:
+        control, readings = Control(**there["control"]), Readings(**there["readings"])
+        sweep = _one_design(there["settings"], inputs, control)
+        stated = [there[part] for part in ("settings", "readings", "control", "accuracy")]
+    except (LookupError, TypeError, ValueError) as unfamiliar:
+        why = f"its settings are not those of this version: {unfamiliar}"
+        raise OtherVersionError(folder, why, version_of({"identity": there})) from unfamiliar
     limits = Limits(control.theta_limit, sweep.criterion.rating)
     block = sweep.block(0, 1)
     judged = Evaluation(readings, control, limits)(block)
@@ -117,9 +124,7 @@ def explain(out: str | Path, design_id: int) -> Explanation:
         inputs=inputs,
         stored={name: values[name] for name in OUTCOME_COLUMNS},
         recomputed={name: again[name] for name in OUTCOME_COLUMNS},
-        changed=tuple(
-            differences(there, identity(*(there[part] for part in ("settings", "readings", "control", "accuracy"))))
-        ),
+        changed=tuple(differences(there, identity(*stated))),
         trajectory=simulate(sweep) if computable else None,
     )
 

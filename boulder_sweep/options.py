@@ -21,7 +21,8 @@ Begin with:
 Exit codes:
   0 done (also when designs fail)         1 internal error
   2 wrong use or invalid file             3 some designs could not be computed
-  4 the output exists already             130, 143 interrupted; the run can go on
+  4 the output exists already, or is      130, 143 interrupted; the run can go on
+    of another version
 """
 
 RUN_EXAMPLES = """\b

@@ -72,6 +72,31 @@ class NotASweepError(StoreError):
     """There is no result of a sweep where one was to be read."""
 
 
+class OtherVersionError(StoreError):
+    """A result is written in a form that this version does not know.
+
+    Parameters
+    ----------
+    path
+        The file, or the folder where no single file is meant.
+    why
+        What is not as this version writes it.
+    version
+        Version that wrote it, where the file says so.
+    """
+
+    exit_code = EXIT_CONFLICT
+
+    def __init__(self, path: Path, why: str, version: str | None = None):
+        self.path, self.why, self.version = path, why, version
+        noted = f", {version}" if version else ""
+        super().__init__(
+            f"{path} was written by another version of boulder-sweep{noted} ({why}). Go on with it, or look at it, "
+            f"with that version; pandas, Polars and DuckDB read the parts as a table in any case. "
+            f"`sweep run` with --overwrite starts again"
+        )
+
+
 class DamagedError(StoreError):
     """A part or the manifest is damaged: truncated, changed or gone."""
 

@@ -15,9 +15,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .errors import DamagedError, NotASweepError
+from boulder_sweep.columns import COLUMNS
+
+from .errors import DamagedError, NotASweepError, OtherVersionError
 from .files import WRITING_SUFFIX, put_file
 from .lock import LOCK_NAME
+from .records import entries_of, version_of
 
 MANIFEST_NAME = "_manifest.parquet"
 _KEY = b"boulder_sweep.manifest"
@@ -192,7 +195,8 @@ def save(manifest: Manifest, folder: Path) -> None:
     value = hashlib.sha256(text.encode()).hexdigest() + text
     schema = table_schema({_KEY: value.encode()})
     sink = pa.BufferOutputStream()
-    pq.write_table(schema.empty_table(), sink)
+    with pq.ParquetWriter(sink, schema):
+        pass  # columns, and no rows
     put_file(folder, MANIFEST_NAME, memoryview(sink.getvalue()))
 
 
@@ -205,35 +209,74 @@ def load(folder: Path) -> Manifest:
         There is none.
     DamagedError
         It cannot be trusted.
+    OtherVersionError
+        It is whole, but not what this version writes.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     path = folder / MANIFEST_NAME
     try:
-        metadata = pq.read_metadata(path).metadata or {}
-    except FileNotFoundError:
-        raise NotASweepError(f"{folder} holds no result of a sweep (no {MANIFEST_NAME})") from None
+        found = pq.read_metadata(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise NotASweepError(_no_result(folder)) from None
     except (OSError, pa.ArrowException) as problem:
         raise DamagedError(f"{path} cannot be read: {problem}") from problem
-    value = metadata.get(_KEY, b"")
+    value = (found.metadata or {}).get(_KEY, b"")
     checksum, text = value[:64], value[64:]
     if hashlib.sha256(text).hexdigest().encode() != checksum:
         raise DamagedError(
             f"{path} is damaged: its checksum does not fit. The parts beside it can still be read as a "
             f"table, but no run can go on with them"
         )
-    content = json.loads(text)
-    if content.pop("format") != _FORMAT:
-        raise DamagedError(f"{path} was written by another version of boulder-sweep")
-    return _from_json(content)
+    content: Any = None
+    try:
+        content = json.loads(text)
+        _check_columns(found.schema.names)
+        return _from_json(content)
+    except ValueError as unfamiliar:
+        raise OtherVersionError(path, str(unfamiliar), version_of(content)) from None
 
 
-def _from_json(content: dict[str, Any]) -> Manifest:
-    """Rebuild a manifest from its JSON."""
-    content["parts"] = {name: Part(**record) for name, record in content["parts"].items()}
-    content["sessions"] = [Session(**record) for record in content["sessions"]]
-    if content["merge"] is not None:
-        content["merge"]["part"] = Part(**content["merge"]["part"])
-        content["merge"] = Merge(**content["merge"])
-    return Manifest(**content)
+def _no_result(folder: Path) -> str:
+    """Say why a place holds no result."""
+    if not folder.exists():
+        return f"there is no {folder}; the result of a sweep is a folder, such as m30-sizing.sweep"
+    if folder.is_dir():
+        return f"{folder} holds no result of a sweep (no {MANIFEST_NAME})"
+    around = folder.resolve().parent
+    inside = f": name the folder it lies in, {around}" if (around / MANIFEST_NAME).exists() else ""
+    return f"{folder} is a file; the result of a sweep is a folder{inside}"
+
+
+def _check_columns(names: list[str]) -> None:
+    """Raise ValueError where a table has other columns than today."""
+    expected = [spec.name for spec in COLUMNS]
+    differing = sorted(set(names) ^ set(expected))
+    if differing:
+        raise ValueError(f"its table has other columns: {', '.join(differing)}")
+
+
+def _from_json(content: Any) -> Manifest:
+    """Rebuild a manifest from its JSON.
+
+    Raises
+    ------
+    ValueError
+        It is not what `save` writes; the text says where.
+    """
+    if not isinstance(content, dict) or "format" not in content:
+        raise ValueError("its records do not say their format")
+    if content["format"] != _FORMAT:
+        raise ValueError(f"its format is {content['format']}, and this version knows {_FORMAT} only")
+    entries = entries_of(Manifest, "the manifest", {key: value for key, value in content.items() if key != "format"})
+    parts = {
+        name: Part(**entries_of(Part, f"the record of {name}", record)) for name, record in entries["parts"].items()
+    }
+    sessions = [Session(**entries_of(Session, "the record of a run", record)) for record in entries["sessions"]]
+    merge = None
+    if entries["merge"] is not None:
+        merging = entries_of(Merge, "the record of a merge", entries["merge"])
+        part = Part(**entries_of(Part, f"the record of {merging['name']}", merging["part"]))
+        merge = Merge(**{**merging, "part": part})
+    return Manifest(**{**entries, "parts": parts, "sessions": sessions, "merge": merge})

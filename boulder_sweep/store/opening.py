@@ -100,7 +100,7 @@ def _taken(
     names = sorted(entry.name for entry in out.iterdir())
     foreign = [name for name in names if not is_ours(name) or (out / name).is_dir()]
     there = None
-    if MANIFEST_NAME in names and not (overwrite and _is_damaged(out)):
+    if MANIFEST_NAME in names and not (overwrite and not _is_readable(out)):
         there = load(out)
     parts = [name for name in names if is_part_name(name)]
     if there is None and not overwrite and parts:
@@ -144,13 +144,13 @@ def _remove(out: Path, names: list[str]) -> None:
         flush_folder(out)
 
 
-def _is_damaged(out: Path) -> bool:
-    """Whether the manifest cannot be trusted."""
+def _is_readable(out: Path) -> bool:
+    """Whether the manifest is whole and such as this version writes."""
     try:
         load(out)
-    except errors.DamagedError:
-        return True
-    return False
+    except (errors.DamagedError, errors.OtherVersionError):
+        return False
+    return True
 
 
 def _is_written_by_us(path: Path) -> bool:

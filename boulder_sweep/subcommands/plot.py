@@ -41,10 +41,10 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None)
     from boulder_sweep.views.verdict_map import draw_verdict_map, needed_columns, require_rows
 
     require_matplotlib()
+    name = str(load_manifest(Path(out)).identity["settings"].get("name", ""))
     target = checked_kind(picture or f"{str(out).rstrip('/').removesuffix('.sweep')}.png")
     table = read(out, needed_columns())
     require_rows(table, out)
-    name = str(load_manifest(Path(out)).identity["settings"].get("name", ""))
     shown = draw_verdict_map(table, target, title=name, at=held, **axes)
     if not table.attrs["complete"]:
         click.echo(f"note: the run is not finished; {len(table):,} designs are drawn", err=True)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
+
 from boulder_sweep.collector import verdict_counts
 from boulder_sweep.evaluation import evaluation_of
-from boulder_sweep.store.manifest import Manifest
+from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest
 from boulder_sweep.store.opening import open_output
 from boulder_sweep.store.provenance import file_metadata, new_session
 from boulder_sweep.store.schema import encode, part_table
@@ -46,3 +51,48 @@ def finished_folder(out: Path) -> Path:
         commit(folder, first)
     folder.close("finished")
     return out
+
+
+def rewrite_records(out: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Write the manifest of a folder anew with other records, whole and with their checksum, as another version may."""
+    path = out / MANIFEST_NAME
+    schema = pq.read_schema(path)
+    key = b"boulder_sweep.manifest"
+    records = json.loads(schema.metadata[key][64:])
+    change(records)
+    text = json.dumps(records).encode()
+    value = hashlib.sha256(text).hexdigest().encode() + text
+    pq.write_table(schema.with_metadata({**schema.metadata, key: value}).empty_table(), path)
+
+
+def part_record(records: dict[str, Any]) -> dict[str, Any]:
+    """Return the record of the first part."""
+    return next(iter(records["parts"].values()))
+
+
+OTHER_FORMS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "format": (lambda records: records.update(format=2), r"its format is 2, and this version knows 1"),
+    "no format": (lambda records: records.pop("format"), r"do not say their format"),
+    "part knows more": (
+        lambda records: part_record(records).update(colour="red"),
+        r"the record of rows-\d+-\d+\.parquet: colour is unknown",
+    ),
+    "part knows less": (lambda records: part_record(records).pop("verdicts"), r"parquet: verdicts is missing"),
+    "part by other words": (
+        lambda records: part_record(records).update(rows="all of them"),
+        r"parquet: rows is 'all of them'",
+    ),
+    "session knows more": (
+        lambda records: records["sessions"][0].update(mood="good"),
+        r"the record of a run: mood is unknown",
+    ),
+    "session knows less": (lambda records: records["sessions"][0].pop("how"), r"the record of a run: how is missing"),
+    "sessions by name": (lambda records: records.update(sessions={}), r"the manifest: sessions is \{\}"),
+    "no parts": (lambda records: records.pop("parts"), r"the manifest: parts is missing"),
+    "no merge": (lambda records: records.pop("merge"), r"the manifest: merge is missing"),
+    "other merge": (
+        lambda records: records.update(merge={"name": "x", "part": 1, "replaced": []}),
+        r"the record of a merge: part is 1",
+    ),
+}
+"""What other versions may write: a change of the records, and how it is told."""

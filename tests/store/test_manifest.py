@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from itertools import pairwise
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boulder_sweep.store.errors import DamagedError, NotASweepError
+from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError
 from boulder_sweep.store.manifest import (
     MANIFEST_NAME,
     Manifest,
@@ -20,6 +24,7 @@ from boulder_sweep.store.manifest import (
     load,
     save,
 )
+from tests.store.folders import OTHER_FORMS, rewrite_records
 
 
 def manifest_with_parts() -> Manifest:
@@ -66,6 +71,46 @@ def test_every_flipped_byte_of_the_records_is_noticed(tmp_path):
         path.write_bytes(flipped)
         with pytest.raises(DamagedError):
             load(tmp_path)
+
+
+@pytest.mark.parametrize("form", OTHER_FORMS)
+def test_records_of_another_version_are_not_guessed_at(tmp_path, form):
+    change, words = OTHER_FORMS[form]
+    manifest = manifest_with_parts()
+    manifest.identity["versions"] = {"boulder-sweep": "7.8.9"}
+    save(manifest, tmp_path)
+    rewrite_records(tmp_path, lambda records: None)
+    assert load(tmp_path) == manifest
+    rewrite_records(tmp_path, change)
+    with pytest.raises(OtherVersionError, match=words) as refused:
+        load(tmp_path)
+    assert str(tmp_path / MANIFEST_NAME) in str(refused.value)
+    assert "another version of boulder-sweep, 7.8.9" in str(refused.value)
+    assert "--overwrite" in str(refused.value)
+
+
+def test_a_table_with_other_columns_is_of_another_version(tmp_path):
+    save(manifest_with_parts(), tmp_path)
+    path = tmp_path / MANIFEST_NAME
+    schema = pq.read_schema(path)
+    for other in (schema.remove(3), schema.append(pa.field("colour", pa.string()))):
+        pq.write_table(other.empty_table(), path)
+        differing = set(schema.names) ^ set(other.names)
+        with pytest.raises(OtherVersionError, match=f"other columns: {differing.pop()}"):
+            load(tmp_path)
+
+
+def test_records_that_are_no_records(tmp_path):
+    for nonsense in ([], "x", {"format": 1, "identity": 3}):
+        save(manifest_with_parts(), tmp_path)
+        path = tmp_path / MANIFEST_NAME
+        schema = pq.read_schema(path)
+        text = json.dumps(nonsense).encode()
+        value = hashlib.sha256(text).hexdigest().encode() + text
+        pq.write_table(schema.with_metadata({b"boulder_sweep.manifest": value}).empty_table(), path)
+        with pytest.raises(OtherVersionError) as refused:
+            load(tmp_path)
+        assert refused.value.version is None
 
 
 @pytest.mark.parametrize("keep", [0, 3, 100, -1])

@@ -1,0 +1,87 @@
+"""Commands pointed at results of another version, and at what is no result at all."""
+
+from __future__ import annotations
+
+import pytest
+
+from boulder_sweep.store import read
+from boulder_sweep.store.errors import OtherVersionError
+from tests.store.folders import OTHER_FORMS, rewrite_records
+
+RESULT = "small-grid.sweep"
+COMMANDS = [["status", RESULT], ["status", RESULT, "--verify"], ["explain", RESULT, "3"], ["plot", RESULT]]
+
+
+@pytest.fixture
+def result(sweep, possible_grid):
+    """Work beside a finished result."""
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    return possible_grid.parent.joinpath(RESULT).resolve()
+
+
+def assert_is_of_another_version(answer):
+    code, out, err = answer
+    assert (code, out) == (4, "")
+    assert f"{RESULT}/_manifest.parquet was written by another version of boulder-sweep" in err
+    assert "--overwrite" in err
+    assert "internal" not in err
+
+
+@pytest.mark.parametrize("form", ["format", "part knows more", "part knows less", "session knows more"])
+def test_a_result_of_another_version(sweep, result, form):
+    rewrite_records(result, OTHER_FORMS[form][0])
+    before = {path.name: path.read_bytes() for path in result.iterdir()}
+    for words in [
+        *COMMANDS,
+        ["run", "grid.yaml"],
+        ["run", "grid.yaml", "--resume"],
+        ["run", "grid.yaml", "--dry-run", "--resume"],
+    ]:
+        assert_is_of_another_version(sweep(*words, *(["-q"] if words[0] == "run" else [])))
+    with pytest.raises(OtherVersionError):
+        read(result)
+    assert {path.name: path.read_bytes() for path in result.iterdir()} == before
+    assert sweep("run", "grid.yaml", "-q", "--overwrite")[0] == 0
+    assert sweep("status", RESULT)[0] == 0
+
+
+@pytest.mark.parametrize("part", ["control", "readings", "accuracy", "settings"])
+def test_a_row_whose_settings_are_of_another_version(sweep, result, part):
+    """The records are as they should be, what they say of the computation is not."""
+    rewrite_records(
+        result, lambda records: records["identity"].update({part: {"colour": "red"}} if part != "accuracy" else {})
+    )
+    if part == "accuracy":
+        rewrite_records(result, lambda records: records["identity"].pop(part))
+    code, out, err = sweep("explain", RESULT, "3")
+    assert (code, out) == (4, "")
+    assert "was written by another version of boulder-sweep" in err
+    code, _, err = sweep("run", "grid.yaml", "-q", "--resume")
+    assert code == 4
+    assert part in err
+
+
+@pytest.mark.parametrize("command", [["status"], ["explain"], ["plot"]])
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("nowhere.sweep", "there is no nowhere.sweep; the result of a sweep is a folder"),
+        ("nowhere/at/all", "there is no nowhere/at/all"),
+        ("grid.yaml", "grid.yaml is a file; the result of a sweep is a folder\n"),
+        ("grid.yaml/x", "there is no grid.yaml/x"),
+        (".", "holds no result of a sweep"),
+    ],
+)
+def test_what_is_no_result(sweep, grid, command, place, words):
+    code, out, err = sweep(*command, place, *(["3"] if command == ["explain"] else []))
+    assert (code, out) == (2, "")
+    assert words in err
+    assert not err.startswith("internal")
+
+
+def test_a_file_of_a_result_in_place_of_its_folder(sweep, result):
+    (part,) = result.glob("rows-*.parquet")
+    for words in (["status", part], ["explain", part, "3"], ["plot", part]):
+        code, out, err = sweep(*words)
+        assert (code, out) == (2, "")
+        assert f"is a file; the result of a sweep is a folder: name the folder it lies in, {result}" in err
