@@ -243,27 +243,37 @@ class DesignPlan:
 
 
 class _Rows:
-    """Places of a range of rows on the axes."""
+    """Places of a range of rows on the axes; of 32 bits where they fit, which divide several times as fast."""
 
     def __init__(self, plan: DesignPlan, start: int, stop: int) -> None:
         self.plan = plan
-        self.rows = np.arange(start, stop, dtype=np.int64)
+        self.start, self.count = start, stop - start
         self.digits: dict[int, np.ndarray] = {}
         self.places: dict[tuple[int, ...], np.ndarray] = {}
 
     def place(self, axes: tuple[int, ...]) -> np.ndarray:
-        """Return the place of every row among the combinations of some axes, int64."""
+        """Return the place of every row among the combinations of some axes, int32 or int64."""
         if axes not in self.places:
-            place = np.zeros(len(self.rows), dtype=np.int64)
+            combinations = math.prod(self.plan.lengths[axis] for axis in axes)
+            place = np.zeros(self.count, dtype=_whole_numbers(combinations))
             for axis in axes:
-                place = place * self.plan.lengths[axis] + self.digit(axis)
+                place *= self.plan.lengths[axis]
+                place += self.digit(axis)
             self.places[axes] = place
         return self.places[axes]
 
     def digit(self, axis: int) -> np.ndarray:
-        """Return the place of every row on one axis."""
+        """Return the place of every row on one axis, int32 or int64."""
         if axis not in self.digits:
-            self.digits[axis] = self.rows // self.plan.strides[axis] % self.plan.lengths[axis]
+            stride, length = self.plan.strides[axis], self.plan.lengths[axis]
+            first, beyond = divmod(self.start, stride)
+            largest = max(beyond, length, stride) + self.count
+            # The number of a design may need 64 bits; how far it is from the first of the block hardly ever does.
+            place = np.arange(beyond, beyond + self.count, dtype=_whole_numbers(largest))
+            place //= stride
+            place += first % length
+            place -= place // length * length
+            self.digits[axis] = place
         return self.digits[axis]
 
     def column(self, quantity: Quantity) -> Column:
@@ -272,7 +282,7 @@ class _Rows:
             lookup, dictionary = quantity.dictionary
             if len(dictionary) <= MAX_DICTIONARY:
                 place = self.place(quantity.axes)
-                return Column(place.astype(np.int32) if lookup is None else lookup[place], dictionary)
+                return Column(place.astype(np.int32, copy=False) if lookup is None else lookup[place], dictionary)
         return Column(None, np.ascontiguousarray(self.values(quantity)))
 
     def values(self, quantity: Quantity) -> np.ndarray:
@@ -280,3 +290,8 @@ class _Rows:
         if isinstance(quantity, Source):
             return quantity.values[self.place(quantity.axes)]
         return quantity.function(*(self.values(value) for value in quantity.inputs))
+
+
+def _whole_numbers(largest: int) -> type[np.int32 | np.int64]:
+    """Return the shortest type that holds whole numbers up to the largest."""
+    return np.int32 if largest <= np.iinfo(np.int32).max else np.int64

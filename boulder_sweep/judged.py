@@ -91,11 +91,13 @@ def joined(pieces: list[Judged]) -> Judged:
     Judged
         All rows, in the order of the pieces.
     """
-    used = {piece.reasons[code] for piece in pieces for code in np.unique(piece.reason)}
+    used = {piece.reasons[code] for piece in pieces for code in np.flatnonzero(np.bincount(piece.reason))}
     reasons = (*REASONS, *sorted(used - set(REASONS)))
     place = {reason: code for code, reason in enumerate(reasons)}
-    columns = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in OUTCOME_COLUMNS}
-    columns["reason"] = np.concatenate([_translated(piece, place) for piece in pieces])
+    translated = [piece._replace(reason=_translated(piece, place)) for piece in pieces]
+    if len(translated) == 1:
+        return translated[0]._replace(reasons=reasons)
+    columns = {name: np.concatenate([getattr(piece, name) for piece in translated]) for name in OUTCOME_COLUMNS}
     return Judged(**columns, reasons=reasons)
 
 
@@ -106,4 +108,6 @@ def rows_of(judged: Judged, start: int, stop: int) -> Judged:
 
 def _translated(piece: Judged, place: dict[str, int]) -> np.ndarray:
     """Reason codes of a piece as indices into other words; words that no row uses need no place."""
+    if all(place.get(reason, code) == code for code, reason in enumerate(piece.reasons)):
+        return piece.reason
     return np.array([place.get(reason, 0) for reason in piece.reasons], dtype=np.int32)[piece.reason]

@@ -120,9 +120,11 @@ def take_sample(
     metadata
         For the metadata of a part.
     """
+    import pyarrow as pa  # heavy, and only runs need it
+
     from .store.schema import encode, part_table, table_schema
 
-    beside_rows = len(encode(table_schema(metadata).empty_table()))
+    beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
     sampled, spent, written = 0, 0.0, 0
     for place, wanted in enumerate(_SAMPLE_SIZES):
         size = min(wanted, rows)

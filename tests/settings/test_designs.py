@@ -171,6 +171,20 @@ def test_ten_to_the_twelve_designs_load_and_stream(load_with):
     assert row["boulder_width_m"].to_numpy()[0] == sweep.axes[0].values[123]
 
 
+@pytest.mark.parametrize("start", [0, 2**31 - 3, 2**32 - 3, 10**10 - 3, 10**12 - 5])
+def test_rows_are_the_same_on_either_side_of_32_bits(start):
+    """Rows, strides and lengths beyond 32 bits; an axis that changes every ten thousand million rows, too."""
+    lengths = (100, 100_000, 100_000)
+    axes = [np.arange(length, dtype=float) for length in lengths]
+    names = ("boulder_height_m", "boulder_width_m", "boulder_density_kg_m3")
+    given = {name: Source(np.ones(1)) for name in (*INPUT_COLUMNS, "hood_height_m", "bumper_height_m")}
+    given |= {name: Source(axis, (place,)) for place, (name, axis) in enumerate(zip(names, axes, strict=True))}
+    block = DesignPlan(lengths, given).block(start, start + 5)
+    rows = np.arange(start, start + 5)
+    for name, places in zip(names, np.unravel_index(rows, lengths), strict=True):
+        assert block.columns[name].to_numpy().tolist() == places.tolist(), name
+
+
 def test_more_designs_than_can_be_numbered_are_refused(problems_of, minimal):
     (problem,) = problems_of(
         minimal, *HUGE, *(f"vehicle.{key}={{from: 1e6, to: 2e6, count: 1000}}" for key in ("spring", "damper", "mass"))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -123,3 +127,32 @@ def test_a_flipped_bit_in_any_page_is_noticed(block, judged):
         flipped[last] ^= 1
         with pytest.raises(OSError, match=r"(?i)crc|corrupt"):
             pq.read_table(pa.BufferReader(flipped), page_checksum_verification=True)
+
+
+def test_tables_pass_the_checks_of_arrow(block, judged):
+    """The arrays are put together from their buffers; words beyond ASCII and missing numbers included."""
+    reasons = (*judged.reasons, "Böschung zu steil: 35° > 30°", "")
+    last = judged.reason.copy()
+    last[:2] = len(reasons) - 2, len(reasons) - 1
+    table = part_table(block, judged._replace(reason=last, reasons=reasons), {})
+    table.validate(full=True)
+    assert table["reason"].slice(0, 2).to_pylist() == ["Böschung zu steil: 35° > 30°", ""]
+    for name in ("margin", "penetration_m"):
+        values = getattr(judged, name)
+        assert table[name].equals(pa.chunked_array([pa.array(values, mask=np.isnan(values))])), name
+
+
+_RUN_AND_LIST = """
+import sys
+from tests.sweep.grids import grid_of
+from boulder_sweep.sweeper import run
+run(grid_of(20), sys.argv[1])
+print(*sorted({"pandas", "matplotlib", "polars", "duckdb"} & set(sys.modules)))
+"""
+
+
+def test_a_run_does_without_pandas(tmp_path):
+    """Importing it takes longer than many runs do; `pyarrow.array` would."""
+    command = [sys.executable, "-c", _RUN_AND_LIST, str(tmp_path / "out")]
+    found = subprocess.run(command, check=True, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert found.stdout.strip() == ""
