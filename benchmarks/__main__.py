@@ -10,10 +10,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from . import accuracy, kernel, sweep
+from . import accuracy, kernel, single_precision, sweep
 from .designs import DESIGNS
 from .peers.__main__ import measure_with
 from .report import Table, write_between_markers
+
+NAMES = ("kernel", "accuracy", "single-precision", "sweep", "peers")
 
 
 def _accuracy() -> list[Table]:
@@ -26,11 +28,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--peers-python", help="interpreter of an environment with benchmarks/requirements-peers.txt")
     parser.add_argument("--large", action="store_true", help="a sweep of 10^7 designs, too: minutes more")
-    parser.add_argument("--only", nargs="+", choices=("kernel", "accuracy", "sweep", "peers"), help="only these")
+    parser.add_argument("--only", nargs="+", choices=NAMES, help="only these")
     arguments = parser.parse_args()
     works: dict[str, Callable[[], list[Table]]] = {
         "kernel": lambda: [kernel.measure()],
         "accuracy": _accuracy,
+        "single-precision": lambda: [single_precision.measure()],
         "sweep": lambda: sweep.measure(large=arguments.large),
         "peers": lambda: [measure_with(arguments.peers_python, write=True)],
     }
