@@ -12,7 +12,7 @@ import numpy as np
 
 from boulder_kernels import (
     Control,
-    Design,
+    DesignTable,
     Outcome,
     OutcomeTable,
     Readings,
@@ -22,6 +22,7 @@ from boulder_kernels import (
     simulate_design,
 )
 from boulder_kernels.design import design_at
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
 
 from .columns import INPUT_COLUMNS
 from .evaluation import control_of, design_table, readings_of
@@ -108,9 +109,11 @@ def simulate(
     record = _empty_record(times)
     outcome = simulate_design(one, how, control, record)
     limits = Limits(control.theta_limit, sweep.criterion.rating)
-    judged = judge(
-        _outcome_row(outcome, _coarser(one, how, control, sweep)), table.L, np.array([inputs["bed_offset_m"]]), limits
-    )
+    row = _outcome_row(outcome)
+    if control.error_estimate:
+        coarser = simulate_design(one, how, control._replace(halved=False), no_record())
+        _estimate(row, _outcome_row(coarser), table, how)
+    judged = judge(row, table.L, np.array([inputs["bed_offset_m"]]), limits)
     motion = Motion(one, how, constants_of(one, how, control.elements), control, _kept(record, times, outcome), outcome)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
 
@@ -165,15 +168,8 @@ def _changed(
 
 def _control(sweep: Sweep) -> Control:
     """How the reported solution is integrated: with half the step where a coarser one estimates its error."""
-    control = control_of(sweep)._replace(stop_at_limit=False)
-    return control._replace(h=0.5 * control.h) if control.error_estimate else control
-
-
-def _coarser(one: Design, how: Readings, control: Control, sweep: Sweep) -> Outcome | None:
-    """Outcome with twice the step where the error is to be estimated."""
-    if not control.error_estimate:
-        return None
-    return simulate_design(one, how, control._replace(h=2.0 * control.h), no_record())
+    control = control_of(sweep)
+    return control._replace(stop_at_limit=False, halved=control.error_estimate)
 
 
 def _sample_times(horizon: float, sample_s: float) -> np.ndarray:
@@ -194,15 +190,19 @@ def _empty_record(times: np.ndarray) -> Record:
     return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged)
 
 
-def _outcome_row(outcome: Outcome, coarser: Outcome | None) -> OutcomeTable:
-    """Return one outcome as a table of one row, with its numerical error where there is a coarser solution."""
+def _outcome_row(outcome: Outcome) -> OutcomeTable:
+    """Return one outcome as a table of one row, without an estimate of its error."""
     m = outcome.maxima
-    theta_error = x_error = math.nan
-    if coarser is not None:
-        theta_error = abs(coarser.maxima.theta - m.theta)
-        x_error = max(abs(coarser.maxima.x_b - m.x_b), abs(coarser.maxima.x_v - m.x_v))
-    row = (m.theta, m.x_b, m.x_v, m.F_v, outcome.t_limit, outcome.t_end, theta_error, x_error)
+    row = (m.theta, m.x_b, m.x_v, m.F_v, outcome.t_limit, outcome.t_end, math.nan, math.nan)
     return OutcomeTable(np.array([outcome.status], np.int8), *(np.array([value]) for value in row))
+
+
+def _estimate(row: OutcomeTable, coarser: OutcomeTable, table: DesignTable, how: Readings) -> None:
+    """Write into a row its numerical errors, by the rule that a sweep has for its rows."""
+    estimate_errors(coarser, row, table, SAFETY if how.restoring_gravity else SAFETY_PRINTED)
+    if math.isnan(coarser.t_limit[0]) != math.isnan(row.t_limit[0]):
+        # That rule tells by the status which solution reached the limit; here they go on beyond it.
+        row.theta_error[0] = row.x_error[0] = math.inf
 
 
 def _kept(record: Record, times: np.ndarray, outcome: Outcome) -> Record:
