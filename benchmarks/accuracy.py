@@ -14,7 +14,6 @@ from dataclasses import asdict, fields
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_sweep.accuracy import STEPS_S
 
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, first, sample
 from .literal import literal_table
@@ -98,7 +97,6 @@ def tables(points: list[Point], count: int) -> list[Table]:
         f"errors against a step of {1e3 * REFERENCE_STEP_S:g} ms; CPU time of one thread; switches inside: "
         f"{min(LITERAL_DESIGNS, count)} designs, told the time at which the reference ended"
     )
-    steps_named = {round(1e3 * step, 6): name for name, step in STEPS_S.items()}
     found = []
     for preset in PRESETS:
         table = Table(
@@ -117,13 +115,11 @@ def tables(points: list[Point], count: int) -> list[Table]:
         for p in points:
             if p.preset != preset or p.step_ms not in SHOWN_MS:
                 continue
-            name = steps_named.get(p.step_ms)
-            step = f"{p.step_ms:g} ms" + (f" (`{name}`)" if name and p.way == "events located" else "")
             way = p.way if np.isnan(p.coverage) else f"{p.way}, covers {100 * p.coverage:.1f} %"
             table.rows.append(
                 [
                     way,
-                    step,
+                    f"{p.step_ms:g} ms",
                     f"{p.cpu_us:.2f} us",
                     ", ".join(significant(v) for v in (p.theta_max_deg, p.theta_p99_deg, p.theta_rms_deg)),
                     ", ".join(significant(v) for v in (p.x_max_mm, p.x_p99_mm, p.x_rms_mm)),

@@ -93,7 +93,7 @@ class Finding:
 def paths(folder: Path) -> dict[str, Callable[[], object]]:
     """Key paths by name; `folder` takes the tables of whole runs."""
     from boulder_sweep import load
-    from boulder_sweep.accuracy import STEPS_S
+    from boulder_sweep.accuracy import STEPS
     from boulder_sweep.sweeper import run
 
     designs = sample(ROWS)
@@ -108,10 +108,10 @@ def paths(folder: Path) -> dict[str, Callable[[], object]]:
         raise ValueError(f"the grid of the gate has {sweep.n_designs} designs, not {RUN_ROWS}")
 
     def lanes(name: str, *, estimate: bool) -> Callable[[], object]:
-        control = bk.Control(STEPS_S[name], HORIZON, ROTATION_LIMIT, 0, estimate)
+        control = bk.Control(STEPS[name].step_s, HORIZON, ROTATION_LIMIT, 0, estimate)
         return lambda: bk.simulate_table(designs, readings, control)
 
-    one = bk.Control(STEPS_S["balanced"], HORIZON, ROTATION_LIMIT, 0, False)
+    one = bk.Control(STEPS["balanced"].step_s, HORIZON, ROTATION_LIMIT, 0, False)
     record = bk.no_record()
 
     def one_by_one() -> None:

@@ -29,8 +29,6 @@ LADDER = (
     *(Steps(1e-3 * step, locate_yield=True) for step in (8, 6, 4, 3, 2, 1.5, 1, 0.75, 0.5, 0.375, 0.25, 0.125)),
 )
 """What a pilot chooses from, the cheapest first. Longer steps save nothing: a design's events cost the same."""
-STEPS_S = {name: steps.step_s for name, steps in STEPS.items()}
-"""Steps of the named accuracies [s]."""
 
 
 @dataclass(frozen=True)
