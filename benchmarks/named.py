@@ -1,12 +1,13 @@
 """What the named accuracies cost and how accurate they are: ``python -m benchmarks.named``.
 
-Exactly what ``sweep run`` asks of the kernels under each name, in either preset. Ratios are medians over rounds in which
-all three were timed in turn.
+Exactly what ``sweep run`` asks of the kernels under each name, in either preset. Ratios are medians over rounds in
+which all three were timed in turn.
 """
 
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 import numpy as np
 
@@ -48,14 +49,16 @@ def measure(count: int = DESIGNS, rounds: int = ROUNDS) -> Table:
         "named",
         "The named accuracies",
         f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {count} random designs; CPU time of one thread",
-        ["readings", "accuracy", "steps", "CPU time a design", "over `fast`", "rotation: max [deg]"]
-        + ["displacement: max [mm]", "wrong verdicts"],
+        [
+            *("readings", "accuracy", "steps", "CPU time a design", "over `fast`"),
+            *("rotation: max [deg]", "displacement: max [mm]", "wrong verdicts"),
+        ],
     )
     for preset, readings in PRESETS.items():
         known = reference_of(designs, readings)
         named = STEPS if readings.restoring_gravity else STEPS_PRINTED
         ways = {name: named_control(name, steps) for name, steps in named.items()}
-        works = {name: (lambda how=how: bk.simulate_table(designs, readings, how)) for name, how in ways.items()}
+        works = {name: partial(bk.simulate_table, designs, readings, how) for name, how in ways.items()}
         times = interleaved(works, rounds)
         for name, work in works.items():
             found = work()
