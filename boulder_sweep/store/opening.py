@@ -126,7 +126,7 @@ def _resumed(out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, n
     if different:
         raise errors.SettingsDifferError(out, different)
     recover_merge(there, out)
-    damaged = damaged_parts(out, there, read_parts=True)
+    damaged = damaged_parts(out, there.parts, read_parts=True)
     there.parts = {name: part for name, part in there.parts.items() if name not in damaged}
     there.resume_command = manifest.resume_command
     keep = {*there.parts, MANIFEST_NAME, LOCK_NAME}

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 from boulder_sweep.columns import BY_NAME
 
-from .errors import DamagedError
-from .manifest import load
-from .verify import load_checked
+from .finished import FinishedRows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,57 +67,24 @@ def read_row(folder: Path, design_id: int) -> pa.Table:
     DamagedError
         The part is gone, truncated or changed.
     """
-    import pyarrow as pa  # heavy, and only readers need it
-    import pyarrow.parquet as pq
-
-    from .verify import wrong_content
-
-    manifest = load(folder)
-    if not 0 <= design_id < manifest.rows:
-        raise IndexError(f"{folder} holds {manifest.rows:,} designs, numbered from 0; there is no {design_id}")
-    for name, part in manifest.parts.items():
-        if part.first <= design_id < part.first + part.rows:
-            damage = wrong_content(folder / name, part)
-            if damage:
-                raise DamagedError(_damage_text(folder, {name: damage}))
-            try:
-                rows = pq.read_table(folder / name, page_checksum_verification=True)
-            except (OSError, pa.ArrowException) as problem:
-                raise DamagedError(_damage_text(folder, {name: str(problem)})) from problem
-            return rows.slice(design_id - part.first, 1)
-    raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` says how to go on")
+    finished = FinishedRows(folder)
+    if not 0 <= design_id < finished.rows:
+        raise IndexError(f"{folder} holds {finished.rows:,} designs, numbered from 0; there is no {design_id}")
+    row = finished.row(design_id)
+    if row is None:
+        raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` says how to go on")
+    return row
 
 
 def _read(folder: Path, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, int]:
     """Return the finished parts, in the order of the designs, and the rows of the whole table."""
     import pyarrow as pa  # heavy, and only readers need it
-    import pyarrow.dataset as ds
 
     from .schema import table_schema
 
-    manifest, damaged = load_checked(folder, read_parts=verify)
-    if damaged:
-        raise DamagedError(_damage_text(folder, damaged))
-    in_order = sorted(manifest.parts.items(), key=lambda item: item[1].first)
-    files = [str(folder / name) for name, _ in in_order]
-    wanted = list(columns) if columns is not None else None
-    if not files:
+    finished = FinishedRows(folder)
+    parts = list(finished.tables(columns, verify=verify))
+    if not parts:
         empty = table_schema().empty_table()
-        return (empty.select(wanted) if wanted else empty), manifest.rows
-    parts = ds.ParquetFileFormat(
-        default_fragment_scan_options=ds.ParquetFragmentScanOptions(page_checksum_verification=True)
-    )
-    try:
-        return ds.dataset(files, format=parts).to_table(columns=wanted), manifest.rows
-    except (OSError, pa.ArrowException) as problem:
-        raise DamagedError(_damage_text(folder, {"a part": str(problem)})) from problem
-
-
-def _damage_text(folder: Path, damaged: dict[str, str]) -> str:
-    """Say what is damaged and what to do."""
-    first, what = next(iter(damaged.items()))
-    more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
-    return (
-        f"{folder} is damaged ({first}: {what}{more}). `sweep status {folder} --verify` tells which parts are, "
-        f"and running again with --resume computes them anew"
-    )
+        return (empty if columns is None else empty.select(list(columns))), finished.rows
+    return pa.concat_tables(parts), finished.rows

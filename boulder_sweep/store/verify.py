@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
 from pathlib import Path
 
-from .lock import is_locked
 from .manifest import Manifest, Merge, Part, hidden_name, load
 
-_ATTEMPTS = 3
+_ATTEMPTS = 20
+"""More than the merges that a run can begin while a part is looked at."""
+_CHANGED = "changed: its checksum differs"
 
 
 def load_checked(folder: Path, *, read_parts: bool) -> tuple[Manifest, dict[str, str]]:
@@ -30,14 +33,18 @@ def load_checked(folder: Path, *, read_parts: bool) -> tuple[Manifest, dict[str,
     damaged : dict
         What is wrong with the others, in words; by file name.
     """
+    whole: dict[str, Part] = {}
     for _ in range(_ATTEMPTS):
         manifest = load(folder)
-        damaged = damaged_parts(folder, manifest, read_parts=read_parts)
-        # Parts may have been merged since the manifest was read: then look again.
-        if not (damaged and is_locked(folder)):
+        known = deepcopy(manifest)
+        unknown = {name: part for name, part in manifest.parts.items() if whole.get(name) != part}
+        damaged = damaged_parts(folder, unknown, read_parts=read_parts)
+        whole |= {name: part for name, part in unknown.items() if name not in damaged}
+        if manifest.merge is not None and damaged.keys() & set(manifest.merge.replaced):
+            damaged = _without_merged(folder, manifest, damaged)
+        # Parts may have been merged since the manifest was read: then look again, at what is new and what seemed wrong.
+        if not damaged or load(folder) == known:
             break
-    if manifest.merge is not None and damaged.keys() & set(manifest.merge.replaced):
-        damaged = _without_merged(folder, manifest, damaged)
     manifest.parts = {name: part for name, part in manifest.parts.items() if name not in damaged}
     return manifest, damaged
 
@@ -56,12 +63,13 @@ def _without_merged(folder: Path, manifest: Manifest, damaged: dict[str, str]) -
 
 def merged_file(folder: Path, merge: Merge) -> str | None:
     """Return the name that a merged part has on the disk, its own or the hidden one; None where it is not whole."""
-    names = (merge.name, hidden_name(merge.name))
+    # Its own name twice, since it may get that just after it was looked for.
+    names = (merge.name, hidden_name(merge.name), merge.name)
     return next((name for name in names if not wrong_content(folder / name, merge.part)), None)
 
 
-def damaged_parts(folder: Path, manifest: Manifest, *, read_parts: bool) -> dict[str, str]:
-    """Compare parts with what the manifest says of them.
+def damaged_parts(folder: Path, parts: Mapping[str, Part], *, read_parts: bool) -> dict[str, str]:
+    """Compare parts, by their file names, with what the manifest says of them.
 
     Returns
     -------
@@ -71,8 +79,8 @@ def damaged_parts(folder: Path, manifest: Manifest, *, read_parts: bool) -> dict
     check = wrong_content if read_parts else wrong_size
     # Checksums are computed without the interpreter's lock, so threads read and compute at once.
     with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
-        found = pool.map(lambda name: check(folder / name, manifest.parts[name]), manifest.parts)
-        return {name: wrong for name, wrong in zip(manifest.parts, found, strict=True) if wrong}
+        found = pool.map(lambda name: check(folder / name, parts[name]), parts)
+        return {name: wrong for name, wrong in zip(parts, found, strict=True) if wrong}
 
 
 def wrong_size(path: Path, part: Part) -> str:
@@ -81,6 +89,11 @@ def wrong_size(path: Path, part: Part) -> str:
         size = path.stat().st_size
     except OSError:
         return "gone"
+    return _other_size(size, part)
+
+
+def _other_size(size: int, part: Part) -> str:
+    """Say how a size differs from what it should be; empty if it does not."""
     if size == part.bytes:
         return ""
     kind = "truncated" if size < part.bytes else "longer than written"
@@ -97,4 +110,12 @@ def wrong_content(path: Path, part: Part) -> str:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as problem:
         return f"cannot be read: {problem.strerror}"
-    return "" if digest == part.sha256 else "changed: its checksum differs"
+    return "" if digest == part.sha256 else _CHANGED
+
+
+def wrong_bytes(content: bytes, part: Part) -> str:
+    """Say how the content of a file differs from what it should be, by its checksum; empty if it does not."""
+    wrong = _other_size(len(content), part)
+    if wrong:
+        return wrong
+    return "" if hashlib.sha256(content).hexdigest() == part.sha256 else _CHANGED

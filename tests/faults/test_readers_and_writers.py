@@ -33,7 +33,7 @@ READERS = {
 
 
 def test_readers_during_a_run_see_whole_parts_in_order_and_never_fewer_than_before(tmp_path):
-    """Up to the moment, after the last row, in which small parts are merged: a reader may then have to try again."""
+    """Others than ours up to the merge of small parts after the last row, when they may have to try again."""
     out, rows = tmp_path / "out", 3 * ROWS
     driver = Driver(out, *OPTIONS, "--rows", str(rows))
     driver.wait_for_rows()
@@ -46,12 +46,14 @@ def test_readers_during_a_run_see_whole_parts_in_order_and_never_fewer_than_befo
                 assert ids == list(range(len(ids))), name
                 assert len(ids) >= seen[name], name
             except Exception:
-                assert load(out).rows_done == rows, f"{name} failed before the merge"
+                if name == "read" or load(out).rows_done < rows:
+                    raise
                 continue
             seen[name] = len(ids)
             looks[name] += 1
         found = status(out, verify=True)
-        assert found.damaged == {} or found.rows_done + 3000 >= rows
+        assert found.damaged == {}
+        assert found.rows_done >= seen["read"]
     assert driver.end()[0] == 3  # the stand-in gives rows that cannot be computed, too
     assert min(looks.values()) > 0
     assert min(seen.values()) > 0

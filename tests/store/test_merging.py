@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import errno
 
+import pyarrow as pa
 import pytest
 
-from boulder_sweep.store import merging, status, writer
-from boulder_sweep.store.errors import WriteError
+from boulder_sweep.store import merging, status, verify, writer
+from boulder_sweep.store.errors import DamagedError, StoreError, WriteError
+from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.manifest import MANIFEST_NAME, load
 from boulder_sweep.store.reader import read_table
 from tests.store.folders import ROWS, commit, open_folder, part_bytes
@@ -88,9 +90,9 @@ def test_a_merge_killed_at_any_step_loses_and_doubles_nothing(out, monkeypatch, 
             killed = False
     folder._lock.release()
     assert killed == (step < 8)  # announce, put, three unlinks, rename, flush, record
-    for verify in (False, True):
-        assert status(out, verify=verify).rows_done == 100
-        assert status(out, verify=verify).damaged == {}
+    for deep in (False, True):
+        assert status(out, verify=deep).rows_done == 100
+        assert status(out, verify=deep).damaged == {}
     assert same_bits(read_table(out), before)
     again = open_folder(out, resume=True)
     assert again.damaged == {}
@@ -128,3 +130,66 @@ def test_verdicts_add_up(out):
     assert next(folder.manifest.missing()) == (100, 200)
     assert folder.manifest.rows == ROWS
     folder.close("interrupted")
+
+
+def test_rows_are_read_on_where_they_went(out):
+    before = read_table(out)
+    begun, known, one = (FinishedRows(out) for _ in range(3))
+    tables = begun.tables(["design_id", "margin"])
+    first = next(tables)
+    merge(out).close("finished")
+    rest = list(tables)
+    assert same_bits(pa.concat_tables([first, *rest]), before.select(["design_id", "margin"]))
+    assert same_bits(pa.concat_tables(known.tables()), before)
+    assert same_bits(one.row(70), before.slice(70, 1))
+    assert one.row(100) is None
+
+
+@pytest.mark.parametrize("step", range(1, 8))
+def test_rows_are_read_on_in_the_middle_of_a_merge(out, monkeypatch, step):
+    before = read_table(out)
+    finished = FinishedRows(out)
+    folder = open_folder(out, resume=True)
+    (group,) = folder.manifest.mergeable()
+    killed_at(monkeypatch, step)
+    with pytest.raises(Killed):
+        folder.merge(group, part_bytes(0, 100)[0])
+    monkeypatch.undo()
+    folder._lock.release()
+    assert same_bits(pa.concat_tables(finished.tables()), before)
+    assert same_bits(read_table(out), before)
+    assert status(out, verify=True).damaged == {}
+
+
+@pytest.mark.parametrize("verify_parts", [False, True])
+def test_a_merge_between_a_look_at_the_manifest_and_one_at_the_parts_is_no_damage(out, monkeypatch, verify_parts):
+    looks = []
+
+    def load_and_merge(folder):
+        looks.append(load(folder))
+        if len(looks) == 1:
+            merge(out).close("finished")
+        return looks[-1]
+
+    monkeypatch.setattr(verify, "load", load_and_merge)
+    found = status(out, verify=verify_parts)
+    assert (found.damaged, found.rows_done, found.parts) == ({}, 100, 1)
+
+
+def test_a_result_that_is_replaced_while_it_is_read_is_not_mixed_with_the_other(out):
+    finished = FinishedRows(out)
+    folder = open_folder(out, overwrite=True, identity={"settings": {"soil": 2}})
+    commit(folder, 0)
+    folder.close("interrupted")
+    with pytest.raises(StoreError, match="replaced by the result of another sweep"):
+        list(finished.tables())
+
+
+def test_a_part_that_is_gone_is_told_though_nothing_changes(out):
+    finished = FinishedRows(out)
+    (out / "rows-000000000030-000000000060.parquet").unlink()
+    with pytest.raises(DamagedError, match=r"rows-000000000030-000000000060.parquet: gone"):
+        list(finished.tables())
+    with pytest.raises(DamagedError, match=r"rows-000000000030-000000000060.parquet: gone"):
+        finished.row(40)
+    assert finished.row(10)["design_id"].to_pylist() == [10]

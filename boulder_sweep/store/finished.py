@@ -1,0 +1,182 @@
+"""The finished rows of an output folder, part by part, whatever a run is doing to the folder meanwhile.
+
+Files never change, but a run that has all its rows replaces small parts by larger ones with the same rows, see
+`writer`. A file that was there a moment ago may then be gone: its rows are looked for again, where they are now.
+"""
+
+from __future__ import annotations
+
+import os
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from .errors import DamagedError, StoreError
+from .manifest import Manifest, Part, hidden_name, load
+from .verify import load_checked, wrong_bytes
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_THREADS = min(8, os.cpu_count() or 1)
+
+
+class FinishedRows:
+    """The rows of a result that are finished now; those that come later do not count.
+
+    Parameters
+    ----------
+    folder
+        The output folder; a run may be writing into it.
+
+    Attributes
+    ----------
+    rows : int
+        Rows of the whole table.
+    rows_done : int
+        Rows that are finished.
+    identity : dict
+        What all rows have in common, see `provenance`.
+
+    Raises
+    ------
+    NotASweepError
+        There is no result in the folder.
+    DamagedError, OtherVersionError
+        Its manifest cannot be trusted, or not be understood.
+    """
+
+    def __init__(self, folder: Path):
+        manifest = load(folder)
+        self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
+        self._folder = folder
+        self._places = _Places(manifest)
+        self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())
+
+    def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
+        """Yield all rows in the order of the designs, about a part at a time.
+
+        Parameters
+        ----------
+        columns
+            Names of the columns wanted; all by default.
+        verify
+            Compare every part with its checksum.
+
+        Raises
+        ------
+        DamagedError
+            A part is gone, truncated or changed.
+        """
+        _, damaged = load_checked(self._folder, read_parts=False)
+        if damaged:
+            raise DamagedError(_damage_text(self._folder, damaged))
+        wanted = list(columns) if columns is not None else None
+        ahead: deque[Future[list[pa.Table]]] = deque()
+        with ThreadPoolExecutor(_THREADS) as pool:
+            try:
+                for first, stop in self._ranges:
+                    ahead.append(pool.submit(self._between, first, stop, wanted, verify))
+                    if len(ahead) > _THREADS:
+                        yield from ahead.popleft().result()
+                while ahead:
+                    yield from ahead.popleft().result()
+            finally:
+                for waiting in ahead:
+                    waiting.cancel()
+
+    def row(self, number: int) -> pa.Table | None:
+        """Return one row; None where it is not finished.
+
+        Raises
+        ------
+        DamagedError
+            Its part is gone, truncated or changed.
+        """
+        if not any(first <= number < stop for first, stop in self._ranges):
+            return None
+        return self._between(number, number + 1, None, verify=True)[0]
+
+    def _between(self, first: int, stop: int, columns: list[str] | None, verify: bool) -> list[pa.Table]:
+        """Read the rows [first, stop)."""
+        found = []
+        while first < stop:
+            name, part, file = self._opened(first)
+            with file:
+                table = self._read(file, name, part, columns, verify)
+            end = min(stop, part.stop)
+            found.append(table.slice(first - part.first, end - first))
+            first = end
+        return found
+
+    def _opened(self, row: int) -> tuple[str, Part, BinaryIO]:
+        """Open the file that holds a row now. An open file stays readable, even if it is removed."""
+        places = self._places
+        while True:
+            for name, part in places.of(row):
+                try:
+                    return name, part, (self._folder / name).open("rb")
+                except FileNotFoundError:
+                    continue
+                except OSError as problem:
+                    raise DamagedError(_damage_text(self._folder, {name: str(problem.strerror)})) from problem
+            before, places = places, _Places(load(self._folder))
+            if places.manifest.identity != self.identity:
+                raise StoreError(f"{self._folder} was replaced by the result of another sweep while it was read")
+            if places.manifest == before.manifest:
+                name = next((name for name, _ in places.of(row)), f"the part with row {row}")
+                raise DamagedError(_damage_text(self._folder, {name: "gone"}))
+            self._places = places
+
+    def _read(self, file: BinaryIO, name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
+        """Read a part from its open file."""
+        import pyarrow as pa  # heavy, and only readers need it
+        import pyarrow.parquet as pq
+
+        source: Any = file
+        try:
+            if verify:
+                content = file.read()
+                wrong = wrong_bytes(content, part)
+                if wrong:
+                    raise DamagedError(_damage_text(self._folder, {name: wrong}))
+                source = pa.BufferReader(content)
+            # Parts are read side by side already.
+            return pq.read_table(source, columns=columns, use_threads=False, page_checksum_verification=True)
+        except (OSError, pa.ArrowException) as problem:
+            raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
+
+
+class _Places:
+    """In which files a manifest has which rows."""
+
+    def __init__(self, manifest: Manifest):
+        self.manifest = manifest
+        self._names = sorted(manifest.parts, key=lambda name: manifest.parts[name].first)
+        self._firsts = [manifest.parts[name].first for name in self._names]
+
+    def of(self, row: int) -> Iterator[tuple[str, Part]]:
+        """Yield the files in which a row may be, in the order in which to look."""
+        place = bisect_right(self._firsts, row) - 1
+        if place >= 0:
+            name = self._names[place]
+            if row < self.manifest.parts[name].stop:
+                yield name, self.manifest.parts[name]
+        merge = self.manifest.merge
+        if merge is not None and merge.part.first <= row < merge.part.stop:
+            # The last again, since it may get its own name just after that was looked for.
+            for name in (merge.name, hidden_name(merge.name), merge.name):
+                yield name, merge.part
+
+
+def _damage_text(folder: Path, damaged: dict[str, str]) -> str:
+    """Say what is damaged and what to do."""
+    first, what = next(iter(damaged.items()))
+    more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
+    return (
+        f"{folder} is damaged ({first}: {what}{more}). `sweep status {folder} --verify` tells which parts are, "
+        f"and running again with --resume computes them anew"
+    )
