@@ -70,14 +70,14 @@ def run(
         raise click.UsageError("--resume and --overwrite exclude each other: go on, or begin again")
     if options["scheduler"] and options["backend"] != "dask":
         raise click.UsageError("--scheduler needs --backend dask")
-    sweep = _load(grid, (*overrides, *([f"solver.accuracy={accuracy}"] if accuracy else [])), quiet)
+    sweep = _load(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
     target = Path(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
         return _dry_run(sweep, target, options, as_json)
     if verbose:
         console.say("\n".join(console.value_lines(sweep.resolved())))
     if not quiet:
-        console.say(f"{sweep.name}: {sweep.n_designs:,} designs into {target}")
+        console.say(f"{sweep.name}: {console.counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.sweeper import run as run_sweep
 
     with console.progress(quiet) as show:
@@ -171,7 +171,8 @@ def simulate(
     sweep = _load(case, overrides, quiet)
     number = design or 0
     if number >= sweep.n_designs:
-        raise click.UsageError(f"{case} holds {sweep.n_designs:,} designs, numbered from 0; there is no {number}")
+        held = console.counted(sweep.n_designs, "design")
+        raise click.UsageError(f"{case} holds {held}, numbered from 0; there is no {number}")
     if design is None and sweep.n_designs > 1 and not quiet:
         console.say(f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)")
     reason = sweep.block(number, number + 1).reasons[0]
@@ -284,7 +285,8 @@ def _report(error: Exception, verbose: bool) -> int:
 
         traceback.print_exception(error)
     if isinstance(error, OSError):  # a place that cannot be read or written
-        print(f"error: {error}", file=sys.stderr)
+        place = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
+        print(f"error: {place}", file=sys.stderr)
         return EXIT_WRONG_USE
     print(f"internal error: {type(error).__name__}: {error}; {REPORT}", file=sys.stderr)
     return EXIT_INTERNAL

@@ -100,7 +100,7 @@ def _bar() -> Iterator[Callable[[Progress], None]]:
 
 def grid_lines(sweep: Sweep) -> list[str]:
     """Return a description of the designs: how many, and over which axes."""
-    count = _counted(sweep.n_designs, "design")
+    count = counted(sweep.n_designs, "design")
     if sweep.table is not None:
         return [f"{sweep.name}: {count} from {sweep.table.file}"]
     lines = [f"{sweep.name}: {count}"]
@@ -114,16 +114,16 @@ def grid_lines(sweep: Sweep) -> list[str]:
 def summary_lines(name: str, summary: Summary) -> list[str]:
     """Return what a finished run found, where it is and how to open it."""
     lines = [
-        f"{name}: {_counted(summary.rows, 'design')}, {summary.rows_computed:,} of them simulated now in "
+        f"{name}: {counted(summary.rows, 'design')}, {summary.rows_computed:,} of them simulated now in "
         f"{duration(summary.seconds)} ({summary.rows_per_second:,.0f} per second, "
-        f"{_counted(summary.jobs, 'worker')}, {summary.backend})",
+        f"{counted(summary.jobs, 'worker')}, {summary.backend})",
         "",
     ]
     lines += verdict_lines(summary.reasons, summary.rows)
     lines += [
         "",
         *accuracy_lines(summary.accuracy),
-        f"table  {summary.out} ({_counted(summary.parts, 'file')}, {size(summary.bytes)})",
+        f"table  {summary.out} ({counted(summary.parts, 'file')}, {size(summary.bytes)})",
         f"open   pandas.read_parquet({str(summary.out)!r}), or boulder_sweep.read({str(summary.out)!r})",
     ]
     return lines
@@ -141,9 +141,8 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
     found = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
     if "pilot_designs" not in accuracy:
         return [found]
-    reached = (
-        f"{accuracy['estimated_error_p99_9_deg']:g} deg in 99.9 % of a pilot's {accuracy['pilot_designs']:,} designs"
-    )
+    sample = counted(accuracy["pilot_designs"], "design")
+    reached = f"{accuracy['estimated_error_p99_9_deg']:g} deg in 99.9 % of a pilot of {sample}"
     return [found, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
@@ -154,8 +153,8 @@ def dry_run_lines(sweep: Sweep, out: Path, effort: Estimate) -> list[str]:
         "",
         *value_lines(sweep.resolved()),
         "",
-        f"would simulate {effort.rows_to_compute:,} of {_counted(effort.rows, 'design')} into {out}",
-        f"about {duration(effort.seconds)} with {_counted(effort.jobs, 'worker')}, "
+        f"would simulate {effort.rows_to_compute:,} of {counted(effort.rows, 'design')} into {out}",
+        f"about {duration(effort.seconds)} with {counted(effort.jobs, 'worker')}, "
         f"{size(effort.disk_bytes)} on disk, {size(effort.memory_bytes)} of memory",
         *(f"does not fit: {objection}" for objection in effort.objections()),
     ]
@@ -204,7 +203,8 @@ def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:
     return lines
 
 
-def _counted(count: int, noun: str) -> str:
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun: ``1 design``, ``2,736 designs``."""
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 

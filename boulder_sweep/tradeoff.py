@@ -44,6 +44,12 @@ TARGETS_DEG = (0.1, 0.01, 1e-3, 1e-4, 1e-5)
 Told = Callable[[str], None]
 
 
+class NothingToMeasureError(ValueError):
+    """None of the designs of a sample can be computed."""
+
+    exit_code = 2
+
+
 @dataclass(frozen=True)
 class Tradeoff:
     """What was measured.
@@ -148,16 +154,18 @@ class Tradeoff:
         }
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write table and picture into a folder, which is made; return the files."""
+        """Write table and picture into a folder, which is made; return the files: none where nothing was measured."""
         import pyarrow.csv as pa_csv
         import pyarrow.parquet as pq
 
-        from .views.figures import require_matplotlib
+        from .views.figures import make_folder, require_matplotlib
         from .views.tradeoff import draw_tradeoff
 
         require_matplotlib()
         target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
+        make_folder(target)
+        if not self.points:
+            return []
         files = [target / f"tradeoff.{kind}" for kind in ("parquet", "csv", "png")]
         pq.write_table(self.table(), files[0])
         pa_csv.write_csv(self.table(), files[1])
@@ -178,11 +186,19 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
         After so much time no further way is begun [s].
     tell
         Told what is being measured.
+
+    Raises
+    ------
+    NothingToMeasureError
+        No design of the sample can be computed.
     """
     begun = time.monotonic()
     table, bed_offset = sampled_columns(sweep, designs)
     if not table.L.size:
-        raise ValueError("no design of this sweep can be computed")
+        raise NothingToMeasureError(
+            f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
+            "the table of a run says why"
+        )
     limits = Limits(math.radians(sweep.criterion.max_rotation_deg), sweep.criterion.rating)
     presets = {"corrected": corrected(), "as_printed": as_printed()}
     if sweep.model.preset not in presets:
@@ -198,7 +214,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
             continue
         sample = Sample(table, bed_offset, readings, limits, sweep.solver.horizon_s)
         if tell is not None:
-            tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, {table.L.size:,} designs")
+            tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {table.L.size:,}")
         known = sample.solve(REFERENCE_STEP_S, locate_yield=True)
         twice = sample.solve(2.0 * REFERENCE_STEP_S, locate_yield=True)
         references[name] = _largest_difference_deg(known, twice)

@@ -214,6 +214,11 @@ class Trajectory:
             The file; replaced where it exists.
         energy
             Also write the energy ledger.
+
+        Raises
+        ------
+        HistoryFileError
+            The name does not end in ``.parquet``, or its folder does not exist.
         """
         from .trajectory_file import write  # pyarrow is heavy, and only files need it
 

@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 _TYPES = {"float64": pa.float64(), "dictionary": pa.dictionary(pa.int32(), pa.string())}
 
 
+class HistoryFileError(Exception):
+    """A time history cannot be written; the message says why and what would be right."""
+
+    exit_code = 2
+
+
 def arrow_table(trajectory: Trajectory, *, energy: bool = False) -> pa.Table:
     """Return a time history as an Arrow table.
 
@@ -48,5 +54,16 @@ def arrow_table(trajectory: Trajectory, *, energy: bool = False) -> pa.Table:
 
 
 def write(trajectory: Trajectory, path: str | Path, *, energy: bool = False) -> None:
-    """Write a time history to a Parquet file; see `arrow_table`."""
+    """Write a time history to a Parquet file; see `arrow_table`.
+
+    Raises
+    ------
+    HistoryFileError
+        The name has another ending, or its folder does not exist.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ".parquet":
+        raise HistoryFileError(f"{path}: a time history is a Parquet file; its name must end in .parquet")
+    if not target.absolute().parent.is_dir():
+        raise HistoryFileError(f"{path}: the folder {target.absolute().parent} does not exist")
     pq.write_table(arrow_table(trajectory, energy=energy), path, compression="zstd", write_page_checksum=True)

@@ -16,6 +16,9 @@ _ALTERNATIVES = {
 }
 """Setting the one takes the other away, since a file holds only one of them."""
 
+OPTIONS = {"--accuracy": "solver.accuracy"}
+"""Options of their own that set an entry: a mistake in one is said to stand there, not in a ``--set``."""
+
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""
 
@@ -28,14 +31,16 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
     root : Mapping
         The tree of the file, changed in place.
     overrides : sequence of str
-        As typed behind ``--set``; the value is YAML, so lists and ranges work as in the file.
+        As typed behind ``--set``; the value is YAML, so lists and ranges work as in the file. ``--accuracy=fine``
+        is an option of its own.
     problems : ProblemList
         Receives what cannot be understood.
     """
     for text in overrides:
         key, equals, value_text = text.partition("=")
+        option, key = (key, OPTIONS[key]) if key in OPTIONS else ("--set", key)
         path = key.strip().split(".")
-        place, name = Place("--set"), shorten(key.strip())
+        place, name = Place(option), shorten(key.strip())
         if not equals or not all(path) or len(path) > 4:
             problems.add(place, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
             continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,12 +56,14 @@ def tradeoff(
     from boulder_sweep.settings import load
     from boulder_sweep.tradeoff import measure
 
+    if math.isnan(seconds):
+        raise click.UsageError("--seconds nan: give a number of seconds")
     sweep = load(grid, overrides)
     if out is not None:
-        from boulder_sweep.views.figures import require_matplotlib
+        from boulder_sweep.views.figures import make_folder, require_matplotlib
 
         require_matplotlib()
-        Path(out).mkdir(parents=True, exist_ok=True)
+        make_folder(Path(out))
     found = measure(sweep, designs=designs, seconds=seconds, tell=None if quiet else say)
     files = [] if out is None else found.write(out)
     if as_json:

@@ -76,6 +76,20 @@ def checked_kind(path: str | Path, kinds: tuple[str, ...] = KINDS) -> Path:
     return target
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder for pictures.
+
+    Raises
+    ------
+    PictureError
+        It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise PictureError(f"the folder {folder} cannot be made: {problem.strerror or problem}") from problem
+
+
 @contextmanager
 def figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
     """Give an empty figure, and save it at the end.

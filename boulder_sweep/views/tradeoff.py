@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from boulder_sweep.tradeoff import Tradeoff
     from boulder_sweep.tradeoff_points import Point
 
+FIRST_STEP_MS = 16.0
+"""Step whose name stands on the other side of its point, off that of the next."""
 LEAST_DEG = 1e-11
 """Errors below it are drawn there: no axis of logarithms has a zero [deg]."""
 COLOURS = (ORANGE, AMBER, PURPLE, GREY, SKY)
@@ -50,6 +52,8 @@ def _panel(axes: Axes, points: list[Point]) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.margins(x=0.12)
+    if all(p.rotation_max_deg <= LEAST_DEG for p in points):
+        axes.set_ylim(0.1 * LEAST_DEG, 10.0 * LEAST_DEG)  # no error at all, as where nothing moves
     front = sorted((p for p in points if p.pareto), key=lambda p: p.cpu_us)
     axes.plot(
         [p.cpu_us for p in front],
@@ -95,8 +99,8 @@ def _way(axes: Axes, points: list[Point], colour: str, marker: str, words: str) 
     )
     axes.vlines(cost, usual, largest, color=colour, linewidth=0.8, alpha=0.6, zorder=2)
     for point, x, y in zip(points, cost, usual, strict=True):
-        left = not point.way.error_estimate
-        shown = left and point.way.step_ms in NAMED_STEPS_MS[located]
+        left = not point.way.error_estimate and point.way.step_ms != FIRST_STEP_MS
+        shown = not point.way.error_estimate and point.way.step_ms in NAMED_STEPS_MS[located]
         text = point.accuracy or (f"{point.way.step_ms:g} ms" if shown else "")
         axes.annotate(
             text,

@@ -12,7 +12,7 @@ from boulder_sweep.comparison import simulated_signal
 from boulder_sweep.crash_tests import NAMES
 
 from . import figures
-from .figures import BLACK, BLUE, GREY, ORANGE, PictureError
+from .figures import BLACK, BLUE, GREY, ORANGE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,7 +59,7 @@ def write_validation(found: Validation, folder: Path) -> list[Path]:
         The folder cannot be made or written, or matplotlib is not installed.
     """
     figures.require_matplotlib()
-    make_folder(folder)
+    figures.make_folder(folder)
     written = [folder / "figure_10_rigid_wall.png"]
     draw_rigid_wall(found.wall, written[0])
     for test, (_, name) in FIGURES.items():
@@ -69,14 +69,6 @@ def write_validation(found: Validation, folder: Path) -> list[Path]:
     draw_convergence(found.convergence, folder / "convergence.png")
     written.append(folder / "convergence.png")
     return [*written, *_write_tables(found, folder)]
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder for pictures."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise PictureError(f"{folder} cannot be made: {problem.strerror or problem}") from problem
 
 
 def draw_crash_test(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
-from boulder_sweep.cli import cli
+from boulder_sweep.cli import cli, execute
+from boulder_sweep.settings import load
 from boulder_sweep.tradeoff import Tradeoff, measure
 from boulder_sweep.tradeoff_points import Point, Way, mark_front
 from tests.sweep.grids import grid
@@ -87,8 +89,37 @@ def test_command_prints_a_table_or_one_object() -> None:
     assert content["points"]
 
 
-def test_time_runs_out_gracefully() -> None:
+def test_time_runs_out_gracefully(tmp_path: Path) -> None:
     found = measure(grid(), designs=40, seconds=0.0)
     assert not found.points
     assert found.left_out
     assert found.recommendation() == ["Nothing was measured in so little time."]
+    assert found.write(tmp_path) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_one_design_that_does_not_move_is_drawn_too(tmp_path: Path) -> None:
+    still = load(GRID.with_name("rwg.yaml"), ["vehicle.speed=0 m/s"])
+    found = measure(still, seconds=1.0)
+    assert all(point.rotation_max_deg == 0.0 for point in found.points)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert found.write(tmp_path)[2].stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "words_of_error"),
+    [
+        (["-o", "{file}"], "error: the folder {file} cannot be made: File exists"),
+        (["--seconds", "nan"], "--seconds nan: give a number of seconds"),
+        (["--set", "site.embedment_depth=5 m"], "error: rwg: none of the designs can be computed"),
+    ],
+)
+def test_wrong_use_of_the_command(
+    words: list[str], words_of_error: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.write_text("here already", encoding="utf-8")
+    code = execute(["tradeoff", str(GRID.with_name("rwg.yaml")), "-q", *(word.format(file=file) for word in words)])
+    assert code == 2
+    assert words_of_error.format(file=file) in capsys.readouterr().err

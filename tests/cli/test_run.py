@@ -119,7 +119,9 @@ def test_a_dry_run_of_a_grid_of_ten_to_the_twelve(sweep, grid):
         (["grid.yaml", "--resume", "--overwrite"], "exclude each other"),
         (["grid.yaml", "-q", "-v"], "exclude each other"),
         (["grid.yaml", "--frobnicate"], "--frobnicate"),
-        (["grid.yaml", "--accuracy", "superb"], "superb"),
+        (["grid.yaml", "--accuracy", "superb"], "--accuracy: solver.accuracy: 'superb' is not fast, balanced, fine"),
+        (["grid.yaml", "--accuracy", "1e-12 deg"], "--accuracy: solver.accuracy: 1e-12 deg is outside"),
+        (["grid.yaml", "--accuracy", ""], "--accuracy: solver.accuracy: '' is not"),
         (["grid.yaml", "--set", "speed"], "KEY=VALUE"),
         (["grid.yaml", "extra"], "extra"),
         (["no.yaml"], "there is no such file"),
@@ -189,6 +191,14 @@ def test_an_internal_error_is_one_line_unless_verbose(sweep, grid, monkeypatch):
     code, _, err = sweep("run", grid, "--verbose")
     assert code == 1
     assert "Traceback" in err
+
+
+def test_one_design_is_not_called_designs(sweep, possible_grid):
+    one = ["--set", "boulder.height=3 m", "--set", "site.embedment_depth=1.5 m", "--set", "soil.subgrade_reaction=95"]
+    code, out, err = sweep("run", possible_grid, *one, "--accuracy", "0.1 deg")
+    assert code == 0
+    assert err.startswith("small grid: 1 design into small-grid.sweep\n")
+    assert "99.9 % of a pilot of 1 design\n" in out
 
 
 def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkeypatch):

@@ -61,6 +61,14 @@ def test_places_that_cannot_be_written(sweep, grid):
         assert code == 2
         assert "no/such" in err
         assert "internal" not in err
+        assert "Errno" not in err
+
+
+def test_a_time_history_is_not_written_under_the_name_of_another_format(sweep, grid):
+    code, _, err = sweep("simulate", grid, "-q", "--trajectory", "history.csv")
+    assert code == 2
+    assert err == "error: history.csv: a time history is a Parquet file; its name must end in .parquet\n"
+    assert not (grid.parent / "history.csv").exists()
 
 
 def test_status_of_a_finished_run(sweep, possible_grid):
