@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import csv
 from dataclasses import asdict, fields
+from functools import partial
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def kernel_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable, re
     for way, options in ways.items():
         for step_ms in STEPS_MS:
             how = control(1e-3 * step_ms, **options)
-            out, seconds = timed(lambda how=how: bk.simulate_table(table, readings, how), repeats)
+            out, seconds = timed(partial(bk.simulate_table, table, readings, how), repeats)
             point = point_of(preset, way, 1e-3 * step_ms, 1e6 * seconds / table.L.size, Peaks.of(out), Peaks.of(known))
             if how.error_estimate:
                 both = (out.status != LIMIT) & (known.status != LIMIT)
@@ -67,9 +68,8 @@ def literal_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable) -
     readings, points = PRESETS[preset], []
     literal_table(first(table, 1), readings, 1e-3, known.t_end, ROTATION_LIMIT)  # compiles
     for step_ms in LITERAL_STEPS_MS:
-        (theta, x_b, x_v), seconds = timed(
-            lambda h=1e-3 * step_ms: literal_table(table, readings, h, known.t_end, ROTATION_LIMIT), 1
-        )
+        work = partial(literal_table, table, readings, 1e-3 * step_ms, known.t_end, ROTATION_LIMIT)
+        (theta, x_b, x_v), seconds = timed(work, 1)
         # A design that the reference stopped at the limit comes to it there only but for the error of either.
         overturned = (known.status == LIMIT) & (theta > 0.99 * ROTATION_LIMIT) | (theta >= ROTATION_LIMIT)
         found = Peaks(theta, x_b, x_v, overturned)

@@ -14,6 +14,7 @@ import re
 import sys
 import types
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +147,7 @@ def measure(count: int = DESIGNS, repeats: int = 4) -> Table:
         simulated(*_first(ways[0], designs))
         cells, costs = [], []
         for way, how in ways:
-            out, seconds = timed(lambda way=way, how=how: simulated(way, designs, how), repeats)
+            out, seconds = timed(partial(simulated, way, designs, how), repeats)
             costs.append(1e6 * seconds / count)
             point = point_of("corrected", "lanes", 1e-3 * step_ms, costs[-1], Peaks.of(out), known)
             cells.append(f"{significant(point.theta_max_deg)}, {significant(point.theta_p99_deg)}")

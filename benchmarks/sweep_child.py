@@ -43,6 +43,7 @@ def main() -> None:
 
     clock = KernelClock(evaluation.simulate_table)
     vars(evaluation)["simulate_table"] = clock
+    code: str | int | None
     try:
         code = cli.main(sys.argv[3:])
     except SystemExit as end:

@@ -269,11 +269,9 @@ class _Rows:
             first, beyond = divmod(self.start, stride)
             largest = max(beyond, length, stride) + self.count
             # The number of a design may need 64 bits; how far it is from the first of the block hardly ever does.
-            place = np.arange(beyond, beyond + self.count, dtype=_whole_numbers(largest))
-            place //= stride
-            place += first % length
-            place -= place // length * length
-            self.digits[axis] = place
+            within: np.ndarray = np.arange(beyond, beyond + self.count, dtype=_whole_numbers(largest))
+            place = within // stride + first % length
+            self.digits[axis] = place - place // length * length  # several times as fast as a remainder
         return self.digits[axis]
 
     def column(self, quantity: Quantity) -> Column:

@@ -87,7 +87,7 @@ def _solve_one(times: Any, c: Constants, tolerance: Any) -> Any:
 def _prepare(problem: Problem) -> Callable[[float], np.ndarray]:
     """Compile for batches of one size."""
     rows = [problem.constants(row) for row in range(problem.size)]
-    columns = Constants(*(np.array(values, dtype=float) for values in zip(*rows, strict=True)))
+    columns = [np.array(values, dtype=float) for values in zip(*rows, strict=True)]
     times = np.array([problem.times(row) for row in range(problem.size)])
     solve = jax.jit(jax.vmap(_solve_one, in_axes=(0, 0, None)))
     parts = [slice(i, i + BATCH) for i in range(0, problem.size, BATCH)]

@@ -34,7 +34,7 @@ def _rates(t, y, rate, p):  # type of the arguments: numbalsoda.lsoda_sig
     rate[3], rate[4], rate[5] = k.alpha_b, y[5], k.a_v
 
 
-def _loop(solve: Callable[..., object]) -> Callable[..., np.ndarray]:
+def _loop(solve: Callable[..., tuple[np.ndarray, bool]]) -> Callable[..., np.ndarray]:
     """Compile the loop over designs around one of the solvers."""
 
     @numba.njit(nogil=True)

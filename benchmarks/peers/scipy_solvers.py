@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numba
@@ -65,7 +65,7 @@ def compiled_rates(t: float, y: np.ndarray, c: Constants) -> np.ndarray:
 
 
 def _solve(
-    rates: list[Callable[..., np.ndarray]],
+    rates: Sequence[Callable[..., np.ndarray]],
     problem: Problem,
     method: str,
     tolerance: float,
