@@ -12,6 +12,7 @@ from boulder_sweep.studies.coverage import coverage_table, coverages, grid_table
 from boulder_sweep.studies.extremes import admitted_table, refusal_table
 from boulder_sweep.studies.knife_edge import knife_edge_words
 from boulder_sweep.studies.readings import ReadingsStudy, readings_study
+from boulder_sweep.studies.settings_tables import choices_table, columns_table, entries_table
 from boulder_sweep.studies.statements import statement_table
 from boulder_sweep.studies.table import Table
 from boulder_sweep.studies.wording import (
@@ -126,6 +127,18 @@ def _refusals(_: Path) -> str:
     return refusal_table().markdown()
 
 
+def _settings_entries(_: Path) -> str:
+    return entries_table().markdown()
+
+
+def _settings_choices(_: Path) -> str:
+    return choices_table().markdown()
+
+
+def _result_columns(_: Path) -> str:
+    return columns_table().markdown()
+
+
 CONTENTS: dict[str, Callable[[Path], str]] = {
     "validation-table": _validation_table,
     "statements": _statements,
@@ -143,5 +156,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "knife-edge": _knife_edge,
     "admitted-box": _admitted_box,
     "refusals": _refusals,
+    "settings-entries": _settings_entries,
+    "settings-choices": _settings_choices,
+    "result-columns": _result_columns,
 }
 """Function of every block by its name."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from boulder_sweep import load
 from boulder_sweep.studies.__main__ import PULSE, main
 from boulder_sweep.studies.contents import CONTENTS, EVERY, GRID, compute, readings_of_grid
 from boulder_sweep.studies.documents import blocks, differences, pages
@@ -75,6 +76,21 @@ def test_every_page_is_in_the_index() -> None:
     for file in pages(ROOT):
         if file.name != "README.md":
             assert f"({file.name})" in page("README.md")
+
+
+def test_settings_shown_are_valid(tmp_path: Path) -> None:
+    grid, listed = re.findall(r"```yaml\n(.*?)```", page("settings.md"), re.DOTALL)
+    (tmp_path / "grid.yaml").write_text(grid, encoding="utf-8")
+    sweep = load(tmp_path / "grid.yaml")
+    assert (sweep.name, sweep.notes) == ("my-site", ())
+    assert [axis.name for axis in sweep.axes][-1] == "impact_speed_m_s"
+    (tmp_path / "designs.csv").write_text(
+        "boulder_length_m,boulder_width_m,boulder_height_m,boulder_density_kg_m3,embedment_depth_m\n1.65,1.68,3.4,2600,2\n",
+        encoding="utf-8",
+    )
+    vehicle = grid[grid.index("vehicle:") :].replace("[30, 40] mph", "30 mph")
+    (tmp_path / "list.yaml").write_text(listed + vehicle, encoding="utf-8")
+    assert load(tmp_path / "list.yaml").n_designs == 1
 
 
 def test_commands_of_the_pages_exist() -> None:

@@ -63,6 +63,9 @@ def test_the_example_file_is_valid(tmp_path: Path) -> None:
     assert example
     (tmp_path / "grid.yaml").write_text(example.group(1), encoding="utf-8")
     assert "valid" in sweep("check", "grid.yaml", cwd=tmp_path)
+    shown = boulder_sweep.load(tmp_path / "grid.yaml")
+    assert shown.notes == (), "what is shown as an example needs no remark"
+    assert shown.name != "m30-sizing", "its run would find the folder of the first one"
 
 
 def test_the_mistake_that_the_readme_shows(tmp_path: Path) -> None:
