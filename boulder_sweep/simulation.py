@@ -53,7 +53,7 @@ def simulate(
     horizon_s: float | None = None,
     sample_s: float = SAMPLE_S,
 ) -> Trajectory:
-    """Simulate one design with its time history, beyond the rotation limit and to the horizon.
+    """Simulate one design with its time history, beyond the rotation limit: to the horizon or half a turn.
 
     Parameters
     ----------
@@ -94,7 +94,9 @@ def simulate(
     A row of ``sweep run`` stops where the rotation reaches its limit, and as soon as it is proved that nothing
     reported can still grow. This simulation does neither, so for a boulder that overturns the maxima are those
     of the whole time and not those up to the limit. Verdict, reason and time to the limit follow the same
-    rules and agree. Beyond the limit the model no longer holds: what is shown there is how it goes wrong.
+    rules and agree. (Not where a design is so stiff, thousands of times what is met in practice, that it needs more
+    steps than are allowed beyond the limit and not before it: it is refused here.) Beyond the limit the model no
+    longer holds: what is shown there is how it goes wrong.
     """
     sweep = _as_sweep(design)
     sweep = _changed(sweep, readings, soil_elements, step_s, horizon_s)
