@@ -109,6 +109,8 @@ class Entries:
             other = next((field for field in fields.FIELDS if word in (field.key, *field.also)), None)
             if other is not None:
                 hint = f"; {other.key} belongs under {other.section}"
+            elif word[:1].isdigit():
+                hint = "; if it is the rest of a number, write a decimal point in place of the comma"
         where = f"under {section}" if section else "at the top level"
         name = shorten(entry.key) or "(empty)"
         path = f"{section}.{name}" if section else name

@@ -98,6 +98,7 @@ def test_on_the_command_line_without_anything_heavy(tmp_path):
         ("modle", "did you mean model?"),
         ("solver.acuracy", "did you mean accuracy?"),
         ("xyzzy", "known: name, boulder"),
+        ("boulder.65 m", "write a decimal point in place of the comma"),
     ],
 )
 def test_unknown_keys_are_told_with_what_was_meant(the_problem, key, hint):

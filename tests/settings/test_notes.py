@@ -27,6 +27,7 @@ def test_usual_values_have_no_remarks(load_with, load_it, minimal):
         ("soil.density=1000", "sand and gravel"),
         ("boulder.height={from: 1, to: 5, count: 3}", "1 to 5 m is outside"),
         ("boulder.density=1800", "rock"),
+        ("boulder.density=2.6", "a bare number is in kg/m^3, not in t/m^3 or pcf"),
         ("vehicle.bed_offset=1", "leading edge of the cargo bed; penetration is counted from that edge"),
         ("vehicle.hood_height=1.7", "medium-duty trucks"),
         ("criterion.max_rotation=45", "the model no longer holds"),
