@@ -15,6 +15,8 @@ from boulder_sweep.studies.table import Table, number
 ELEMENTS = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000)
 PAPERS_N = 5000
 """Number of elements above which the paper saw no change."""
+STEP_S = 5e-4
+"""Short enough that the elements show, not the steps, down to some 1e-8 deg."""
 SAMPLE_S = 0.01
 
 
@@ -89,7 +91,7 @@ def convergence(elements: Sequence[int] = ELEMENTS) -> Convergence:
         for preset in PRESETS:
             for n in (*elements, 0):
                 outcome = simulate(
-                    sweep, readings=preset, soil_elements=n, step_s=0.002, sample_s=SAMPLE_S
+                    sweep, readings=preset, soil_elements=n, step_s=STEP_S, sample_s=SAMPLE_S
                 ).motion.outcome
                 rotation[test, preset, n] = math.degrees(outcome.maxima.theta)
                 reached[test, preset, n] = outcome.t_limit
