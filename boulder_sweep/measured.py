@@ -209,7 +209,9 @@ def _values(
     values = {column.signal.name: np.full(len(rows), np.nan) for column in columns if column is not None}
     for row, (line, cells) in enumerate(rows):
         if len(cells) != len(header):
-            problems.add(Place(str(file), line, 1), "", f"has {len(cells)} cells; the first line has {len(header)}")
+            plural = "" if len(cells) == 1 else "s"
+            message = f"has {len(cells)} cell{plural}; the first line has {len(header)}"
+            problems.add(Place(str(file), line, 1), "", message)
             continue
         at = 1
         for cell, column in zip(cells, columns, strict=True):

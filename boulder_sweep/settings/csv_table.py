@@ -100,7 +100,7 @@ class _Reader:
 
     def take(self, row: list[str]) -> None:
         if len(row) != len(self.fields):
-            message = f"has {len(row)} cells; the first line has {len(self.fields)}"
+            message = f"has {len(row)} cell{'' if len(row) == 1 else 's'}; the first line has {len(self.fields)}"
             self.problems.add(Place(self.label, self.lines.number, 1), "", message)
             return
         self.count += 1

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from boulder_kernels import Control, Readings, Record, as_printed, constants_of, corrected, simulate_design
-from boulder_sweep.accuracy import accuracy_of
+from boulder_sweep.accuracy import Steps, accuracy_of
 from boulder_sweep.crash_tests import NAMES, crash_test
 from boulder_sweep.history import EnergyLedger, ledger_of
 from boulder_sweep.settings.model import ACCURACIES, Model, ReadingChoice, SolverSettings
@@ -93,15 +93,15 @@ def balance_table(found: list[Balance]) -> Table:
     return table
 
 
-def audit(preset: str, step_s: float, count: int = AUDIT_DESIGNS, seed: int = 0) -> np.ndarray:
+def audit(preset: str, steps: Steps, count: int = AUDIT_DESIGNS, seed: int = 0) -> np.ndarray:
     """Return the largest residual of the ledger of many random designs.
 
     Parameters
     ----------
     preset
         ``as_printed`` or ``corrected``.
-    step_s
-        Step of the integrator [s].
+    steps
+        Step of the integrator, and whether steps end where the soil yields.
     count, seed
         How many designs, and which.
 
@@ -111,7 +111,15 @@ def audit(preset: str, step_s: float, count: int = AUDIT_DESIGNS, seed: int = 0)
         Largest residual over 0.5 s as a share of the vehicle's energy at first touch.
     """
     readings = PRESETS[preset]
-    control = Control(step_s, AUDIT_HORIZON_S, math.radians(20.0), 0, False, False)
+    control = Control(
+        steps.step_s,
+        AUDIT_HORIZON_S,
+        math.radians(20.0),
+        elements=0,
+        error_estimate=False,
+        stop_at_limit=False,
+        locate_yield=steps.locate_yield,
+    )
     residuals = np.empty(count)
     for row, design in enumerate(random_designs(count, seed)):
         record = _blank_record()
@@ -127,18 +135,21 @@ def audit_table() -> Table:
     table = Table(("accuracy", "step [ms]", "readings", "median", "99 %", "largest"))
     for accuracy in ACCURACIES:
         for preset in PRESETS:
-            step = reported_step(accuracy, preset)
-            found = audit(preset, step)
+            steps = reported_steps(accuracy, preset)
+            found = audit(preset, steps)
             values = (np.median(found), np.quantile(found, 0.99), found.max())
-            table.add(accuracy, f"{1e3 * step:g}", preset.replace("_", " "), *(f"{value:.0e}" for value in values))
+            table.add(
+                accuracy, f"{1e3 * steps.step_s:g}", preset.replace("_", " "), *(f"{value:.0e}" for value in values)
+            )
     return table
 
 
-def reported_step(accuracy: str, preset: str) -> float:
-    """Step of the solution that a row reports [s], by the name of an accuracy and the preset of the readings."""
+def reported_steps(accuracy: str, preset: str) -> Steps:
+    """Return the steps of the solution that a row reports, by the names of an accuracy and of a preset."""
     model, solver = Model(ReadingChoice.of_preset(preset)), SolverSettings(accuracy=accuracy)
     sweep = dataclasses.replace(crash_test("rwg"), model=model, solver=solver)
-    return float(accuracy_of(sweep).to_dict()["reported_step_s"])
+    chosen = accuracy_of(sweep)
+    return Steps(float(chosen.to_dict()["reported_step_s"]), chosen.steps.locate_yield)
 
 
 def _balance(test: str, when: str, time_s: float, ledger: EnergyLedger) -> Balance:

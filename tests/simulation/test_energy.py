@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from boulder_sweep.accuracy import Steps
 from boulder_sweep.crash_tests import NAMES
 from boulder_sweep.settings.model import PRESETS
 from boulder_sweep.studies.energy import PARTS, audit, balances
@@ -64,7 +65,7 @@ def test_only_the_printed_separation_makes_energy(trajectories: Trajectories) ->
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_ledger_closes_over_a_thousand_random_designs(preset: str) -> None:
-    found = audit(preset, 0.001, count=1000, seed=5)
+    found = audit(preset, Steps(0.001), count=1000, seed=5)
     assert found.shape == (1000,)
     assert np.isfinite(found).all()
     assert found.max() < 2e-6
@@ -72,7 +73,7 @@ def test_ledger_closes_over_a_thousand_random_designs(preset: str) -> None:
 
 
 def test_residual_shrinks_with_the_fifth_power_of_the_step() -> None:
-    coarse, fine = (np.median(audit("corrected", step, count=100)) for step in (0.004, 0.002))
+    coarse, fine = (np.median(audit("corrected", Steps(step, locate_yield=True), count=100)) for step in (0.004, 0.002))
     assert 3.5 < np.log2(coarse / fine) < 6.5
 
 
