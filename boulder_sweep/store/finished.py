@@ -144,10 +144,12 @@ class FinishedRows:
                 if wrong:
                     raise DamagedError(_damage_text(self._folder, {name: wrong}))
                 source = pa.BufferReader(content)
-            # Parts are read side by side already.
-            return pq.read_table(source, columns=columns, use_threads=False, page_checksum_verification=True)
+            # Parts are read side by side already; and a table by way of a data set would take twice as long.
+            with pq.ParquetFile(source, page_checksum_verification=True) as opened:
+                table = opened.read(columns, use_threads=False)
         except (OSError, pa.ArrowException) as problem:
             raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
+        return table if columns is None else table.select(columns)  # in the order asked for
 
 
 class _Places:
