@@ -218,7 +218,7 @@ class Trajectory:
         Raises
         ------
         HistoryFileError
-            The name does not end in ``.parquet``, or its folder does not exist.
+            The name does not end in ``.parquet``, its folder does not exist, or it cannot be written.
         """
         from .trajectory_file import write  # pyarrow is heavy, and only files need it
 

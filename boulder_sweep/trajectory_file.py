@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,11 +60,16 @@ def write(trajectory: Trajectory, path: str | Path, *, energy: bool = False) -> 
     Raises
     ------
     HistoryFileError
-        The name has another ending, or its folder does not exist.
+        The name has another ending, its folder does not exist, or it cannot be written.
     """
     target = Path(path)
     if target.suffix.lower() != ".parquet":
         raise HistoryFileError(f"{path}: a time history is a Parquet file; its name must end in .parquet")
     if not target.absolute().parent.is_dir():
         raise HistoryFileError(f"{path}: the folder {target.absolute().parent} does not exist")
-    pq.write_table(arrow_table(trajectory, energy=energy), path, compression="zstd", write_page_checksum=True)
+    table = arrow_table(trajectory, energy=energy)
+    try:
+        pq.write_table(table, target, compression="zstd", write_page_checksum=True)
+    except OSError as problem:
+        why = os.strerror(problem.errno) if problem.errno else str(problem)
+        raise HistoryFileError(f"{path} cannot be written: {why}") from problem

@@ -64,6 +64,12 @@ def test_places_that_cannot_be_written(sweep, grid):
         assert "Errno" not in err
 
 
+def test_a_folder_in_the_place_of_a_time_history(sweep, grid):
+    (grid.parent / "history.parquet").mkdir()
+    code, _, err = sweep("simulate", grid, "-q", "--trajectory", "history.parquet")
+    assert (code, err) == (2, "error: history.parquet cannot be written: Is a directory\n")
+
+
 def test_a_time_history_is_not_written_under_the_name_of_another_format(sweep, grid):
     code, _, err = sweep("simulate", grid, "-q", "--trajectory", "history.csv")
     assert code == 2

@@ -1,6 +1,8 @@
 """Explicit lists of designs from CSV and Parquet files."""
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from boulder_sweep.settings import SettingsError, load
@@ -193,7 +195,6 @@ def test_a_relative_name_begins_at_the_file_and_behind_set_at_the_working_direct
 @pytest.fixture
 def write_parquet(tmp_path):
     def write_parquet(**columns):
-        pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
         pq.write_table(pa.table(columns), tmp_path / "designs.parquet")
 
     return write_parquet

@@ -146,37 +146,6 @@ def test_verdict_is_that_of_a_row_of_a_sweep() -> None:
                 assert found[name] == pytest.approx(getattr(row, name)[0], rel=1e-3), name
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize("change", ["vehicle.spring=1e8 N/m", "soil.subgrade_reaction=60000 MN/m^3"])
-def test_error_is_estimated_also_where_the_step_is_shortened(preset: str, change: str) -> None:
-    """Both solutions are shortened for a stiff design, and the finer still has half the step of the coarser."""
-    sweep = boulder_sweep.load(
-        CONFIGS / "rwg.yaml", [change, "solver.accuracy=balanced", f"model.readings={preset}", "solver.horizon=1 s"]
-    )
-    row = evaluation_of(sweep)(sweep.block(0, 1))
-    found = simulate(sweep).summary()
-    assert found["verdict"] == VERDICTS[row.verdict[0]]
-    assert found["rotation_error_deg"] > 0.0
-    # A row stops at the limit and may take longer steps; each is known to within its own error.
-    apart = abs(found["max_rotation_deg"] - row.max_rotation_deg[0])
-    assert apart <= found["rotation_error_deg"] + row.rotation_error_deg[0]
-
-
-def test_error_is_infinite_where_only_one_solution_reaches_the_limit() -> None:
-    """A limit between the peaks of the two solutions: neither says by how much it is wrong."""
-    sweep = boulder_sweep.load(CONFIGS / "rwg.yaml", ["solver.accuracy=balanced"])
-    coarse, fine = (simulate(sweep, step_s=step).summary()["max_rotation_deg"] for step in (0.008, 0.004))
-    limit = 0.75 * coarse + 0.25 * fine
-    between = boulder_sweep.load(
-        CONFIGS / "rwg.yaml", ["solver.accuracy=balanced", f"criterion.max_rotation={limit!r} deg"]
-    )
-    row = evaluation_of(between)(between.block(0, 1))
-    found = simulate(between)
-    assert found.verdict == VERDICTS[row.verdict[0]]
-    assert np.isinf(row.displacement_error_m[0])
-    assert np.isinf(found.judged.displacement_error_m[0])
-
-
 def test_a_design_may_be_a_file_a_mapping_or_a_row_of_a_table(tmp_path: Path) -> None:
     sweep = boulder_sweep.load(CONFIGS / "crash_tests.yaml")
     from_sweep = simulate(sweep, 1).summary()
