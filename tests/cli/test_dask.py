@@ -1,0 +1,63 @@
+"""``sweep run --backend dask`` from the command line, with a cluster of its own and with one that is there."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+from distributed import LocalCluster
+
+from boulder_sweep.store import status
+from boulder_sweep.store.reader import read_table
+from tests.sweep.grids import same_bits
+
+
+@pytest.fixture(scope="module")
+def scheduler():
+    """Address of the scheduler of a cluster of one worker in another process."""
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=True, dashboard_address=None) as cluster:
+        yield cluster.scheduler_address
+
+
+def assert_is_the_table_of_threads(sweep, grid, options):
+    assert sweep("run", grid, "-q", "-o", "threads")[0] == 0
+    code, out, err = sweep("run", grid, "-q", "-o", "dask", "--backend", "dask", *options)
+    assert (code, err) == (0, "")
+    assert "18 designs" in out
+    assert "dask" in out
+    assert same_bits(read_table(grid.parent / "dask"), read_table(grid.parent / "threads"))
+    assert status("dask").sessions[-1].backend == "dask"
+
+
+def test_a_run_with_a_cluster_of_its_own(sweep, possible_grid):
+    assert_is_the_table_of_threads(sweep, possible_grid, ["--jobs", "2"])
+
+
+def test_a_run_on_a_cluster_that_is_there(sweep, possible_grid, scheduler):
+    assert_is_the_table_of_threads(sweep, possible_grid, ["--scheduler", scheduler])
+
+
+def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, scheduler, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    words = ["-q", "-o", "out", "--backend", "dask", "--scheduler", scheduler]
+    with monkeypatch.context() as patch:
+        patch.setattr("boulder_sweep.store.writer.put_file", full)
+        code, out, err = sweep("run", possible_grid, *words)
+    assert (code, out) == (1, "")
+    command = f"sweep run grid.yaml -o out --backend dask --scheduler {scheduler} --resume"
+    assert command in err
+    code, out, _ = sweep(*shlex.split(command)[1:], "-q")
+    assert code == 0
+    assert status("out").complete
+
+
+def test_a_scheduler_that_does_not_answer_is_wrong_use(sweep, possible_grid, monkeypatch):
+    monkeypatch.setattr("boulder_sweep.backends._CONNECT_S", "1s")
+    code, out, err = sweep(
+        "run", possible_grid, "-q", "-o", "out", "--backend", "dask", "--scheduler", "tcp://127.0.0.1:9"
+    )
+    assert (code, out) == (2, "")
+    assert err.startswith("error: no Dask scheduler answers at tcp://127.0.0.1:9")
+    assert not (possible_grid.parent / "out").exists()
