@@ -107,6 +107,11 @@ class Tradeoff:
         for target in dict.fromkeys(targets):
             by_words.setdefault(self._advice(target), []).append(f"{target:g}")
         found = [f"For {' or '.join(values)} deg {advice}." for advice, values in by_words.items()]
+        best = (self.best(target, error_estimate=True) for target in targets)
+        if any(point is not None and not point.accuracy for point in best):
+            found.append(
+                "An accuracy given as a number bounds the estimated errors, which are larger than the true ones."
+            )
         sums = [p for p in self._own() if p.way.soil_elements == max(ELEMENTS)]
         closed = {p.way.step_ms: p.cpu_us for p in self._own() if p.way.is_plain}
         if sums:
@@ -125,7 +130,7 @@ class Tradeoff:
         """Say what to use for an accuracy [deg]."""
         guarded, plain = (self.best(wanted_deg, error_estimate=estimate) for estimate in (True, False))
         if guarded is None:
-            return "none of these steps is short enough"
+            return "none of the steps measured is short enough"
         ask = guarded.accuracy or f"{_rounded_up(guarded.estimated_p99_9_deg):g} deg"
         text = (
             f"use solver: {{accuracy: {ask}}} (steps of {guarded.way.steps}): {guarded.cpu_us:.3g} us a design, "

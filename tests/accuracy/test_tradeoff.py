@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from boulder_sweep.cli import cli, execute
 from boulder_sweep.settings import load
-from boulder_sweep.tradeoff import Tradeoff, measure
+from boulder_sweep.tradeoff import TARGETS_DEG, Tradeoff, measure
 from boulder_sweep.tradeoff_points import Point, Way, mark_front
 from tests.sweep.grids import grid
 
@@ -60,6 +60,8 @@ def test_the_best_way_keeps_to_what_is_wanted(found: Tradeoff) -> None:
     text = " ".join(found.recommendation())
     assert "0.01 deg" in text
     assert "us a design" in text
+    named = all((best := found.best(wanted, error_estimate=True)) and best.accuracy for wanted in TARGETS_DEG)
+    assert named != ("bounds the estimated errors" in text)
 
 
 def test_front_holds_what_nothing_beats() -> None:
