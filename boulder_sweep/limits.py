@@ -25,7 +25,11 @@ BLOCK_S = 0.1
 MOST_ROWS = 2**63 - 1
 """Rows that a design_id of 64 bits can number."""
 _SAMPLE_S = 0.1
-_SAMPLE_SIZES = (1, 4, 16, 64, 256, 256, 256, 256, 256, 256)
+_FIRST_SIZES = (1, 8, 64, 64, 64, 64)
+"""Rows, here and there in the table, that say about how long one takes."""
+_PIECES, _LARGEST_PIECE = 24, 1024
+"""Pieces of equal size all over the table that are computed then; many rows of each, for a short one takes more time
+and more bytes a row than a table has on the whole."""
 _BYTES_UNDER_WAY = 400
 """Memory of a row between being handed out and being written, inputs, outcomes and encoding together."""
 _WORKER_PROCESS_BYTES = 250_000_000
@@ -125,24 +129,43 @@ def take_sample(
     from .store.schema import encode, part_table, table_schema
 
     beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
-    sampled, spent, written = 0, 0.0, 0
-    for place, wanted in enumerate(_SAMPLE_SIZES):
-        size = min(wanted, rows)
-        start = int(place * _GOLDEN % 1.0 * (rows - size))
+
+    def computed(place: float, size: int) -> tuple[float, pa.Table | None]:
+        """Compute some rows at a place between 0 and 1 of the table; what they took, and what would be written."""
+        start = int(place * (rows - size))
         begun = time.perf_counter()
         try:
             block = make_block(start, start + size)
             judged = evaluation(block)
         except Exception:  # the run itself will meet it, try again and name the rows
-            continue
-        spent += time.perf_counter() - begun
-        written += len(encode(part_table(block, judged, metadata))) - beside_rows
-        sampled += size
-        if spent > _SAMPLE_S or sampled >= rows:
+            return 0.0, None
+        return time.perf_counter() - begun, part_table(block, judged, metadata)
+
+    tried = 0.0
+    per_row: dict[int, float] = {}
+    for number, wanted in enumerate(_FIRST_SIZES):
+        size = min(wanted, rows)
+        seconds, _ = computed(number * _GOLDEN % 1.0, size)
+        tried += seconds
+        # Where single rows take long, few are enough; else the largest say it best, for a block takes time itself.
+        per_row[size] = max(seconds / size, per_row.get(size, 0.0))
+        if tried > _SAMPLE_S:
             break
-    if not sampled:
+    by_time = int(_SAMPLE_S / _PIECES / max(per_row[max(per_row)], 1e-9))
+    size = max(1, min(by_time, _LARGEST_PIECE, rows))
+    spent, tables = 0.0, []
+    for number in range(_PIECES):
+        seconds, table = computed((0.5 + number * _GOLDEN) % 1.0, size)
+        if table is not None:
+            spent += seconds
+            tables.append(table)
+        if spent > 2 * _SAMPLE_S or len(tables) * size >= rows:
+            break
+    if not tables:
         return _GUESS
-    return Sample(spent / sampled, max(written, 0) / sampled, beside_rows)
+    together = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
+    written = max(len(encode(together)) - beside_rows, 0)
+    return Sample(spent / len(together), written / len(together), beside_rows)
 
 
 def estimated(

@@ -7,10 +7,12 @@ import sys
 import tracemalloc
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from boulder_sweep import limits
 from boulder_sweep.admission import Admission
 from boulder_sweep.evaluation import evaluation_of
 from boulder_sweep.limits import (
@@ -26,6 +28,7 @@ from boulder_sweep.limits import (
     take_sample,
 )
 from boulder_sweep.store.errors import DoesNotFitError
+from boulder_sweep.store.schema import encode, part_table
 from boulder_sweep.sweeper import estimate, run
 from tests.sweep.grids import grid, grid_of, plausible
 
@@ -103,6 +106,60 @@ def test_a_sample_survives_rows_that_raise():
 
     sample = take_sample(evaluation_of(sweep, broken), sweep.block, sweep.n_designs, {})
     assert sample.seconds_per_row > 0
+
+
+class Clock:
+    """A clock that stands still but for the work that is done."""
+
+    def __init__(self, free_up_to: float, seconds_per_row: float, seconds_per_block: float):
+        self.now = 0.0
+        self._free_up_to, self._per_row, self._per_block = free_up_to, seconds_per_row, seconds_per_block
+
+    def perf_counter(self) -> float:
+        return self.now
+
+    def simulate(self, table, readings, control):
+        """Let soils up to some stiffness cost nothing, as designs that are not touched do."""
+        self.now += self._per_block + self._per_row * int(np.count_nonzero(table.beta > self._free_up_to))
+        return plausible(table, readings, control)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("slow_axis", [False, True])
+def test_a_sample_sees_how_many_designs_cost_nothing(monkeypatch, share, slow_axis):
+    """Whether those are the first of the table or spread all over it."""
+    stiffness = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 200}"
+    width = "{from: 1 m, to: 2 m, count: 1000}"
+    finely = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 100000}"
+    sweep = grid_of(1, subgrade=finely) if slow_axis else grid_of(1, subgrade=stiffness, width=width)
+    clock = Clock(200 * share, seconds_per_row=8e-6, seconds_per_block=2e-4)
+    monkeypatch.setattr(limits, "time", clock)
+    sample = take_sample(evaluation_of(sweep, clock.simulate), sweep.block, sweep.n_designs, {})
+    truth = 8e-6 * (1.0 - share)
+    assert truth / 1.3 < sample.seconds_per_row < 1.3 * truth + 5e-7
+    assert clock.now < 0.35
+
+
+def test_a_sample_of_slow_designs_behind_quick_ones_stays_short(monkeypatch):
+    sweep = grid_of(1, subgrade="{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 100000}")
+    for seconds in (1e-3, 0.05):
+        clock = Clock(40.0, seconds_per_row=seconds, seconds_per_block=2e-4)
+        monkeypatch.setattr(limits, "time", clock)
+        sample = take_sample(evaluation_of(sweep, clock.simulate), sweep.block, sweep.n_designs, {})
+        assert 0.8 * seconds / 2 < sample.seconds_per_row < 2 * 0.8 * seconds
+        assert clock.now < 0.5 + 64 * seconds
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
+    sweep = grid(
+        **({"width": "{from: 1 m, to: 2 m, count: 50}"} if wide else {"height": "{from: 2 m, to: 3 m, count: 80}"})
+    )
+    evaluation = evaluation_of(sweep, plausible)
+    sample = take_sample(evaluation, sweep.block, sweep.n_designs, {})
+    block = sweep.block(0, sweep.n_designs)
+    written = len(encode(part_table(block, evaluation(block), {})))
+    assert 0.5 < (sample.bytes_per_row * sweep.n_designs + sample.bytes_per_part) / written < 2.0
 
 
 def test_an_estimate_is_in_proportion():
