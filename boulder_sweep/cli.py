@@ -184,6 +184,9 @@ def simulate(
     from boulder_sweep.simulation import simulate as simulate_design
 
     result = simulate_design(sweep, number)
+    # First of all: a picture may be impossible where nothing moved, a film takes its time.
+    values = result.summary()
+    click.echo(json.dumps(values) if as_json else "\n".join(console.value_lines(values)))
     if plot is not None:
         result.plot(plot)
     if trajectory is not None:
@@ -192,8 +195,6 @@ def simulate(
         result.plot_energy(energy)
     if animate is not None:
         result.animate(animate)
-    values = result.summary()
-    click.echo(json.dumps(values) if as_json else "\n".join(console.value_lines(values)))
     return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0
 
 

@@ -55,6 +55,15 @@ def test_a_design_that_cannot_be_computed(sweep, grid):
     assert err == "design 4 cannot be computed: embedment depth is not less than the boulder's height\n"
 
 
+def test_numbers_are_shown_also_where_there_is_no_motion_to_draw(sweep, grid):
+    code, out, err = sweep(
+        "simulate", grid, "-q", "--design", "0", "--set", "vehicle.bumper_height=1.3 m", "--plot", "x.png"
+    )
+    assert code == 2
+    assert "no_contact" in out
+    assert err == "error: there is no motion to draw: the truck passes over the boulder\n"
+
+
 def test_places_that_cannot_be_written(sweep, grid):
     for option, name in (("--plot", "no/such/folder.png"), ("--trajectory", "no/such/folder.parquet")):
         code, _, err = sweep("simulate", grid, "-q", option, name)
