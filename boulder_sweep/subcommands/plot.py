@@ -35,20 +35,23 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None)
     table, or embedment_ratio.
     """
     held = dict(_held(text) for text in at)
-    from boulder_sweep.store import read
-    from boulder_sweep.store.manifest import load as load_manifest
-    from boulder_sweep.views.figures import checked_kind, require_matplotlib
-    from boulder_sweep.views.verdict_map import draw_verdict_map, needed_columns, require_rows
+    from boulder_sweep.store.finished import FinishedRows
+    from boulder_sweep.views.figures import PictureError, checked_kind, require_matplotlib
+    from boulder_sweep.views.pieces import finished_pieces
+    from boulder_sweep.views.verdict_map import draw_verdict_map
 
     require_matplotlib()
-    name = str(load_manifest(Path(out)).identity["settings"].get("name", ""))
-    target = checked_kind(picture or f"{str(out).rstrip('/').removesuffix('.sweep')}.png")
-    table = read(out, needed_columns())
-    require_rows(table, out)
-    shown = draw_verdict_map(table, target, title=name, at=held, **axes)
-    if not table.attrs["complete"]:
-        click.echo(f"note: the run is not finished; {len(table):,} designs are drawn", err=True)
-    click.echo(f"{target}: {len(shown.rows):,} of {len(table):,} designs")
+    folder = Path(out)
+    finished = FinishedRows(folder)
+    beside = folder if folder.name else folder.resolve()
+    target = checked_kind(picture or f"{str(beside).removesuffix('.sweep')}.png")
+    if finished.rows_done == 0:
+        raise PictureError(f"{out} holds no finished designs yet; `sweep status {out}` says how far it is")
+    title = str(finished.identity["settings"].get("name", ""))
+    shown = draw_verdict_map(finished_pieces(finished), target, title=title, at=held, **axes)
+    if finished.rows_done < finished.rows:
+        click.echo(f"note: the run is not finished; {shown.total:,} designs are drawn", err=True)
+    click.echo(f"{target}: {shown.count:,} of {shown.total:,} designs")
     return 0
 
 

@@ -11,12 +11,11 @@ import numpy as np
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS
 
 from .figures import PictureError
+from .pieces import DEPTH, HEIGHT, RATIO, Kept, Pieces, pieces_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RATIO = "embedment_ratio"
-DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
 ACROSS = (RATIO, DEPTH, "boulder_width_m", "boulder_length_m", "impact_speed_m_s")
 UP = (HEIGHT, "boulder_width_m", "boulder_length_m", "vehicle_mass_kg")
 OVER = ("friction_angle_deg", "subgrade_reaction_MN_m3", "impact_speed_m_s", "boulder_width_m")
@@ -34,7 +33,8 @@ class Slice:
     Attributes
     ----------
     rows : DataFrame
-        The rows shown, with ``embedment_ratio`` beside the columns of the table.
+        The rows shown, with ``embedment_ratio`` beside the columns of the table; where they are thinned, those of them
+        that can be told apart in a picture.
     across, up : str
         Inputs on the axes of each picture.
     columns, rows_over : str or None
@@ -43,6 +43,10 @@ class Slice:
         Their values shown; [nan] where there is none.
     fixed : dict of str to float
         What is held fixed, and at what.
+    total, count, passing : int
+        How many rows the table has, how many of them lie in the plane, and how many of these pass.
+    thinned : bool
+        Whether there were too many rows to keep them all.
     left_out : dict of str to int
         Of which multiples only some are shown: how many values there are.
     """
@@ -55,11 +59,15 @@ class Slice:
     column_values: list[float]
     row_values: list[float]
     fixed: dict[str, float]
+    total: int
+    count: int
+    passing: int
+    thinned: bool
     left_out: dict[str, int] = field(default_factory=dict)
 
 
 def plane(
-    table: pd.DataFrame,
+    table: pd.DataFrame | Pieces,
     *,
     across: str | None = None,
     up: str | None = None,
@@ -73,7 +81,9 @@ def plane(
     Parameters
     ----------
     table
-        A result table, or its input columns and whatever is to be shown.
+        A result table, or its input columns and whatever is to be shown; or a function that yields the columns asked
+        for piece by piece, as often as it is called. Then memory does not grow with the rows, only with the picture and
+        with how many different values the inputs have.
     across, up
         Inputs on the axes; by default embedment and height where they vary.
     columns, rows
@@ -89,9 +99,8 @@ def plane(
     PictureError
         An input is unknown, or fewer than two vary.
     """
-    inputs = [name for name in INPUT_COLUMNS if name in table.columns]
-    frame = table.assign(**{RATIO: table[DEPTH] / table[HEIGHT]})
-    levels = {name: _levels(frame[name].to_numpy(dtype=float)) for name in (*inputs, RATIO)}
+    pieces = pieces_of(table)
+    levels, total = _levels_of(pieces)
     varying = [name for name, values in levels.items() if len(values) > 1 and name not in DEPENDENT]
     chosen = {"across": across, "up": up, "columns": columns, "rows": rows}
     for name in (*(name for name in chosen.values() if name), *(at or {})):
@@ -118,23 +127,26 @@ def plane(
             middle = values[(len(values) - 1) // 2]
             wanted_value = (at or {}).get(name, middle)
             fixed[name] = float(values[np.argmin(np.abs(values - wanted_value))])
-    keep = np.ones(len(frame), dtype=bool)
-    for name, value in fixed.items():
-        keep &= _equal(frame[name].to_numpy(dtype=float), value)
     shown_columns, shown_rows = (
         _some(levels, chosen[place], n) for place, n in (("columns", most[0]), ("rows", most[1]))
     )
-    for over, shown in ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows)):
-        if over is not None:
-            values = frame[over].to_numpy(dtype=float)
-            keep &= np.logical_or.reduce([_equal(values, value) for value in shown])
+    held = [(name, [value]) for name, value in fixed.items()]
+    multiples = ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows))
+    held += [(name, values) for name, values in multiples if name is not None]
+    kept = Kept(str(chosen["across"]), str(chosen["up"]), [chosen["columns"], chosen["rows"]], levels)
+    for piece in pieces([*{*kept.columns, *fixed}]):
+        keep = np.ones(len(piece), dtype=bool)
+        for name, admitted in held:
+            found = piece[name].to_numpy(dtype=float)
+            keep &= np.logical_or.reduce([_equal(found, value) for value in admitted])
+        kept.add(piece[keep])
     left_out = {
         str(chosen[place]): len(levels[str(chosen[place])])
         for place, shown in (("columns", shown_columns), ("rows", shown_rows))
         if chosen[place] and len(shown) < len(levels[str(chosen[place])])
     }
     return Slice(
-        rows=frame[keep],
+        rows=kept.rows(),
         across=str(chosen["across"]),
         up=str(chosen["up"]),
         columns=chosen["columns"],
@@ -142,6 +154,10 @@ def plane(
         column_values=shown_columns,
         row_values=shown_rows,
         fixed=fixed,
+        total=total,
+        count=kept.count,
+        passing=kept.passing,
+        thinned=kept.thinned,
         left_out=left_out,
     )
 
@@ -190,6 +206,19 @@ def unit_of(name: str) -> str:
     """Unit of an input as printed in a picture; empty for plain numbers."""
     unit = BY_NAME[name].unit if name in BY_NAME else ""
     return {"1": "", "MN/m^3": "MN/m³", "kg/m^3": "kg/m³", "N*s/m": "N·s/m"}.get(unit, unit)
+
+
+def _levels_of(pieces: Pieces) -> tuple[dict[str, np.ndarray], int]:
+    """Different values of every input, and how many rows there are."""
+    found: dict[str, np.ndarray] = {}
+    total = 0
+    for piece in pieces([*INPUT_COLUMNS, RATIO]):
+        total += len(piece)
+        for name in (*INPUT_COLUMNS, RATIO):
+            if name in piece:
+                values = piece[name].astype(float).unique()
+                found[name] = np.unique(np.concatenate([found.get(name, values), values]))
+    return {name: _levels(values) for name, values in found.items()}, total
 
 
 def _levels(values: np.ndarray) -> np.ndarray:

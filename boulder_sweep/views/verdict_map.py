@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.columns import INPUT_COLUMNS
-
 from . import figures
-from .figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE, PictureError
+from .figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE
+from .pieces import Pieces
 from .slices import Slice, label, plane, select, value_text
 
 if TYPE_CHECKING:
@@ -32,7 +31,7 @@ MOST_CELLS = 400
 
 
 def draw_verdict_map(
-    table: pd.DataFrame,
+    table: pd.DataFrame | Pieces,
     path: str | Path,
     *,
     title: str = "",
@@ -47,7 +46,8 @@ def draw_verdict_map(
     Parameters
     ----------
     table
-        A result table, as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used.
+        A result table, as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used. Or what
+        yields it piece by piece, see `boulder_sweep.views.pieces`.
     path
         Picture to write (.png, .svg, .pdf).
     title
@@ -83,7 +83,6 @@ def draw_verdict_map(
         for axes in grid[:, 0]:
             axes.set_ylabel(label(shown.up))
         _legend(fig, present)
-        share = float((shown.rows["verdict"].astype(str) == "pass").mean()) if len(shown.rows) else 0.0
         fig.suptitle(
             f"{title}: which designs stop the truck" if title else "Which designs stop the truck",
             x=0.01,
@@ -91,7 +90,7 @@ def draw_verdict_map(
             fontsize=11.5,
             fontweight="bold",
         )
-        fig.supxlabel(_caption(shown, share, len(table)), x=0.01, ha="left", fontsize=8.0, color=GREY)
+        fig.supxlabel(_caption(shown), x=0.01, ha="left", fontsize=8.0, color=GREY)
     return shown
 
 
@@ -120,7 +119,12 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice) -> set[int]:
     cells = np.full((len(y_levels), len(x_levels)), -1, dtype=np.int16)
     cells[y_place, x_place] = codes
     filled = len(np.unique(y_place.astype(np.int64) * max(len(x_levels), 1) + x_place))
-    gridded = filled == len(rows) and 2 * filled >= cells.size and max(cells.shape, default=0) <= MOST_CELLS
+    gridded = (
+        not shown.thinned
+        and filled == len(rows)
+        and 2 * filled >= cells.size
+        and max(cells.shape, default=0) <= MOST_CELLS
+    )
     if gridded and min(cells.shape) > 1:
         masked = np.ma.masked_less(cells, 0)
         style: dict[str, Any] = {"cmap": colours, "norm": norm, "linewidth": 0.35, "edgecolors": "white"}
@@ -148,21 +152,10 @@ def _legend(fig: Any, present: set[int]) -> None:
     fig.legend(handles=handles, loc="outside upper right", ncols=len(handles), handlelength=1.2, columnspacing=1.2)
 
 
-def _caption(shown: Slice, share: float, total: int) -> str:
+def _caption(shown: Slice) -> str:
     fixed = ", ".join(value_text(name, value) for name, value in shown.fixed.items())
-    words = [f"{len(shown.rows):,} of {total:,} designs" + (f", at {fixed}" if fixed else "")]
-    words.append(f"{share:.1%} of them pass")
+    words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
+    words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
     for name, count in shown.left_out.items():
         words.append(f"{label(name).partition(' [')[0]}: a choice of its {count} values")
     return " · ".join(words)
-
-
-def needed_columns() -> list[str]:
-    """Columns of a result table that a map is made of."""
-    return [*INPUT_COLUMNS, "verdict", "reason"]
-
-
-def require_rows(table: pd.DataFrame, where: str | Path) -> None:
-    """Refuse a table without rows."""
-    if len(table) == 0:
-        raise PictureError(f"{where} holds no finished designs yet; `sweep status {where}` says how far it is")

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.axes import Axes
 
 import boulder_sweep
 from boulder_sweep.cli import execute
+from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.views.figures import PictureError
-from boulder_sweep.views.slices import label, plane, value_text
+from boulder_sweep.views.pieces import Kept, Pieces, pieces_of
+from boulder_sweep.views.slices import Slice, label, plane, value_text
 from boulder_sweep.views.verdict_map import CLASSES, classes_of, draw_verdict_map
 
 GRID = """\
@@ -78,6 +83,93 @@ def test_map_is_drawn_as_cells_or_as_points(table: pd.DataFrame, tmp_path: Path)
     draw_verdict_map(scattered, tmp_path / "points.png")
     for name in ("cells.png", "points.png"):
         assert (tmp_path / name).stat().st_size > 10_000
+
+
+def drawn(table, monkeypatch: pytest.MonkeyPatch, path: Path, **options: Any) -> tuple[Slice, list[Any]]:
+    """Draw a map; what it is of, and the numbers that are drawn in each of its panels."""
+    numbers: list[Any] = []
+
+    def noted(axes, *arguments, **style):
+        numbers.append([np.ma.filled(np.ma.asarray(each, dtype=float), -99) for each in arguments])
+        numbers.append(np.asarray(style.get("c", ())))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Axes, "pcolormesh", noted)
+        patch.setattr(Axes, "scatter", noted)
+        return draw_verdict_map(table, path, **options), numbers
+
+
+def in_pieces(table: pd.DataFrame, size: int) -> Pieces:
+    whole = pieces_of(table)
+
+    def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
+        (frame,) = whole(columns)
+        for first in range(0, len(frame), size):
+            yield frame[list(columns)][first : first + size]
+
+    return pieces
+
+
+@pytest.mark.parametrize("size", [1, 7, 100, 10_000])
+@pytest.mark.parametrize("cells", [True, False])
+def test_a_table_in_pieces_gives_the_same_picture(table, tmp_path, monkeypatch, size, cells):
+    if not cells:
+        table = table.sample(150, random_state=1).assign(boulder_height_m=lambda t: t.boulder_height_m + t.index * 1e-4)
+    whole, expected = drawn(table, monkeypatch, tmp_path / "whole.png")
+    parts, found = drawn(in_pieces(table, size), monkeypatch, tmp_path / "parts.png")
+    np.testing.assert_equal(found, expected)
+    assert expected
+    for name in ("across", "up", "columns", "rows_over", "column_values", "row_values", "fixed", "total", "count",
+                 "passing", "thinned", "left_out"):  # fmt: skip
+        assert getattr(parts, name) == getattr(whole, name), name
+    assert (parts.count, parts.thinned) == (len(whole.rows), False)
+    assert parts.total == len(table)
+    assert parts.passing == (whole.rows.verdict == "pass").sum()
+
+
+def test_of_too_many_rows_those_are_kept_that_a_picture_can_tell_apart(monkeypatch, tmp_path):
+    monkeypatch.setattr("boulder_sweep.views.pieces.MOST_KEPT", 1000)
+    rng = np.random.default_rng(0)
+    n = 5000
+    table = pd.DataFrame(dict.fromkeys(INPUT_COLUMNS, np.ones(n))).assign(
+        boulder_width_m=rng.choice([1.0, 1.0 + 1e-6, 2.0], n),
+        vehicle_mass_kg=6000.0 + 100.0 * rng.integers(0, 20, n),
+        verdict=np.where(np.arange(n) < n - 60, "fail", "pass"),
+        reason=np.where(np.arange(n) < n - 60, "overturns", ""),
+    )
+    shown, _ = drawn(in_pieces(table, 300), monkeypatch, tmp_path / "map.png")
+    assert (shown.across, shown.up) == ("boulder_width_m", "vehicle_mass_kg")
+    assert shown.thinned
+    assert (shown.total, shown.count, shown.passing) == (n, n, 60)
+    assert len(shown.rows) < 1000 + 300
+
+    def last_drawn(rows: pd.DataFrame) -> dict[Any, str]:
+        """Return the verdict that is seen at each place of the picture."""
+        by_place = rows.astype({"verdict": str}).groupby([rows.boulder_width_m.round(3), "vehicle_mass_kg"])
+        return by_place.verdict.last().to_dict()
+
+    assert len(last_drawn(table)) == 40
+    assert last_drawn(shown.rows) == last_drawn(table)
+
+
+def test_the_command_never_holds_more_than_a_few_parts(out, monkeypatch, capsys):
+    """What it keeps of each part is what the picture shows."""
+    held = []
+
+    def add(kept, rows):
+        held.append(len(rows))
+        plain(kept, rows)
+
+    plain = Kept.add
+    monkeypatch.setattr(Kept, "add", add)
+    monkeypatch.setattr("boulder_sweep.store.read", None)
+    assert (
+        boulder_sweep.run(boulder_sweep.load(out.parent / "grid.yaml"), out, overwrite=True, rows_per_part=5).rows == 36
+    )
+    assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=95"]) == 0
+    assert "18 of 36 designs" in capsys.readouterr().out
+    assert len(held) == 8
+    assert sum(held) == 18
 
 
 def test_words() -> None:

@@ -1,0 +1,110 @@
+"""A table of designs piece by piece, and the few rows of it that a picture is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from boulder_sweep.store.finished import FinishedRows
+
+RATIO = "embedment_ratio"
+DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
+VERDICT, REASON = "verdict", "reason"
+MOST_KEPT = 2_000_000
+"""Rows; a dozen maps with as many cells as a map may have. Of more, those are kept that a picture can tell apart."""
+_RASTER = 500
+"""Places along an axis of a map that a picture can tell apart; it has fewer pixels there."""
+
+Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
+"""Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along."""
+
+
+def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
+    """Return a table that is in memory as one piece; what yields pieces as it is."""
+    if callable(table):
+        return table
+    whole = table.assign(**{RATIO: table[DEPTH] / table[HEIGHT]})
+    return lambda columns: [whole]
+
+
+def finished_pieces(finished: FinishedRows) -> Pieces:
+    """Return what yields the finished rows of a result.
+
+    Parameters
+    ----------
+    finished
+        The rows; the first time they are compared with their checksums.
+    """
+    verified = False
+
+    def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
+        nonlocal verified
+        stored = list(dict.fromkeys(own for name in columns for own in ((DEPTH, HEIGHT) if name == RATIO else (name,))))
+        for table in finished.tables(stored, verify=not verified):
+            frame = table.to_pandas()
+            yield frame.assign(**{RATIO: frame[DEPTH] / frame[HEIGHT]}) if RATIO in columns else frame
+        verified = True
+
+    return pieces
+
+
+class Kept:
+    """The rows that a picture shows, collected piece by piece.
+
+    Parameters
+    ----------
+    across, up
+        Inputs on the axes.
+    over
+        Inputs over small multiples; None where there is none.
+    levels
+        Different values of every input, ascending.
+    """
+
+    def __init__(self, across: str, up: str, over: Sequence[str | None], levels: Mapping[str, np.ndarray]):
+        self.count = self.passing = 0
+        self.thinned = False
+        self._ends = {
+            name: (levels[name].min(initial=np.inf), levels[name].max(initial=-np.inf)) for name in (across, up)
+        }
+        self._over = [name for name in over if name is not None]
+        self.columns = list(dict.fromkeys([across, up, *self._over, VERDICT, REASON]))
+        self._parts: list[pd.DataFrame] = []
+        self._held = 0
+
+    def add(self, rows: pd.DataFrame) -> None:
+        """Add rows."""
+        self.count += len(rows)
+        if VERDICT in rows:
+            self.passing += int((rows[VERDICT] == "pass").sum())
+        if self._held == 0:
+            self._parts = [rows]  # also without any rows, for its columns
+        elif len(rows):
+            self._parts.append(rows)
+        self._held += len(rows)
+        if self._held > MOST_KEPT:
+            self._thin()
+
+    def rows(self) -> pd.DataFrame:
+        """Return the rows, in the order of the table."""
+        import pandas as pd
+
+        if len(self._parts) != 1:
+            self._parts = [pd.concat(self._parts, ignore_index=True)]
+        return self._parts[0]
+
+    def _thin(self) -> None:
+        """Keep of the rows at the same place of a picture the one that would be drawn last."""
+        rows = self.rows()
+        places = rows[self._over].copy()
+        for name, (least, most) in self._ends.items():
+            share = (rows[name].to_numpy(dtype=float) - least) / max(most - least, 1e-300)
+            places[name] = np.round(share * _RASTER).astype(np.int32)
+        self._parts = [rows[~places.duplicated(keep="last").to_numpy()]]
+        self._held = len(self._parts[0])
+        self.thinned = True
