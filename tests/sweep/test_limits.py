@@ -159,7 +159,7 @@ def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
     sample = take_sample(evaluation, sweep.block, sweep.n_designs, {})
     block = sweep.block(0, sweep.n_designs)
     written = len(encode(part_table(block, evaluation(block), {})))
-    assert 0.5 < (sample.bytes_per_row * sweep.n_designs + sample.bytes_per_part) / written < 2.0
+    assert 0.75 < (sample.bytes_per_row * sweep.n_designs + sample.bytes_per_part) / written < 1.33
 
 
 def test_an_estimate_is_in_proportion():
