@@ -133,6 +133,15 @@ def exact_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compiled(function, {"nsz"})
 
 
+def exact_inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile as `inlined` does, without fused multiply-add, as `exact_kernel`.
+
+    For what the lanes and the single impact both put into their own code, and must round alike: a product that is used
+    twice is fused or not by what stands around it.
+    """
+    return _compiled(function, {"nsz"}, inline=True)
+
+
 def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile as `kernel` does, and let sums be reordered so that one long sum is vectorised.
 

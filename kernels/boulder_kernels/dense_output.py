@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import inlined
+from ._jit import exact_inlined
 from .dynamics import Acceleration, State
 
 
@@ -36,7 +36,7 @@ class DenseOutput(NamedTuple):
     truck: Track
 
 
-@inlined
+@exact_inlined
 def track(h: float, x: float, v: float, a: float, x_end: float, v_end: float, a_end: float) -> Track:
     """Quintic Hermite polynomial of one degree of freedom.
 
@@ -64,19 +64,19 @@ def track(h: float, x: float, v: float, a: float, x_end: float, v_end: float, a_
     )
 
 
-@inlined
+@exact_inlined
 def displacement_at(q: Track, tau: float) -> float:
     """Displacement of a track at the fraction tau of its step."""
     return q.x0 + tau * (q.x1 + tau * (q.x2 + tau * (q.x3 + tau * (q.x4 + tau * q.x5))))
 
 
-@inlined
+@exact_inlined
 def slope_at(q: Track, tau: float) -> float:
     """Derivative of a track by tau: the velocity times the length of the step."""
     return q.x1 + tau * (2.0 * q.x2 + tau * (3.0 * q.x3 + tau * (4.0 * q.x4 + tau * (5.0 * q.x5))))
 
 
-@inlined
+@exact_inlined
 def dense_output(y: State, k: Acceleration, y_end: State, k_end: Acceleration, h: float) -> DenseOutput:
     """Polynomials of a step of length h [s] from states and accelerations at its ends."""
     return DenseOutput(
@@ -87,7 +87,7 @@ def dense_output(y: State, k: Acceleration, y_end: State, k_end: Acceleration, h
     )
 
 
-@inlined
+@exact_inlined
 def state_at(dense: DenseOutput, tau: float) -> State:
     """State at the fraction tau of a step."""
     per_second = 1.0 / dense.h

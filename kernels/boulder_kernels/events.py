@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ._jit import inlined, kernel
-from .dense_output import DenseOutput, displacement_at, state_at
+from .dense_output import DenseOutput, Track, displacement_at, slope_at, state_at
 from .design import Constants
 from .dynamics import State, acceleration
 from .modes import (
@@ -56,6 +56,8 @@ SEATING_ANGLE = 1e-9
 """A boulder that would swing through less than this [rad] about its base is taken to have come to rest."""
 JUMP_TOLERANCE = 1e-11
 """Precision of a located jump of the forces, or of the limit, as a fraction of the step."""
+NEWTON_TOLERANCE = 1e-6
+"""Last correction of a root by Newton's method, as a fraction of the step: its square is what is left."""
 KINK_TOLERANCE = 1e-3
 """The same for a kink: forces are continuous there, so the error goes with its square."""
 
@@ -319,6 +321,39 @@ def locate(
     return tau
 
 
+@kernel
+def locate_limit(gap_start: float, gap_end: float, rotation: Track, limit: float, tau_end: float) -> float:
+    """Fraction of a step at which the rotation reaches its limit: `locate` for LIMIT, by Newton's method in a bracket.
+
+    Parameters
+    ----------
+    gap_start, gap_end
+        Gaps at the start of the step, positive, and at tau_end, not positive [rad].
+    rotation
+        The rotation within the step.
+    limit
+        Limit of rotation [rad].
+    tau_end
+        Fraction of the step before which it is reached.
+    """
+    low, high = 0.0, tau_end
+    tau = tau_end * gap_start / (gap_start - gap_end)
+    for _ in range(ITERATIONS):
+        theta = displacement_at(rotation, tau)
+        gap = limit - abs(theta)
+        if gap > 0.0:
+            low = tau
+        else:
+            high = tau
+        before = tau
+        tau = before + gap / (slope_at(rotation, before) if theta > 0.0 else -slope_at(rotation, before))
+        if not low <= tau <= high:
+            tau = 0.5 * (low + high)
+        if abs(tau - before) <= NEWTON_TOLERANCE:
+            break
+    return tau
+
+
 @inlined
 def first_event(
     start: Gaps,
@@ -348,7 +383,10 @@ def first_event(
     first, earliest = -1, 1.0
     for event in range(EVENTS):
         if end[event] < 0.0 and (event in (YIELD_TOP, YIELD_BASE)) == yielding:
-            tau = locate(event, start[event], end[event], dense, g, switches, c)
+            if event == LIMIT and start[event] > 0.0:
+                tau = locate_limit(start[event], end[event], dense.rotation, g.limit, 1.0)
+            else:
+                tau = locate(event, start[event], end[event], dense, g, switches, c)
             if first < 0 or tau < earliest:
                 first, earliest = event, tau
     return first, earliest

@@ -23,7 +23,7 @@ from .events import (
     gap_factors,
     gaps_at,
     initial_modes,
-    locate,
+    locate_limit,
 )
 from .modes import Modes, Switches, switches_of
 from .outcomes import (
@@ -176,7 +176,7 @@ def attempt_budget(h: float, horizon: float) -> float:
     return ATTEMPTS_PER_STEP * horizon / h + ATTEMPTS_SPARE
 
 
-@inlined
+@kernel
 def keep_up_to_event(
     t: float,
     h: float,
@@ -215,6 +215,8 @@ def keep_up_to_event(
     -----
     The modes are frozen in the right-hand side, but the ultimate resistance of the soil is not: a step that ran across
     its kink is no better for the kink being located. So it is tried again, to end just behind the kink.
+
+    Not inlined: lanes and the single impact call one and the same code, and so get the same bits.
     """
     start, end = gaps_at(y, M, factors, c), gaps_at(y_end, M_end, factors, c)
     event, tau = first_event(start, end, dense, factors, switches, c, False)
@@ -227,7 +229,44 @@ def keep_up_to_event(
             event = kink
     if tau < 1.0:
         y_end = state_at(dense, tau)
-    return event, tau, y_end, updated_maxima(m, t, h, tau, y, y_end, dense, switches, c)
+    m_end = updated_maxima(m, t, h, tau, y, y_end, dense, switches, c)
+    if m_end.theta >= factors.limit and event != LIMIT:
+        event = LIMIT
+        tau, y_end, m_end = keep_up_to_limit(t, h, y, dense, factors, switches, m, m_end, c)
+    return event, tau, y_end, m_end
+
+
+@kernel
+def keep_up_to_limit(
+    t: float,
+    h: float,
+    y: State,
+    dense: DenseOutput,
+    factors: GapFactors,
+    switches: Switches,
+    m: Maxima,
+    m_end: Maxima,
+    c: Constants,
+) -> tuple[float, State, Maxima]:
+    """Keep a step that turns beyond the limit and back again up to the limit.
+
+    Parameters
+    ----------
+    m, m_end
+        Maxima before the step and after it.
+    t, h, y, dense, factors, switches, c
+        As of `keep_up_to_event`.
+
+    Returns
+    -------
+    tau, y, m
+        The fraction of the step that is kept, the state there, and the maxima up to there.
+    """
+    tau_top = (m_end.t_theta - t) / h
+    gap, gap_top = factors.limit - abs(y.theta_b), factors.limit - m_end.theta
+    tau = locate_limit(gap, gap_top, dense.rotation, factors.limit, tau_top)
+    y_limit = state_at(dense, tau)
+    return tau, y_limit, updated_maxima(m, t, h, tau, y, y_limit, dense, switches, c)
 
 
 @inlined
@@ -352,11 +391,9 @@ def simulate_by_steps(
             h_next = tau * h
             continue
         h_next = h_full
-        if np.isnan(t_limit) and abs(y_end.theta_b) >= control.theta_limit and not control.stop_at_limit:
-            at_limit = gap_factors(modes, c, control.theta_limit, False)
-            gap = control.theta_limit - abs(y_end.theta_b)
-            gap_start = control.theta_limit - abs(y.theta_b)
-            t_limit = t + h * min(tau, locate(LIMIT, gap_start, gap, dense, at_limit, switches, c))
+        if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
+            gap_start, gap = control.theta_limit - abs(y.theta_b), control.theta_limit - m.theta
+            t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, (m.t_theta - t) / h)
         if recording:
             written = write_samples(record, written, t, h, tau, dense, modes, switches, c, exchanged)
             exchanged = add_exchanged(exchanged, dense, h, tau, modes, switches, c)

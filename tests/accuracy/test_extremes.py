@@ -132,3 +132,18 @@ def test_many_events_in_a_step(readings: Readings, step_s: float) -> None:
     assert long.status[0] in (Status.LIMIT, Status.SETTLED, Status.HORIZON, Status.OUTWARD)
     if step_s <= 0.016:
         assert long.theta_max[0] == pytest.approx(short.theta_max[0], abs=np.radians(0.2))
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("below", [1e-3, 1e-6, 1e-9])
+def test_a_limit_just_below_the_peak(below: float, preset: str) -> None:
+    """Beyond the limit and back within one step: the time is found, and nothing beyond the limit is reported."""
+    for step_s in (0.004, 0.008, 0.012):
+        plain = run(how(step_s), preset)
+        limit = float(plain.theta_max[0]) * (1.0 - below)
+        out = run(Control(step_s, 1.0, limit, 0, False), preset)
+        assert out.status[0] == Status.LIMIT
+        assert out.theta_max[0] == limit
+        assert out.t_limit[0] == out.t_end[0] < plain.t_end[0]
+        to_the_end = run(Control(step_s, 1.0, limit, 0, False, False), preset)
+        assert np.isfinite(to_the_end.t_limit[0]) == (to_the_end.theta_max[0] >= limit)
