@@ -99,3 +99,32 @@ def test_the_crash_tests(name: str, config: str, shown: str, readings: str) -> N
 def test_links_lead_somewhere() -> None:
     for target in re.findall(r"\]\((?!https?:|#)([^)]+)\)", README):
         assert (ROOT / target).exists(), target
+
+
+def test_the_named_accuracies_are_those_of_the_benchmark() -> None:
+    """Same cells as the rows of the corrected readings in the table that the benchmark wrote."""
+    benchmark = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
+    table = benchmark.split("<!-- begin named -->")[1].split("<!-- end named -->")[0]
+    rows = [line.removeprefix("| corrected ") for line in table.splitlines() if line.startswith("| corrected ")]
+    assert len(rows) == 3
+    assert marked("named").splitlines()[2:] == rows
+
+
+def test_the_comparison_with_others_is_that_of_the_benchmark() -> None:
+    """Milliseconds of the paper's way and the factors of both ways, in round numbers."""
+    benchmark = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
+    costs = {}
+    for line in benchmark.split("<!-- begin peers -->")[1].splitlines():
+        cells = [cell.strip() for cell in line.split("|")[1:-1]]
+        if len(cells) == 6 and cells[0] not in ("solver", "---"):
+            costs[cells[0]] = (cells[4], float(cells[5].replace(",", "")))
+    milliseconds, factor = costs.pop("the paper's way: SciPy RK45, NumPy sums, N = 5000")
+    shown = re.search(r"takes some (\d+) ms of CPU time a design at\s0\.01°, some (\d+) thousand times as much", README)
+    assert shown
+    assert float(milliseconds.removesuffix(" ms")) == pytest.approx(int(shown[1]), rel=0.1)
+    assert factor == pytest.approx(1000 * int(shown[2]), rel=0.15)
+    ours = costs.pop("boulder-sweep, lanes")[1]
+    assert ours == 1.0
+    best = re.search(r"the best other solver tried, LSODA compiled into the loop, (\d+) times", README)
+    assert best
+    assert min(factor for _, factor in costs.values()) == pytest.approx(int(best[1]), rel=0.15)
