@@ -92,6 +92,7 @@ def _decorators() -> types.ModuleType:
     module.kernel = decorator({"contract", "nsz"})
     module.inlined = decorator({"contract", "nsz"}, inline=True)
     module.exact_kernel = decorator({"nsz"})
+    module.exact_inlined = decorator({"nsz"}, inline=True)
     module.summing_kernel = decorator({"contract", "nsz", "reassoc"})
     return module
 
