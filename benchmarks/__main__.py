@@ -10,12 +10,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from . import accuracy, kernel, named, single_precision, sweep
+from . import accuracy, kernel, named, rates, single_precision, sweep
 from .designs import DESIGNS
 from .peers.__main__ import measure_with
 from .report import Table, write_between_markers
 
-NAMES = ("kernel", "accuracy", "named", "single-precision", "sweep", "peers")
+NAMES = ("kernel", "rates", "accuracy", "named", "single-precision", "sweep", "peers")
 
 
 def _accuracy() -> list[Table]:
@@ -32,6 +32,7 @@ def main() -> None:
     arguments = parser.parse_args()
     works: dict[str, Callable[[], list[Table]]] = {
         "kernel": lambda: [kernel.measure()],
+        "rates": lambda: [rates.measure()],
         "accuracy": _accuracy,
         "named": lambda: [named.measure()],
         "single-precision": lambda: [single_precision.measure()],

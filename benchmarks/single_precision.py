@@ -43,7 +43,7 @@ ORDER = (
 CHANGES = {
     # Its square must not be zero.
     "soil": (("TINY = 1e-30", "TINY = 1e-15"), ("    if c.elements > 0:\n        return element_sums(k, c)\n", "")),
-    "workspace": (("LANES = 16", "LANES = 32"),),
+    "workspace": (("LANES = 8", "LANES = 16"),),
     "lanes": (("np.zeros(SIZE)", "np.zeros(SIZE, np.float32)"),),
 }
 STEPS_MS = (16.0, 12.0, 8.0, 4.0, 2.0, 1.0)
