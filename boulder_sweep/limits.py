@@ -30,6 +30,8 @@ _FIRST_SIZES = (1, 8, 64, 64, 64, 64)
 _PIECES, _LARGEST_PIECE = 24, 1024
 """Pieces of equal size all over the table that are computed then; many rows of each, for a short one takes more time
 and more bytes a row than a table has on the whole."""
+_SHARE = 0.05
+"""Of a small table, a sample is no more than about this share: its rows are computed again by the run."""
 _BYTES_UNDER_WAY = 400
 """Memory of a row between being handed out and being written, inputs, outcomes and encoding together."""
 _WORKER_PROCESS_BYTES = 250_000_000
@@ -152,7 +154,8 @@ def take_sample(
         if tried > _SAMPLE_S:
             break
     by_time = int(_SAMPLE_S / _PIECES / max(per_row[max(per_row)], 1e-9))
-    size = max(1, min(by_time, _LARGEST_PIECE, rows))
+    by_share = max(_FIRST_SIZES[-1], int(_SHARE * rows / _PIECES))
+    size = max(1, min(by_time, by_share, _LARGEST_PIECE, rows))
     spent, tables = 0.0, []
     for number in range(_PIECES):
         seconds, table = computed((0.5 + number * _GOLDEN) % 1.0, size)

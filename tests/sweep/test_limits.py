@@ -129,8 +129,8 @@ class Clock:
 def test_a_sample_sees_how_many_designs_cost_nothing(monkeypatch, share, slow_axis):
     """Whether those are the first of the table or spread all over it."""
     stiffness = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 200}"
-    width = "{from: 1 m, to: 2 m, count: 1000}"
-    finely = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 100000}"
+    width = "{from: 1 m, to: 2 m, count: 5000}"
+    finely = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 1000000}"
     sweep = grid_of(1, subgrade=finely) if slow_axis else grid_of(1, subgrade=stiffness, width=width)
     clock = Clock(200 * share, seconds_per_row=8e-6, seconds_per_block=2e-4)
     monkeypatch.setattr(limits, "time", clock)
