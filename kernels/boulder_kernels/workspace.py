@@ -17,8 +17,8 @@ from .modes import Modes, Switches
 from .outcomes import Maxima
 
 LANES = 8
-"""Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take more
-of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
+"""Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
+more of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
 
 _FIELDS = {
     "constants": len(Constants._fields),
