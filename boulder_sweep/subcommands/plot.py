@@ -49,6 +49,10 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None)
         raise PictureError(f"{out} holds no finished designs yet; `sweep status {out}` says how far it is")
     title = str(finished.identity["settings"].get("name", ""))
     shown = draw_verdict_map(finished_pieces(finished), target, title=title, at=held, **axes)
+    for name, value in held.items():
+        taken = shown.fixed.get(name, value)
+        if abs(taken - value) > 1e-6 * abs(value):
+            click.echo(f"note: {name} is drawn at {taken:.6g}, the nearest to {value:.6g} that there is", err=True)
     if finished.rows_done < finished.rows:
         click.echo(f"note: the run is not finished; {shown.total:,} designs are drawn", err=True)
     click.echo(f"{target}: {shown.count:,} of {shown.total:,} designs")

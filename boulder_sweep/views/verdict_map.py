@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import figures
-from .figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE
+from .figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE, PictureError
 from .pieces import Pieces
 from .slices import Slice, label, plane, select, value_text
 
@@ -28,6 +29,10 @@ CLASSES = (
 """Verdict, or verdict and reason; colour; words of the legend."""
 MOST_CELLS = 400
 """A map with more values along an axis is drawn as points."""
+NARROW = 2
+"""With up to so many maps side by side there is no room for the legend beside the title."""
+CHARACTERS_PER_INCH = 15
+"""Of the caption."""
 
 
 def draw_verdict_map(
@@ -66,8 +71,15 @@ def draw_verdict_map(
         Nothing can be drawn of this table, or the picture cannot be written.
     """
     shown = plane(table, across=across, up=up, columns=columns, rows=rows, at=at)
+    if shown.count == 0:
+        held = ", ".join(f"{name}={value:.5g}" for name, value in shown.fixed.items())
+        raise PictureError(
+            f"none of the {shown.total:,} designs lies at {held}: this is a list of designs rather than a grid; "
+            "hold values that occur together (--at), or draw the table in a notebook"
+        )
     n_columns, n_rows = len(shown.column_values), len(shown.row_values)
-    width, height = max(2.2 * n_columns + 1.9, 5.2), max(1.9 * n_rows + 1.6, 3.6)
+    beside = n_columns <= NARROW
+    width, height = max(2.2 * n_columns + 1.9, 5.2) + 1.8 * beside, max(1.9 * n_rows + 1.6, 3.6)
     with figures.figure(path, width, height) as fig:
         grid = fig.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
         present: set[int] = set()
@@ -82,7 +94,7 @@ def draw_verdict_map(
             axes.set_xlabel(label(shown.across))
         for axes in grid[:, 0]:
             axes.set_ylabel(label(shown.up))
-        _legend(fig, present)
+        _legend(fig, present, beside=beside)
         fig.suptitle(
             f"{title}: which designs stop the truck" if title else "Which designs stop the truck",
             x=0.01,
@@ -90,7 +102,13 @@ def draw_verdict_map(
             fontsize=11.5,
             fontweight="bold",
         )
-        fig.supxlabel(_caption(shown), x=0.01, ha="left", fontsize=8.0, color=GREY)
+        fig.supxlabel(
+            textwrap.fill(_caption(shown), int(CHARACTERS_PER_INCH * width)),
+            x=0.01,
+            ha="left",
+            fontsize=8.0,
+            color=GREY,
+        )
     return shown
 
 
@@ -145,11 +163,13 @@ def _panel_title(shown: Slice, row_value: float, column_value: float) -> str:
     return ", ".join(value_text(name, value) for name, value in pairs if name is not None)
 
 
-def _legend(fig: Any, present: set[int]) -> None:
+def _legend(fig: Any, present: set[int], *, beside: bool) -> None:
+    """Say what the colours mean: above the maps, or beside them where the title leaves no room."""
     from matplotlib.patches import Patch
 
     handles = [Patch(color=colour, label=words) for k, (_, colour, words) in enumerate(CLASSES) if k in present]
-    fig.legend(handles=handles, loc="outside upper right", ncols=len(handles), handlelength=1.2, columnspacing=1.2)
+    place, columns = ("outside right upper", 1) if beside else ("outside upper right", len(handles))
+    fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
 
 
 def _caption(shown: Slice) -> str:

@@ -215,3 +215,35 @@ def test_command_refuses_wrong_use(
 def test_command_says_where_there_is_no_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert execute(["plot", str(tmp_path / "nothing.sweep")]) == 2
     assert "nothing.sweep" in capsys.readouterr().err
+
+
+def test_command_says_which_value_it_took(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=120"]) == 0
+    assert "subgrade_reaction_MN_m3 is drawn at 95, the nearest to 120" in capsys.readouterr().err
+    assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=60"]) == 0
+    assert not capsys.readouterr().err
+
+
+def test_a_list_of_designs_without_a_common_plane_is_refused(table: pd.DataFrame, tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    one_by_one = table.iloc[:6].assign(
+        **{name: rng.uniform(1.0, 2.0, 6) for name in ("boulder_length_m", "boulder_width_m", "boulder_height_m")},
+        vehicle_mass_kg=rng.uniform(5000.0, 9000.0, 6),
+    )
+    with pytest.raises(PictureError, match=r"none of the 6 designs lies at .*a list of designs rather than a grid"):
+        draw_verdict_map(one_by_one, tmp_path / "map.png")
+    assert not (tmp_path / "map.png").exists()
+
+
+def test_a_long_caption_is_broken_into_lines_that_fit(
+    table: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import matplotlib.figure
+
+    captions = []
+    monkeypatch.setattr(matplotlib.figure.Figure, "supxlabel", lambda self, text, **_: captions.append((self, text)))
+    found = draw_verdict_map(table, tmp_path / "map.png", columns="friction_angle_deg", rows="boulder_width_m")
+    assert found.column_values == [36.0, 42.0]
+    (fig, text) = captions[0]
+    assert max(map(len, text.splitlines())) <= 15 * fig.get_figwidth()
+    assert " ".join(text.split()).endswith("of them pass")
