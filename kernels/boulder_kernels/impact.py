@@ -215,8 +215,6 @@ def keep_up_to_event(
     -----
     The modes are frozen in the right-hand side, but the ultimate resistance of the soil is not: a step that ran across
     its kink is no better for the kink being located. So it is tried again, to end just behind the kink.
-
-    Not inlined: lanes and the single impact call one and the same code, and so get the same bits.
     """
     start, end = gaps_at(y, M, factors, c), gaps_at(y_end, M_end, factors, c)
     event, tau = first_event(start, end, dense, factors, switches, c, False)
