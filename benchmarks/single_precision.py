@@ -37,7 +37,8 @@ KEPT = ("design", "readings", "stability")
 """Modules that stay in double precision: what is worked out once per design."""
 ORDER = (
     *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "soil", "tableau"),
-    *("dynamics", "dense_output", "dormand_prince", "outcomes", "events", "energy", "settling", "workspace", "impact"),
+    *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
+    *("energy", "settling", "workspace", "impact"),
     "lanes",
 )
 CHANGES = {

@@ -13,18 +13,8 @@ from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
 from .dynamics import Acceleration, State, acceleration
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import (
-    COUPLE,
-    LIMIT,
-    ROTATION,
-    GapFactors,
-    change_mode,
-    first_event,
-    gap_factors,
-    gaps_at,
-    initial_modes,
-    locate_limit,
-)
+from .events import first_event, locate_limit
+from .gaps import COUPLE, LIMIT, ROTATION, GapFactors, gap_factors, gaps_at
 from .modes import Modes, Switches, switches_of
 from .outcomes import (
     Maxima,
@@ -43,6 +33,7 @@ from .settling import (
     proof_is_possible,
 )
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
+from .transitions import change_mode, initial_modes
 
 FULL_TURN = math.pi
 """Rotation at which a simulation without a stop ends all the same [rad]: the boulder lies upside down."""

@@ -15,7 +15,7 @@ from .dense_output import dense_output
 from .design import Constants, DesignTable, constants_of, design_at, is_computable
 from .dormand_prince import step
 from .dynamics import Acceleration, State
-from .events import LIMIT, GapFactors, gap_factors, gaps_of, initial_modes
+from .gaps import LIMIT, GapFactors, gap_factors, gaps_of
 from .impact import (
     SHORTEN,
     Control,
@@ -50,6 +50,7 @@ from .settling import (
 )
 from .soil import soil_kinematics
 from .stability import ACCEPTED, MOST_STEPS, RETRY
+from .transitions import initial_modes
 from .trigonometry import sine_versine
 from .workspace import (
     ATTEMPTS_LEFT,

@@ -12,7 +12,7 @@ import numpy as np
 from ._jit import inlined
 from .design import Constants
 from .dynamics import Acceleration, State
-from .events import GapFactors
+from .gaps import GapFactors
 from .modes import Modes, Switches
 from .outcomes import Maxima
 

@@ -6,7 +6,6 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import State, acceleration
-from boulder_kernels.events import initial_modes, mode_at_rest
 from boulder_kernels.modes import (
     FREE,
     HELD,
@@ -25,6 +24,7 @@ from boulder_kernels.restoring import (
     printed_restoring_moment,
     signed_arm,
 )
+from boulder_kernels.transitions import initial_modes, mode_at_rest
 from tests import oracle
 from tests.oracle.dynamics import Contact, Rotation, loads, rate
 from tests.oracle.events import rest_modes

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import State, acceleration
-from boulder_kernels.events import CONTACT, CORNER, COUPLE, ROTATION
+from boulder_kernels.gaps import CONTACT, CORNER, COUPLE, ROTATION
 from boulder_kernels.modes import (
     FREE,
     HELD,

@@ -1,0 +1,219 @@
+"""How far a motion is from each instant at which a mode changes.
+
+Each event has a gap, positive as long as the present mode holds. A gap that is negative at the end of a step puts
+the event inside it. Every gap is a sum of a few quantities of the state with factors that depend on the mode only, so
+that a loop over lanes in different modes needs no branch.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ._jit import inlined, kernel
+from .design import Constants
+from .dynamics import State
+from .modes import FREE, HELD, LIMITED_FORWARD, RESTING, SEATED, TURNING_BACK, TURNING_FORWARD, Modes
+from .restoring import signed_arm
+from .soil import soil_kinematics
+from .trigonometry import sine_versine
+from .vehicle import contact_displacement, spring_compression
+
+CONTACT = 0
+"""Truck and boulder part, or touch again."""
+ROTATION = 1
+"""The boulder leaves or finds its base, or (printed reading) turns back."""
+COUPLE = 2
+"""Printed reading: the net moment passes the limit of the restoring moment."""
+CORNER = 3
+"""Printed reading: the corner passes under the centre of mass, sin(gamma_N + theta_b) changes its sign."""
+ARM = 4
+"""Printed reading: the corner passes beside the centre of mass, cos(gamma_N + theta_b) changes its sign."""
+YIELD_TOP = 5
+"""The soil at the soil line reaches its ultimate resistance, or falls below it."""
+YIELD_BASE = 6
+"""The same at the base of the boulder."""
+LIMIT = 7
+"""The rotation reaches the limit."""
+EVENTS = 8
+
+NEVER = 1e300
+"""Gap of an event that cannot happen in the present mode."""
+CONTACT_ROUNDING = 1e-15
+"""Compressions below this share of the distance the truck would cover in a second are rounding: truck and boulder that
+move on together would part and touch without end by it."""
+
+
+class GapFactors(NamedTuple):
+    """What the gaps of a mode are made of; all of them are constant while the mode lasts."""
+
+    contact_0: float
+    contact: float
+    """Of the compression u."""
+    rotation_0: float
+    rotation_M: float
+    """Of M."""
+    rotation_abs_M: float
+    rotation_theta: float
+    rotation_omega: float
+    couple_0: float
+    couple_M: float
+    couple_abs_M: float
+    couple_limit: float
+    """Of the limit of the restoring moment."""
+    corner_0: float
+    corner_theta: float
+    arm_0: float
+    arm: float
+    """Of the signed arm of the weight."""
+    top_0: float
+    top_abs: float
+    """Of the modulus of the displacement at the soil line."""
+    top: float
+    base_0: float
+    base_abs: float
+    base: float
+    limit: float
+    """Limit of rotation [rad]."""
+
+
+class Gaps(NamedTuple):
+    """Distance of the state from each event, positive while the mode holds; indexed by the constants above."""
+
+    contact: float
+    rotation: float
+    couple: float
+    corner: float
+    arm: float
+    top: float
+    base: float
+    limit: float
+
+
+@kernel
+def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: bool) -> GapFactors:
+    """Factors of the gaps in the present modes.
+
+    Parameters
+    ----------
+    modes
+        The present modes.
+    c
+        Constants of the design.
+    theta_stop
+        Rotation at which the simulation ends [rad].
+    locate_yield
+        Whether a step is cut where the soil at the top or the base reaches its ultimate resistance.
+    """
+    rotation_0 = rotation_M = rotation_abs_M = rotation_theta = rotation_omega = 0.0
+    couple_0, couple_M, couple_abs_M, couple_limit = NEVER, 0.0, 0.0, 0.0
+    corner_0, corner_theta = NEVER, 0.0
+    arm_0, arm = NEVER, 0.0
+    turning = modes.turning
+    if turning == SEATED:
+        rotation_0, rotation_abs_M = c.C_cos, -1.0
+    elif turning == TURNING_FORWARD:
+        rotation_theta = 1.0
+    elif turning == TURNING_BACK:
+        rotation_theta = -1.0
+    else:
+        corner_0, corner_theta = modes.corner * c.theta_corner, -modes.corner
+        if turning == FREE:
+            rotation_omega = -1.0
+        else:
+            if turning == RESTING:
+                rotation_M = 1.0
+            else:
+                rotation_omega = 1.0
+            arm_0, arm = 0.0, modes.arm
+            couple_0, couple_limit = 0.0, -1.0
+            if turning == HELD or turning == RESTING:
+                couple_abs_M, couple_limit = -1.0, 1.0
+            elif turning == LIMITED_FORWARD:
+                couple_M = 1.0
+            else:
+                couple_M = -1.0
+    top_0, top_abs, top = NEVER, 0.0, 0.0
+    base_0, base_abs, base = NEVER, 0.0, 0.0
+    if locate_yield:
+        top = float(modes.yielded_top)
+        top_0, top_abs = (c.x_yield, -1.0) if modes.yielded_top == 0 else (-c.x_yield, 0.0)
+        base = float(modes.yielded_base)
+        base_0, base_abs = (c.x_yield, -1.0) if modes.yielded_base == 0 else (-c.x_yield, 0.0)
+    return GapFactors(
+        CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v),
+        1.0 if modes.touching else -1.0,
+        rotation_0,
+        rotation_M,
+        rotation_abs_M,
+        rotation_theta,
+        rotation_omega,
+        couple_0,
+        couple_M,
+        couple_abs_M,
+        couple_limit,
+        corner_0,
+        corner_theta,
+        arm_0,
+        arm,
+        top_0,
+        top_abs,
+        top,
+        base_0,
+        base_abs,
+        base,
+        theta_stop,
+    )
+
+
+@inlined
+def gaps_of(
+    A: float,
+    slope_x: float,
+    theta_b: float,
+    omega_b: float,
+    u: float,
+    M: float,
+    arm: float,
+    g: GapFactors,
+) -> Gaps:
+    """Gaps of all events.
+
+    Parameters
+    ----------
+    A, slope_x
+        Displacement of the soil at the soil line and its decrease down to the base [m].
+    theta_b, omega_b
+        Rotation [rad] and angular velocity [rad/s].
+    u
+        Compression of the vehicle's spring [m].
+    M
+        Net moment of soil and truck [N m].
+    arm
+        Signed arm of the weight, as of `signed_arm` [N m].
+    g
+        Factors of the present modes.
+    """
+    base = A - slope_x
+    return Gaps(
+        g.contact_0 + g.contact * u,
+        g.rotation_0
+        + g.rotation_M * M
+        + g.rotation_abs_M * abs(M)
+        + g.rotation_theta * theta_b
+        + g.rotation_omega * omega_b,
+        g.couple_0 + g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm),
+        g.corner_0 + g.corner_theta * theta_b,
+        g.arm_0 + g.arm * arm,
+        g.top_0 + g.top_abs * abs(A) + g.top * A,
+        g.base_0 + g.base_abs * abs(base) + g.base * base,
+        g.limit - abs(theta_b),
+    )
+
+
+@inlined
+def gaps_at(y: State, M: float, g: GapFactors, c: Constants) -> Gaps:
+    """Gaps of all events at a state with net moment M [N m]."""
+    sin, versin = sine_versine(y.theta_b)
+    u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+    return gaps_of(k.A, k.slope_x, y.theta_b, y.omega_b, u, M, signed_arm(sin, versin, c), g)
