@@ -12,7 +12,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from boulder_sweep.studies.coverage import coverage_table, coverages, grid_table, random_table
+from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 
 GRID = Path(__file__).parent.parent / "configs" / "m30_sizing.yaml"
 LEAST = 0.99

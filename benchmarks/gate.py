@@ -93,8 +93,8 @@ class Finding:
 def paths(folder: Path) -> dict[str, Callable[[], object]]:
     """Key paths by name; `folder` takes the tables of whole runs."""
     from boulder_sweep import load
-    from boulder_sweep.accuracy import STEPS
-    from boulder_sweep.sweeper import run
+    from boulder_sweep.judge.accuracy import STEPS
+    from boulder_sweep.runner.sweeper import run
 
     designs = sample(ROWS)
     few = first(designs, SCALAR_ROWS)

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_sweep.accuracy import STEPS, STEPS_PRINTED, Steps
+from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
 
 from .accuracy import PRESETS, control, reference_of
 from .designs import DESIGNS, ROTATION_LIMIT, sample

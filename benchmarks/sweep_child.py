@@ -38,8 +38,9 @@ class KernelClock:
 
 def main() -> None:
     begun, record = float(sys.argv[1]), Path(sys.argv[2])
-    from boulder_sweep import cli, evaluation
-    from boulder_sweep.limits import peak_memory
+    from boulder_sweep.cli.main import main as cli
+    from boulder_sweep.judge import evaluation
+    from boulder_sweep.runner.estimate import peak_memory
 
     clock = KernelClock(evaluation.simulate_table)
     vars(evaluation)["simulate_table"] = clock

@@ -13,10 +13,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from boulder_sweep.impact.simulation import Trajectory, simulate
+    from boulder_sweep.runner.sweeper import Summary, run
     from boulder_sweep.settings import SettingsError, Sweep, load
-    from boulder_sweep.simulation import Trajectory, simulate
     from boulder_sweep.store import read
-    from boulder_sweep.sweeper import Summary, run
 
     __version__: str
 
@@ -37,10 +37,10 @@ _HOME = {
     "SettingsError": "boulder_sweep.settings",
     "Sweep": "boulder_sweep.settings",
     "load": "boulder_sweep.settings",
-    "Summary": "boulder_sweep.sweeper",
-    "run": "boulder_sweep.sweeper",
-    "Trajectory": "boulder_sweep.simulation",
-    "simulate": "boulder_sweep.simulation",
+    "Summary": "boulder_sweep.runner.sweeper",
+    "run": "boulder_sweep.runner.sweeper",
+    "Trajectory": "boulder_sweep.impact.simulation",
+    "simulate": "boulder_sweep.impact.simulation",
     "read": "boulder_sweep.store",
 }
 

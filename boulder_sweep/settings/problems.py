@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from boulder_sweep.errors import BoulderSweepError
+
 MAX_REPORTED = 100
 """Most problems reported at once; a longer list helps nobody and a hostile file could make it endless."""
 
@@ -49,7 +51,7 @@ class Problem:
         return ": ".join(part for part in (head, self.key, self.message) if part)
 
 
-class SettingsError(Exception):
+class SettingsError(BoulderSweepError):
     """The settings are not valid.
 
     Attributes
@@ -61,6 +63,10 @@ class SettingsError(Exception):
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = list(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    def user_message(self) -> str:
+        """Return the problems, one a line; each begins with its place in the file."""
+        return str(self)
 
     def __reduce__(self) -> tuple[type[SettingsError], tuple[list[Problem]]]:
         """Pickle by the problems, so that the error survives the way between processes."""

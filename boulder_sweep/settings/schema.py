@@ -14,15 +14,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from boulder_sweep.settings.bounds import MAX_ELEMENTS
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_leaf, read_single
-from boulder_sweep.settings.model import (
-    ACCURACIES,
-    CLOSED_FORM,
-    PRESETS,
-    PRINTED,
-    RATINGS,
-    SWITCHES,
-    ReadingChoice,
-)
+from boulder_sweep.settings.model import ACCURACIES, CLOSED_FORM, PRESETS, PRINTED, RATINGS, SWITCHES, ReadingChoice
 from boulder_sweep.settings.numbers import NumberError, read_count, split_number
 from boulder_sweep.settings.problems import did_you_mean, shorten
 from boulder_sweep.settings.tree import Mapping, Node, Scalar

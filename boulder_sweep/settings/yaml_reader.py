@@ -26,7 +26,6 @@ from ruamel.yaml.tokens import FlowMappingEndToken, FlowSequenceEndToken
 
 from boulder_sweep.settings.problems import Place, ProblemList, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
-from boulder_sweep.settings.yaml_words import explain
 
 MAX_DEPTH = 20
 """Deepest nesting of lists and blocks; the format itself needs four levels."""
@@ -35,6 +34,25 @@ MAX_NODES = 100_000
 
 MAX_UNIT = 100
 """Longest unit behind a bracket, in characters."""
+
+_PLAIN_WORDS = (
+    ("expected ',' or ']'", "a list is not closed: ',' or ']' is missing"),
+    ("expected ',' or '}'", "a {...} block is not closed, or a ',' is missing in it"),
+    (r"found character '\t'", "indent with spaces, not with tabs"),
+    (
+        "expected '<document start>'",
+        "text stands where a key should begin; check quotation marks and indentation",
+    ),
+    ("cannot start any token", "this character cannot stand here; put the text into quotation marks"),
+    (
+        "mapping values are not allowed here",
+        "a ':' where none can stand; check the indentation and the quotation marks",
+    ),
+    ("could not find expected ':'", "a key without ':' behind it"),
+    ("found unexpected end of stream", "quotation marks are not closed"),
+    ("expected <block end>", "the indentation does not fit the lines above"),
+)
+"""Messages of the parser, and what they mean for people who do not write YAML every day."""
 
 
 class _TooDeepError(YAMLError):
@@ -137,7 +155,7 @@ def parse_node(text: str, label: str, problems: ProblemList) -> Node | None:
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         at = Place(label) if mark is None else Place(label, mark.line + 1, mark.column + 1)
-        reason = str(error.problem) if isinstance(error, _TooDeepError) else explain(error)
+        reason = str(error.problem) if isinstance(error, _TooDeepError) else _explained(error)
         problems.add(at, "", reason)
         problems.raise_if_any()
     return builder.root
@@ -261,3 +279,16 @@ class _Builder:
             words = [*(opened.key.text for opened in self.stack if opened.key), key.text]
             path = ".".join(shorten(word) for word in words)
             self.problems.add(key.place, path, f"is given twice (first in line {first.place.line})")
+
+
+def _explained(error: Any) -> str:
+    """Return a YAML syntax error in words for people who do not write YAML every day."""
+    problem = " ".join(str(getattr(error, "problem", None) or error).split())
+    for technical, plain in _PLAIN_WORDS:
+        if technical in problem:
+            return f"not valid YAML: {plain}"
+    if type(error) is YAMLError:  # one of our own
+        return problem
+    if "special characters are not allowed" in str(error):
+        return "contains control characters; a plain text file in UTF-8 is needed"
+    return f"not valid YAML: {shorten(problem, 120)}"

@@ -12,8 +12,8 @@ A folder holds
     A file that is not finished; there for an instant only, or after a run was killed.
 """
 
-from .errors import StoreError
-from .reader import read
-from .status import RunStatus, status
+from boulder_sweep.store.errors import StoreError
+from boulder_sweep.store.reader import read
+from boulder_sweep.store.status import RunStatus, status
 
 __all__ = ["RunStatus", "StoreError", "read", "status"]

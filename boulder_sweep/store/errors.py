@@ -1,21 +1,14 @@
-"""What can go wrong with an output folder, in words for the one who pointed there.
-
-Every error carries the exit code that the command line ends with.
-"""
+"""What can go wrong with an output folder, in words for the one who pointed there."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-EXIT_STOPPED = 1
-EXIT_WRONG_USE = 2
-EXIT_CONFLICT = 4
+from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, BoulderSweepError
 
 
-class StoreError(Exception):
+class StoreError(BoulderSweepError):
     """An output folder cannot be used, or can no longer be written."""
-
-    exit_code = EXIT_WRONG_USE
 
 
 class OutputExistsError(StoreError):
@@ -100,13 +93,13 @@ class OtherVersionError(StoreError):
 class DamagedError(StoreError):
     """A part or the manifest is damaged: truncated, changed or gone."""
 
-    exit_code = EXIT_STOPPED
+    exit_code = EXIT_INTERNAL
 
 
 class WriteError(StoreError):
     """The folder could not be written; what was finished before is whole, and the run can go on later."""
 
-    exit_code = EXIT_STOPPED
+    exit_code = EXIT_INTERNAL
 
 
 class DoesNotFitError(StoreError):

@@ -14,9 +14,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from .errors import DamagedError, StoreError
-from .manifest import Manifest, Part, hidden_name, load
-from .verify import load_checked, wrong_bytes
+from boulder_sweep.store.errors import DamagedError, StoreError
+from boulder_sweep.store.manifest import Manifest, Part, hidden_name, load
+from boulder_sweep.store.verify import load_checked, wrong_bytes
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -15,7 +15,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from .errors import FolderInUseError, WriteError
+from boulder_sweep.store.errors import FolderInUseError, WriteError
 
 LOCK_NAME = "_lock"
 SIGN_OF_LIFE_S = 10.0

@@ -16,11 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from boulder_sweep.columns import COLUMNS
-
-from .errors import DamagedError, NotASweepError, OtherVersionError
-from .files import WRITING_SUFFIX, put_file
-from .lock import LOCK_NAME
-from .records import entries_of, version_of
+from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError
+from boulder_sweep.store.files import WRITING_SUFFIX, put_file
+from boulder_sweep.store.lock import LOCK_NAME
+from boulder_sweep.store.records import entries_of, version_of
 
 MANIFEST_NAME = "_manifest.parquet"
 _KEY = b"boulder_sweep.manifest"
@@ -189,7 +188,7 @@ def save(manifest: Manifest, folder: Path) -> None:
     import pyarrow as pa  # heavy, and only runs need it
     import pyarrow.parquet as pq
 
-    from .schema import table_schema
+    from boulder_sweep.store.schema import table_schema
 
     text = json.dumps({"format": _FORMAT, **asdict(manifest)}, separators=(",", ":"))
     value = hashlib.sha256(text.encode()).hexdigest() + text

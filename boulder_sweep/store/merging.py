@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .files import flush_folder
-from .manifest import Manifest, hidden_name
-from .verify import merged_file
+from boulder_sweep.store.files import flush_folder
+from boulder_sweep.store.manifest import Manifest, hidden_name
+from boulder_sweep.store.verify import merged_file
 
 
 def finish_merge(manifest: Manifest, folder: Path) -> None:

@@ -6,14 +6,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from . import errors
-from .files import flush_folder
-from .lock import LOCK_NAME, FolderLock
-from .manifest import MANIFEST_NAME, Manifest, Session, is_ours, is_part_name, load, save
-from .merging import recover_merge
-from .provenance import PREFIX, differences
-from .verify import damaged_parts
-from .writer import OutputFolder
+from boulder_sweep.store import errors
+from boulder_sweep.store.files import flush_folder
+from boulder_sweep.store.lock import LOCK_NAME, FolderLock
+from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest, Session, is_ours, is_part_name, load, save
+from boulder_sweep.store.merging import recover_merge
+from boulder_sweep.store.provenance import PREFIX, differences
+from boulder_sweep.store.verify import damaged_parts
+from boulder_sweep.store.writer import OutputFolder
 
 
 def open_output(

@@ -1,4 +1,4 @@
-"""Who can repeat this table? What it was computed from, with what, and on what.
+"""Settings, code and machine behind a table.
 
 The *identity* is what must be equal for rows to belong to one table: settings, control of the integration,
 versions and the hashes of the code that decides a row. It goes into every part and into the manifest, and a
@@ -20,13 +20,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from .manifest import Session
+from boulder_sweep.store.manifest import Session
 
 PREFIX = "boulder_sweep."
 """Beginning of the names of this package's entries in the metadata of a file."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
-_DECIDING_SOURCES = ("accuracy.py", "designs.py", "evaluation.py", "pilot.py", "sampling.py", "verdict.py")
+_DECIDING_SOURCES = ("designs.py", "judge/*.py")
 """Modules beside the kernels whose code decides what stands in a row."""
 
 
@@ -148,7 +148,13 @@ def kernels_sha256() -> str:
 @cache
 def rules_sha256() -> str:
     """Hash of the sources that turn settings into designs and outcomes into verdicts."""
-    return _sources_sha256([_PACKAGE_FOLDER / name for name in _DECIDING_SOURCES])
+    sources = []
+    for pattern in _DECIDING_SOURCES:
+        found = sorted(_PACKAGE_FOLDER.glob(pattern))
+        if not found:
+            raise FileNotFoundError(f"{_PACKAGE_FOLDER / pattern}: sources that decide a row are missing")
+        sources += found
+    return _sources_sha256(sources)
 
 
 @cache
@@ -187,7 +193,7 @@ def _sources_sha256(sources: list[Path]) -> str:
     digest = hashlib.sha256()
     for source in sources:
         digest.update(source.name.encode())
-        digest.update(source.read_bytes() if source.exists() else b"")
+        digest.update(source.read_bytes())
     return digest.hexdigest()
 
 

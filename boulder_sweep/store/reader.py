@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boulder_sweep.columns import BY_NAME
-
-from .finished import FinishedRows
+from boulder_sweep.store.finished import FinishedRows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,7 +79,7 @@ def _read(folder: Path, columns: Sequence[str] | None, verify: bool) -> tuple[pa
     """Return the finished parts, in the order of the designs, and the rows of the whole table."""
     import pyarrow as pa  # heavy, and only readers need it
 
-    from .schema import table_schema
+    from boulder_sweep.store.schema import table_schema
 
     finished = FinishedRows(folder)
     parts = list(finished.tables(columns, verify=verify))

@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUTS, OUTCOME_COLUMNS, OUTCOMES, ColumnSpec
-from boulder_sweep.judged import RATINGS, REASONS, VERDICTS, Judged
+from boulder_sweep.judge.judged import RATINGS, REASONS, VERDICTS, Judged
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import Column, DesignBlock

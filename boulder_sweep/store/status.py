@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .lock import is_locked
-from .manifest import Session
-from .verify import load_checked
+from boulder_sweep.store.lock import is_locked
+from boulder_sweep.store.manifest import Session
+from boulder_sweep.store.verify import load_checked
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from pathlib import Path
 
-from .manifest import Manifest, Merge, Part, hidden_name, load
+from boulder_sweep.store.manifest import Manifest, Merge, Part, hidden_name, load
 
 _ATTEMPTS = 20
 """More than the merges that a run can begin while a part is looked at."""

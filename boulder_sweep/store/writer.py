@@ -15,12 +15,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from . import errors
-from .files import put_file
-from .lock import FolderLock
-from .manifest import MANIFEST_NAME, Manifest, Merge, Part, hidden_name, save
-from .merging import finish_merge
-from .provenance import now
+from boulder_sweep.store import errors
+from boulder_sweep.store.files import put_file
+from boulder_sweep.store.lock import FolderLock
+from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest, Merge, Part, hidden_name, save
+from boulder_sweep.store.merging import finish_merge
+from boulder_sweep.store.provenance import now
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import figures
-from .figures import PictureError
-from .scene import SideView, samples_shown
-from .shapes import STYLES, Shape
-from .trajectory import require_samples
-from .wording import design_line, verdict_line
+from boulder_sweep.errors import PictureError
+from boulder_sweep.views import figures
+from boulder_sweep.views.scene import SideView, samples_shown
+from boulder_sweep.views.shapes import STYLES, Shape
+from boulder_sweep.views.trajectory import require_samples
+from boulder_sweep.views.wording import design_line, verdict_line
 
 if TYPE_CHECKING:
-    from boulder_sweep.trajectory import Trajectory
+    from boulder_sweep.impact.trajectory import Trajectory
 
 KINDS = (".gif", ".mp4", ".html")
 EVERY_S = 0.005
@@ -84,7 +84,7 @@ def frames(trajectory: Trajectory) -> Iterator[np.ndarray]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from .side_view import WIDTH_IN, draw, height_of, stage
+    from boulder_sweep.views.side_view import WIDTH_IN, draw, height_of, stage
 
     view = SideView(trajectory)
     with matplotlib.rc_context(figures.STYLE):

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import figures
-from .figures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, YELLOW
-from .trajectory import require_samples
-from .wording import design_line, verdict_line
+from boulder_sweep.views import figures
+from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, YELLOW
+from boulder_sweep.views.trajectory import require_samples
+from boulder_sweep.views.wording import design_line, verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from boulder_sweep.trajectory import Trajectory
+    from boulder_sweep.impact.trajectory import Trajectory
 
 LAYERS = (
     ("crush_damper_J", "crush of the vehicle (lasting)", ORANGE),

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from boulder_sweep.errors import PictureError
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -38,12 +40,6 @@ STYLE: Any = {
     "svg.hashsalt": "boulder-sweep",
 }
 KINDS = (".png", ".svg", ".pdf")
-
-
-class PictureError(Exception):
-    """A picture cannot be made; the message says why and what would help."""
-
-    exit_code = 2
 
 
 def require_matplotlib() -> None:

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_kernels.design import G, shear_wedge_angle
-from boulder_sweep.history import soil_profile
-from boulder_sweep.verdict import PENETRATION_LIMITS_M
-
-from .shapes import Shape
-from .truck import truck_shapes
+from boulder_sweep.impact.history import soil_profile
+from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
+from boulder_sweep.views.shapes import Shape
+from boulder_sweep.views.truck import truck_shapes
 
 if TYPE_CHECKING:
-    from boulder_sweep.trajectory import Trajectory
+    from boulder_sweep.impact.trajectory import Trajectory
 
 SLICES = 8
 """Soil forces drawn along the buried face."""

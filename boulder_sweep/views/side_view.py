@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import figures
-from .scene import SideView
-from .shapes import STYLES, Shape
-from .trajectory import require_samples
-from .wording import verdict_line
+from boulder_sweep.views import figures
+from boulder_sweep.views.scene import SideView
+from boulder_sweep.views.shapes import STYLES, Shape
+from boulder_sweep.views.trajectory import require_samples
+from boulder_sweep.views.wording import verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from boulder_sweep.trajectory import Trajectory
+    from boulder_sweep.impact.trajectory import Trajectory
 
 WIDTH_IN = 7.6
 HEAD_PT, HEAD_PT_PER_M = 9.0, 40.0

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS
-
-from .figures import PictureError
-from .pieces import DEPTH, HEIGHT, RATIO, Kept, Pieces, pieces_of
+from boulder_sweep.errors import PictureError
+from boulder_sweep.views.pieces import DEPTH, HEIGHT, RATIO, Kept, Pieces, pieces_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .figures import AMBER, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, figure
+from boulder_sweep.views.figures import AMBER, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from boulder_sweep.tradeoff import Tradeoff
-    from boulder_sweep.tradeoff_points import Point
+    from boulder_sweep.tradeoff.points import Point
+    from boulder_sweep.tradeoff.study import Tradeoff
 
 FIRST_STEP_MS = 16.0
 """Step whose name stands on the other side of its point, off that of the next."""

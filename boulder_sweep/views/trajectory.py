@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import figures
-from .figures import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, PictureError
-from .wording import design_line, verdict_line
+from boulder_sweep.errors import PictureError
+from boulder_sweep.views import figures
+from boulder_sweep.views.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE
+from boulder_sweep.views.wording import design_line, verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from boulder_sweep.trajectory import Trajectory
+    from boulder_sweep.impact.trajectory import Trajectory
 
 
 def draw_trajectory(trajectory: Trajectory, path: str | Path) -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .shapes import Shape
+from boulder_sweep.views.shapes import Shape
 
 if TYPE_CHECKING:
-    from boulder_sweep.trajectory import Trajectory
+    from boulder_sweep.impact.trajectory import Trajectory
 
 CRUSH_ZONE_M = 1.7
 """Part of the front that is drawn shorter as it is crushed."""

@@ -8,22 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.comparison import simulated_signal
-from boulder_sweep.crash_tests import NAMES
-
-from . import figures
-from .figures import BLACK, BLUE, GREY, ORANGE
+from boulder_sweep.crash_tests.cases import NAMES
+from boulder_sweep.crash_tests.comparison import simulated_signal
+from boulder_sweep.views import figures
+from boulder_sweep.views.figures import BLACK, BLUE, GREY, ORANGE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from matplotlib.axes import Axes
 
-    from boulder_sweep.measured import TimeHistory
-    from boulder_sweep.rigid_wall import RigidWall
-    from boulder_sweep.studies.convergence import Convergence
-    from boulder_sweep.trajectory import Trajectory
-    from boulder_sweep.validation import Validation
+    from boulder_sweep.crash_tests.convergence import Convergence
+    from boulder_sweep.crash_tests.measured import TimeHistory
+    from boulder_sweep.crash_tests.rigid_wall import RigidWall
+    from boulder_sweep.crash_tests.validation import Validation
+    from boulder_sweep.impact.trajectory import Trajectory
 
 STYLES: dict[str, dict[str, Any]] = {
     "corrected": {"color": BLUE},

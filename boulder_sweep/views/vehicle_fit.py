@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.fitting.pulse import RESPONSES, UNITS
-
-from . import figures
-from .figures import BLACK, GREY, ORANGE
+from boulder_sweep.crash_tests.fitting.pulse import RESPONSES, UNITS
+from boulder_sweep.views import figures
+from boulder_sweep.views.figures import BLACK, GREY, ORANGE
 
 if TYPE_CHECKING:
-    from boulder_sweep.fitting import VehicleFit
+    from boulder_sweep.crash_tests.fitting import VehicleFit
 
 ORDER = ("displacement", "velocity", "acceleration")
 POINTS = 400

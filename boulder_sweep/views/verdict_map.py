@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import figures
-from .figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE, PictureError
-from .pieces import Pieces
-from .slices import Slice, label, plane, select, value_text
+from boulder_sweep.errors import PictureError
+from boulder_sweep.views import figures
+from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE
+from boulder_sweep.views.pieces import Pieces
+from boulder_sweep.views.slices import Slice, label, plane, select, value_text
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from boulder_kernels import OutcomeTable, Readings, Status, no_record, simulate_design, simulate_table
 from boulder_kernels.design import design_at
-from boulder_sweep.verdict import STATUS_REASONS
+from boulder_sweep.judge.verdict import STATUS_REASONS
 from tests.accuracy.box import PRESETS, box_table, how
 
 COMPUTED = (Status.LIMIT, Status.SETTLED, Status.HORIZON, Status.OUTWARD)

@@ -9,8 +9,8 @@ import pytest
 
 from boulder_kernels import OutcomeTable, Status, simulate_table
 from boulder_kernels.table import empty_outcomes, estimate_errors
-from boulder_sweep.studies.coverage import coverages, grid_table, random_table
-from boulder_sweep.verdict import Limits, judge
+from boulder_sweep.judge.verdict import Limits, judge
+from docs.studies.coverage import coverages, grid_table, random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
 
 GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings, Status, simulate_table
-from boulder_sweep.verdict import STATUS_REASONS, Limits, judge
+from boulder_sweep.judge.verdict import STATUS_REASONS, Limits, judge
 from tests.accuracy.box import LIMIT, PRESETS, how
 
 RWG = Design(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boulder_kernels import as_printed
-from boulder_sweep.studies.knife_edge import knife_edge, rotations_deg
+from docs.studies.knife_edge import knife_edge, rotations_deg
 
 
 def test_the_rotation_jumps_over_the_speed() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from boulder_kernels import OutcomeTable, Readings, simulate_table
 from tests.accuracy.box import PRESETS, box_table, how, rows
-from tests.sweep.grids import grid, same_bits
+from tests.runner.grids import grid, same_bits
 
 
 def assert_same(one: OutcomeTable, other: OutcomeTable) -> None:
@@ -44,9 +44,9 @@ def test_a_hopeless_neighbour_does_not_matter() -> None:
 def test_workers_and_parts_do_not_matter(accuracy: str, tmp_path: Path) -> None:
     import pyarrow.parquet as pq
 
+    from boulder_sweep.runner.sweeper import run
     from boulder_sweep.settings import load_text
-    from boulder_sweep.sweeper import run
-    from tests.sweep.grids import DEFAULTS, GRID
+    from tests.runner.grids import DEFAULTS, GRID
 
     text = GRID.format(**DEFAULTS).replace("step: 4 ms", f"accuracy: {accuracy}")
     found = []

@@ -10,7 +10,7 @@ from boulder_kernels.design import design_at
 from boulder_kernels.dynamics import acceleration
 from boulder_kernels.modes import Modes, switches_of
 from boulder_kernels.stability import ACCEPTED, Rates, rates_of, refusal, stable_step
-from boulder_sweep.studies.coverage import random_table
+from docs.studies.coverage import random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
 
 SAMPLES = 60

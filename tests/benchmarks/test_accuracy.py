@@ -11,7 +11,7 @@ from benchmarks.designs import ROTATION_LIMIT, sample
 from benchmarks.literal import literal_table
 from benchmarks.named import named_control, wrong_verdicts
 from benchmarks.points import LIMIT, Peaks, Point, observed_order, point_of
-from boulder_sweep.accuracy import STEPS
+from boulder_sweep.judge.accuracy import STEPS
 
 
 def peaks(theta: list[float], overturned: list[bool]) -> Peaks:

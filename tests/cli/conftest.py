@@ -30,7 +30,7 @@ def possible_grid(grid):
 @pytest.fixture
 def sweep(capsys):
     """Return a function that runs a command in this process and returns exit code, stdout, stderr."""
-    from boulder_sweep.cli import execute
+    from boulder_sweep.cli.main import execute
 
     def sweep(*words):
         code = execute([str(word) for word in words])

@@ -9,7 +9,7 @@ from distributed import LocalCluster
 
 from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
-from tests.sweep.grids import same_bits
+from tests.runner.grids import same_bits
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, schedule
 
 
 def test_a_scheduler_that_does_not_answer_is_wrong_use(sweep, possible_grid, monkeypatch):
-    monkeypatch.setattr("boulder_sweep.backends._CONNECT_S", "1s")
+    monkeypatch.setattr("boulder_sweep.runner.backends._CONNECT_S", "1s")
     code, out, err = sweep(
         "run", possible_grid, "-q", "-o", "out", "--backend", "dask", "--scheduler", "tcp://127.0.0.1:9"
     )

@@ -60,7 +60,7 @@ def test_nothing_heavy_is_loaded(words, light):
     names = (*HEAVY, "numpy", "pydantic") if light else HEAVY
     code = (
         "import sys\n"
-        "from boulder_sweep.cli import execute\n"
+        "from boulder_sweep.cli.main import execute\n"
         "code = execute(sys.argv[1:])\n"
         f"loaded = sorted(set({names!r}) & set(sys.modules))\n"
         "sys.exit(f'loaded: {loaded}' if loaded or code else 0)\n"

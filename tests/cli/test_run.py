@@ -6,8 +6,8 @@ import shlex
 
 import pytest
 
-from boulder_sweep import console
-from boulder_sweep.summary import progress_of
+from boulder_sweep.cli import console
+from boulder_sweep.runner.summary import progress_of
 
 
 def _counts(out):
@@ -144,7 +144,7 @@ def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
         seen.update(options)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("boulder_sweep.sweeper.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.sweeper.run", run)
     words = [
         "-o",
         "my out",
@@ -167,12 +167,12 @@ def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
 
 @pytest.mark.parametrize("signum", [2, 15])
 def test_an_interrupted_run_tells_how_to_go_on(sweep, grid, monkeypatch, signum):
-    from boulder_sweep.interruption import Interrupted
+    from boulder_sweep.errors import Interrupted
 
     def run(*_, **options):
         raise Interrupted(signum, 5, 18, options["resume_command"])
 
-    monkeypatch.setattr("boulder_sweep.sweeper.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.sweeper.run", run)
     code, out, err = sweep("run", grid)
     assert (code, out) == (128 + signum, "")
     assert "sweep run grid.yaml -o small-grid.sweep --resume" in err
@@ -182,7 +182,7 @@ def test_an_internal_error_is_one_line_unless_verbose(sweep, grid, monkeypatch):
     def run(*_, **__):
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr("boulder_sweep.sweeper.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.sweeper.run", run)
     code, out, err = sweep("run", grid, "-q")
     assert (code, out) == (1, "")
     assert err.count("\n") == 1

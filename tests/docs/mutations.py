@@ -18,7 +18,7 @@ class Mutation(NamedTuple):
 _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/soil.py"
 _VEHICLE, _RESTORING = "kernels/boulder_kernels/vehicle.py", "kernels/boulder_kernels/restoring.py"
 _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
-_WALL, _TRAJECTORY = "boulder_sweep/rigid_wall.py", "boulder_sweep/trajectory.py"
+_WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return 0.25 * math.pi + 0.5 * phi", "return 0.25 * math.pi - 0.5 * phi"),

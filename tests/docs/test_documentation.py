@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep import load
-from boulder_sweep.studies.__main__ import PULSE, main
-from boulder_sweep.studies.contents import CONTENTS, EVERY, GRID, compute, readings_of_grid
-from boulder_sweep.studies.documents import blocks, differences, pages
-from boulder_sweep.studies.energy import AUDIT_DESIGNS
-from boulder_sweep.studies.example_pulse import NOISE_G, NOISE_MM, example_pulse
-from boulder_sweep.studies.pictures import draw_all
+from docs.studies.__main__ import PULSE, main
+from docs.studies.contents import CONTENTS, EVERY, GRID, compute, readings_of_grid
+from docs.studies.documents import blocks, differences, pages
+from docs.studies.energy import AUDIT_DESIGNS
+from docs.studies.example_pulse import NOISE_G, NOISE_MM, example_pulse
+from docs.studies.pictures import draw_all
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -27,7 +27,7 @@ def page(name: str) -> str:
 
 
 def test_no_number_has_drifted() -> None:
-    """Write them anew with ``python -m boulder_sweep.studies``."""
+    """Write them anew with ``python -m docs.studies``."""
     assert differences(ROOT, compute(ROOT)) == []
 
 
@@ -94,7 +94,7 @@ def test_settings_shown_are_valid(tmp_path: Path) -> None:
 
 
 def test_commands_of_the_pages_exist() -> None:
-    from boulder_sweep.cli import cli
+    from boulder_sweep.cli.main import cli
 
     for file in pages(ROOT):
         for command in re.findall(r"^\$ sweep (\S+)", file.read_text(encoding="utf-8"), re.MULTILINE):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from boulder_sweep.studies.documents import DocumentError, blocks, differences, write
-from boulder_sweep.studies.drift import drift
+from docs.studies.documents import DocumentError, blocks, differences, write
+from docs.studies.drift import drift
 
 
 @pytest.mark.parametrize(

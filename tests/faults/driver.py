@@ -11,12 +11,12 @@ import json
 import os
 import sys
 
-from boulder_sweep.evaluation import by_kernels
-from boulder_sweep.interruption import Interrupted
+from boulder_sweep.errors import Interrupted
+from boulder_sweep.judge.evaluation import by_kernels
+from boulder_sweep.runner.sweeper import Progress, run
 from boulder_sweep.store.errors import StoreError
-from boulder_sweep.sweeper import Progress, run
 from tests.faults import faulty
-from tests.sweep.grids import grid_of
+from tests.runner.grids import grid_of
 
 
 def main() -> int:

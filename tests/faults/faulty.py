@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings
-from tests.sweep.grids import plausible
+from tests.runner.grids import plausible
 
 MAIN_PROCESS = "TEST_MAIN_PROCESS"
 POISON = "TEST_POISON"

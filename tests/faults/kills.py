@@ -19,12 +19,13 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from boulder_sweep.evaluation import evaluation_of
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import read_table
-from boulder_sweep.sweeper import run
-from tests.sweep.grids import grid_of, same_bits
+from tests.runner.grids import grid_of, same_bits
 
 ROWS, ROWS_PER_PART = 20_000, 4_000
 LONGEST_LIFE = 0.6
@@ -95,7 +96,8 @@ def main() -> None:
     """Kill as often as asked for and print what came of it."""
     folder, kills, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
     chance = random.Random(seed)
-    evaluation_of(grid_of(10, soil="{elements: 100}")).warm_up()
+    small = grid_of(10, soil="{elements: 100}")
+    evaluation_of(small, accuracy_of(small)).warm_up()
     whole_out = folder / "whole"
     begun = time.monotonic()
     in_a_child(whole_out, None)

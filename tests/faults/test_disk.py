@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from boulder_sweep import limits
+from boulder_sweep.runner import estimate as limits
+from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import files, status
 from boulder_sweep.store.errors import DoesNotFitError, StoreError, WriteError
 from boulder_sweep.store.reader import read_table
-from boulder_sweep.sweeper import run
 from tests.faults.processes import ROOT
-from tests.sweep.grids import grid, grid_of, plausible, same_bits
+from tests.runner.grids import grid, grid_of, plausible, same_bits
 
 pytestmark = pytest.mark.faults
 
@@ -130,8 +130,8 @@ _NO_LONG_FILES = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 from boulder_sweep.store.errors import WriteError
-from boulder_sweep.sweeper import run
-from tests.sweep.grids import grid_of, plausible
+from boulder_sweep.runner.sweeper import run
+from tests.runner.grids import grid_of, plausible
 try:
     run(grid_of(20_000), sys.argv[1], rows_per_part=10_000, simulate=plausible)
 except WriteError as problem:

@@ -14,7 +14,7 @@ import pytest
 from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
 from tests.faults.processes import ROOT, Driver, run_driver
-from tests.sweep.grids import same_bits
+from tests.runner.grids import same_bits
 
 pytestmark = pytest.mark.faults
 

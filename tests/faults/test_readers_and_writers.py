@@ -11,13 +11,13 @@ import pandas as pd
 import polars as pl
 import pytest
 
+from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import read, status
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import read_table
-from boulder_sweep.sweeper import run
 from tests.faults.faulty import slowly
 from tests.faults.processes import Driver, run_driver
-from tests.sweep.grids import grid_of, same_bits
+from tests.runner.grids import grid_of, same_bits
 
 pytestmark = pytest.mark.faults
 

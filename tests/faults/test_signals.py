@@ -7,12 +7,12 @@ import time
 
 import pytest
 
+from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
-from boulder_sweep.sweeper import run
 from tests.faults.faulty import slowly
 from tests.faults.processes import Driver
-from tests.sweep.grids import grid_of, same_bits
+from tests.runner.grids import grid_of, same_bits
 
 pytestmark = pytest.mark.faults
 

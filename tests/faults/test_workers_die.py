@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store.reader import read_table
-from boulder_sweep.sweeper import run
 from tests.faults import faulty
 from tests.faults.processes import run_driver
-from tests.sweep.grids import grid_of, plausible, same_bits
+from tests.runner.grids import grid_of, plausible, same_bits
 
 pytestmark = pytest.mark.faults
 

@@ -236,7 +236,7 @@ def test_reading_needs_no_recursion(tmp_path):
     path.write_text("a: " + "[" * 100_000)
     code = (
         "import sys\n"
-        "from boulder_sweep.cli import execute\n"
+        "from boulder_sweep.cli.main import execute\n"
         "sys.setrecursionlimit(250)\n"
         "sys.exit(execute(['check', sys.argv[1]]))\n"
     )

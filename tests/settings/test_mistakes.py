@@ -68,7 +68,7 @@ def test_on_the_command_line_without_anything_heavy(tmp_path):
     path.write_text(TEN_MISTAKES)
     code = (
         "import sys\n"
-        "from boulder_sweep.cli import execute\n"
+        "from boulder_sweep.cli.main import execute\n"
         f"code = execute(['check', {str(path)!r}])\n"
         "heavy = {'numba', 'pandas', 'scipy', 'pyarrow', 'matplotlib', 'joblib', 'pint', 'dask'} & set(sys.modules)\n"
         "print(code, sorted(heavy))\n"

@@ -10,14 +10,15 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from boulder_sweep.collector import verdict_counts
-from boulder_sweep.evaluation import evaluation_of
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.runner.collector import verdict_counts
 from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest
 from boulder_sweep.store.opening import open_output
 from boulder_sweep.store.provenance import file_metadata, new_session
 from boulder_sweep.store.schema import encode, part_table
 from boulder_sweep.store.writer import OutputFolder
-from tests.sweep.grids import grid, plausible
+from tests.runner.grids import grid, plausible
 
 IDENTITY = {"settings": {"soil": 1}, "settings_sha256": "a" * 64, "versions": {"numba": "1"}}
 ROWS, SIZE = 441, 100
@@ -33,7 +34,7 @@ def part_bytes(first: int, rows: int) -> tuple[bytes, dict[str, int]]:
     """Bytes of a part, and how many rows have which verdict."""
     sweep = grid()
     block = sweep.block(first, first + rows)
-    judged = evaluation_of(sweep, plausible)(block)
+    judged = evaluation_of(sweep, accuracy_of(sweep), plausible)(block)
     return bytes(encode(part_table(block, judged, file_metadata(IDENTITY, "sweep run x.yaml")))), verdict_counts(judged)
 
 

@@ -12,8 +12,8 @@ from boulder_sweep.store.errors import DamagedError, StoreError, WriteError
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.manifest import MANIFEST_NAME, load
 from boulder_sweep.store.reader import read_table
+from tests.runner.grids import same_bits
 from tests.store.folders import ROWS, commit, open_folder, part_bytes
-from tests.sweep.grids import same_bits
 
 SMALL = [(0, 30), (30, 30), (60, 40)]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 
 import pytest
 
@@ -38,9 +39,29 @@ def test_kernels_are_hashed_by_content(tmp_path, monkeypatch):
     assert len({one, two, provenance.kernels_sha256.__wrapped__()}) == 3
 
 
-def test_every_module_that_decides_a_row_is_hashed():
-    for name in provenance._DECIDING_SOURCES:
-        assert (provenance._PACKAGE_FOLDER / name).is_file()
+def test_every_module_that_decides_a_row_is_hashed(tmp_path, monkeypatch):
+    package = tmp_path / "boulder_sweep"
+    shutil.copytree(provenance._PACKAGE_FOLDER, package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(provenance, "_PACKAGE_FOLDER", package)
+    hash_now = provenance.rules_sha256.__wrapped__
+    before = hash_now()
+    deciding = [
+        "designs.py",
+        *(f"judge/{name}.py" for name in ("accuracy", "evaluation", "judged", "pilot", "verdict")),
+    ]
+    for name in deciding:
+        source = package / name
+        text = source.read_text()
+        source.write_text(text + "# changed\n")
+        assert hash_now() != before, name
+        source.write_text(text)
+    assert hash_now() == before
+
+
+def test_sources_that_are_missing_are_an_error_and_not_an_empty_hash(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "_PACKAGE_FOLDER", tmp_path)
+    with pytest.raises(FileNotFoundError, match=r"designs\.py"):
+        provenance.rules_sha256.__wrapped__()
 
 
 def test_differences_are_told_once_and_shortly():

@@ -13,9 +13,10 @@ import pytest
 
 from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUT_COLUMNS
 from boulder_sweep.designs import Column, DesignBlock
-from boulder_sweep.evaluation import evaluation_of
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.store.schema import encode, judged_rows, part_table, table_schema
-from tests.sweep.grids import partly_impossible, plausible
+from tests.runner.grids import partly_impossible, plausible
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def block() -> DesignBlock:
 
 @pytest.fixture(scope="module")
 def judged(block):
-    return evaluation_of(partly_impossible(), plausible)(block)
+    return evaluation_of(partly_impossible(), accuracy_of(partly_impossible()), plausible)(block)
 
 
 def written(block, judged, metadata=None) -> pa.Table:
@@ -144,8 +145,8 @@ def test_tables_pass_the_checks_of_arrow(block, judged):
 
 _RUN_AND_LIST = """
 import sys
-from tests.sweep.grids import grid_of
-from boulder_sweep.sweeper import run
+from tests.runner.grids import grid_of
+from boulder_sweep.runner.sweeper import run
 run(grid_of(20), sys.argv[1])
 print(*sorted({"pandas", "matplotlib", "polars", "duckdb"} & set(sys.modules)))
 """

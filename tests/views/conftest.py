@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from boulder_sweep.columns import INPUT_COLUMNS
-from boulder_sweep.crash_tests import crash_test
-from boulder_sweep.simulation import simulate
-from boulder_sweep.trajectory import Trajectory
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.impact.trajectory import Trajectory
 
 
 @pytest.fixture(scope="session")

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from boulder_sweep.crash_tests import crash_test
-from boulder_sweep.simulation import simulate
-from boulder_sweep.trajectory import Trajectory
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.errors import PictureError
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.views.energy import LAYERS
-from boulder_sweep.views.figures import PictureError, checked_kind
+from boulder_sweep.views.figures import checked_kind
 from boulder_sweep.views.verdict_map import CLASSES
 
 Draw = Callable[[Trajectory, Path], None]

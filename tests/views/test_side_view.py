@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from boulder_sweep.cli import execute
-from boulder_sweep.crash_tests import crash_test
-from boulder_sweep.history import soil_profile
-from boulder_sweep.simulation import simulate
-from boulder_sweep.trajectory import Trajectory
+from boulder_sweep.cli.main import execute
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.errors import PictureError
+from boulder_sweep.impact.history import soil_profile
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.views import animation
-from boulder_sweep.views.figures import PictureError
 from boulder_sweep.views.scene import SLICES, SideView, samples_shown
 from boulder_sweep.views.shapes import STYLES, Shape
 

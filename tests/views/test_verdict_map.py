@@ -12,9 +12,9 @@ import pytest
 from matplotlib.axes import Axes
 
 import boulder_sweep
-from boulder_sweep.cli import execute
+from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import INPUT_COLUMNS
-from boulder_sweep.views.figures import PictureError
+from boulder_sweep.errors import PictureError
 from boulder_sweep.views.pieces import Kept, Pieces, pieces_of
 from boulder_sweep.views.slices import Slice, label, plane, value_text
 from boulder_sweep.views.verdict_map import CLASSES, classes_of, draw_verdict_map

@@ -1,0 +1,1 @@
+"""The command ``sweep``: one module a command; parse, call, print."""

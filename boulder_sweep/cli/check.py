@@ -1,0 +1,20 @@
+"""``sweep check``: every mistake of a file at once."""
+
+from __future__ import annotations
+
+import click
+
+from boulder_sweep.cli.loading import load_sweep
+from boulder_sweep.cli.options import CHECK_EXAMPLES, set_option
+
+
+@click.command(short_help="Check a file: every mistake at once, with its line.", epilog=CHECK_EXAMPLES)
+@click.argument("grid", type=click.Path())
+@set_option
+def check(grid: str, overrides: tuple[str, ...]) -> int:
+    """Check GRID without simulating: every mistake at once, with file, line and column."""
+    from boulder_sweep.cli import console
+
+    sweep = load_sweep(grid, overrides, quiet=False)
+    click.echo("\n".join([f"{grid}: valid", *console.grid_lines(sweep)]))
+    return 0

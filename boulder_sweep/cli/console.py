@@ -1,0 +1,219 @@
+"""What the command line shows: progress on stderr, short readable tables on stdout."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from boulder_sweep.columns import BY_NAME
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from boulder_sweep.runner.estimate import Estimate
+    from boulder_sweep.runner.summary import Progress, Summary
+    from boulder_sweep.settings import Sweep
+    from boulder_sweep.store import RunStatus
+
+PLAIN_EVERY_S = 10.0
+"""Time between two lines of progress where there is no terminal."""
+
+VERDICTS = ("pass", "fail", "undecided", "error")
+
+
+def say(text: str) -> None:
+    """Write a line to stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def duration(seconds: float) -> str:
+    """Return a time for people: ``0.8 s``, ``2 min 05 s``, ``3 h 10 min``."""
+    if seconds < 60:
+        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest:02d} s"
+    return f"{minutes // 60:,} h {minutes % 60:02d} min"
+
+
+def size(count: float) -> str:
+    """Return a number of bytes for people."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.0f} bytes" if unit == "bytes" else f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:,.1f} TB"
+
+
+@contextmanager
+def progress(quiet: bool) -> Iterator[Callable[[Progress], None] | None]:
+    """Give a function that shows how far a run is: a bar on a terminal, a line now and then elsewhere."""
+    if quiet:
+        yield None
+    elif sys.stderr.isatty():
+        with _bar() as show:
+            yield show
+    else:
+        yield _PlainLines()
+
+
+class _PlainLines:
+    """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
+
+    def __init__(self) -> None:
+        self.last = time.monotonic()
+
+    def __call__(self, now: Progress) -> None:
+        if time.monotonic() - self.last < PLAIN_EVERY_S:
+            return
+        self.last = time.monotonic()
+        left = "" if now.seconds_left is None else f", {duration(now.seconds_left)} left"
+        say(
+            f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} designs, "
+            f"{now.rows_per_second:,.0f} per second{left}"
+        )
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[Progress], None]]:
+    # rich is for terminals only. It honours NO_COLOR by itself.
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[numbers]}"))
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        # Before the first block is done there is nothing to count; the bar pulses.
+        task = bars.add_task("getting ready", total=None, numbers="(the first run compiles the kernels)")
+
+        def show(now: Progress) -> None:
+            left = "" if now.seconds_left is None else f", {duration(now.seconds_left)} left"
+            numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
+            bars.update(task, description="simulating", total=now.rows, completed=now.rows_done, numbers=numbers)
+
+        yield show
+
+
+def grid_lines(sweep: Sweep) -> list[str]:
+    """Return a description of the designs: how many, and over which axes."""
+    count = counted(sweep.n_designs, "design")
+    if sweep.table is not None:
+        return [f"{sweep.name}: {count} from {sweep.table.file}"]
+    lines = [f"{sweep.name}: {count}"]
+    for axis in sweep.axes:
+        unit = BY_NAME[axis.name].unit if axis.name in BY_NAME else "1"
+        ends = f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis) > 1 else f"{axis.values[0]:g}"
+        lines.append(f"  {axis.name:<26}{len(axis):>9,} values  {ends}{'' if unit == '1' else ' ' + unit}")
+    return lines
+
+
+def summary_lines(name: str, summary: Summary) -> list[str]:
+    """Return what a finished run found, where it is and how to open it."""
+    lines = [
+        f"{name}: {counted(summary.rows, 'design')}, {summary.rows_computed:,} of them simulated now in "
+        f"{duration(summary.seconds)} ({summary.rows_per_second:,.0f} per second, "
+        f"{counted(summary.jobs, 'worker')}, {summary.backend})",
+        "",
+    ]
+    lines += verdict_lines(summary.reasons, summary.rows)
+    lines += [
+        "",
+        *accuracy_lines(summary.accuracy),
+        f"table  {summary.out} ({counted(summary.parts, 'file')}, {size(summary.bytes)})",
+        f"open   pandas.read_parquet({str(summary.out)!r}), or boulder_sweep.read({str(summary.out)!r})",
+    ]
+    return lines
+
+
+def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
+    """Return how accurately a sweep was computed; nothing where its table does not say."""
+    if not accuracy:
+        return []
+    steps = f"step {1e3 * accuracy['step_s']:g} ms"
+    if accuracy["reported_step_s"] != accuracy["step_s"]:
+        steps += f" and {1e3 * accuracy['reported_step_s']:g} ms"
+    if accuracy["yield_located"]:
+        steps += ", yield located"
+    found = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
+    if "pilot_designs" not in accuracy:
+        return [found]
+    sample = counted(accuracy["pilot_designs"], "design")
+    reached = f"{accuracy['estimated_error_p99_9_deg']:g} deg in 99.9 % of a pilot of {sample}"
+    return [found, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
+
+
+def dry_run_lines(sweep: Sweep, out: Path, effort: Estimate) -> list[str]:
+    """Return what a run would do and what it would take."""
+    return [
+        *grid_lines(sweep),
+        "",
+        *value_lines(sweep.resolved()),
+        "",
+        f"would simulate {effort.rows_to_compute:,} of {counted(effort.rows, 'design')} into {out}",
+        f"about {duration(effort.seconds)} with {counted(effort.jobs, 'worker')}, "
+        f"{size(effort.disk_bytes)} on disk, {size(effort.memory_bytes)} of memory",
+        *(f"does not fit: {objection}" for objection in effort.objections()),
+    ]
+
+
+def verdict_lines(reasons: Mapping[str, int], rows: int) -> list[str]:
+    """Return one line per verdict with its reasons; `reasons` counts rows by ``verdict/reason``."""
+    lines = []
+    for verdict in VERDICTS:
+        own = {key: count for key, count in reasons.items() if key.split("/")[0] == verdict}
+        total = sum(own.values())
+        named = {key.partition("/")[2]: count for key, count in own.items() if "/" in key and count}
+        detail = ", ".join(f"{reason} {count:,}" for reason, count in sorted(named.items(), key=lambda i: -i[1]))
+        lines.append(f"  {verdict:<10}{total:>13,}{total / max(rows, 1):>8.1%}   {detail}".rstrip())
+    return lines
+
+
+def status_lines(status: RunStatus) -> list[str]:
+    """Return how far a run got, what is missing or damaged, and how to go on."""
+    state = "finished" if status.complete else ("running" if status.running else "not finished")
+    lines = [
+        f"{status.out}: {state}, {status.rows_done:,} of {status.rows:,} designs "
+        f"({status.rows_done / max(status.rows, 1):.1%}), {size(status.bytes)}",
+        *verdict_lines(status.verdicts, status.rows_done),
+    ]
+    lines += [f"damaged  {name}: {what}" for name, what in status.damaged.items()]
+    lines += [f"missing  designs {start:,} to {stop - 1:,}" for start, stop in status.missing[:10]]
+    if len(status.missing) > 10:
+        lines.append(f"missing  and {len(status.missing) - 10} more ranges")
+    if status.verified and not status.damaged:
+        lines.append("every part was read and is whole")
+    if status.resume_command and not status.running:
+        lines.append(f"go on    {status.resume_command}")
+    return lines
+
+
+def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:
+    """Return names and values below each other; the names carry the units."""
+    lines = []
+    width = max((len(name) for name in values), default=0) + 2
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            lines += [f"{indent}{name}", *value_lines(value, indent + "  ")]
+        else:
+            lines.append(f"{indent}{name:<{width}}{_shown(value)}".rstrip())
+    return lines
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun: ``1 design``, ``2,736 designs``."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        shown = [_shown(item) for item in value]
+        return ", ".join(shown if len(shown) <= 8 else [*shown[:3], "...", *shown[-2:]])
+    return str(value)

@@ -1,0 +1,54 @@
+"""``sweep explain``: one row of a result, computed again from the result alone."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from boulder_sweep.cli.options import json_option
+
+EXAMPLES = """\b
+Examples:
+  sweep explain m30-sizing.sweep 4711
+  sweep explain m30-sizing.sweep 4711 --plot 4711.png
+"""
+
+
+@click.command("explain", short_help="Compute one row of a result again, over time.", epilog=EXAMPLES)
+@click.argument("out", type=click.Path())
+@click.argument("design_id", type=click.IntRange(min=0))
+@click.option("--plot", type=click.Path(), metavar="F.png", help="Draw rotation, displacements and forces over time.")
+@click.option("--trajectory", type=click.Path(), metavar="F.parquet", help="Write the time history.")
+@json_option
+def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, as_json: bool) -> int:
+    """Compute row DESIGN_ID of the result in OUT again, from the result alone.
+
+    Says whether every outcome comes out the same to the last bit and, where not, what has changed since:
+    versions, kernels, rules. The time history goes on beyond the rotation limit, as that of `sweep simulate`.
+    """
+    from boulder_sweep.cli.console import value_lines
+    from boulder_sweep.impact.explanation import explain as compute_again
+
+    try:
+        found = compute_again(out, design_id)
+    except IndexError as problem:
+        raise click.UsageError(str(problem)) from None
+    if found.trajectory is not None:
+        if plot is not None:
+            found.trajectory.plot(plot)
+        if trajectory is not None:
+            found.trajectory.to_parquet(trajectory)
+    elif plot is not None or trajectory is not None:
+        click.echo("note: the design cannot be computed; there is no time history", err=True)
+    if as_json:
+        click.echo(json.dumps(found.as_dict()))
+        return 0
+    click.echo("\n".join(value_lines({"design": found.inputs, "outcome": found.stored})))
+    for name in found.unequal:
+        click.echo(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
+    for line in found.changed:
+        click.echo(f"changed since: {line}")
+    if not found.unequal:
+        click.echo("computed again: the same to the last bit")
+    return 0

@@ -1,0 +1,93 @@
+"""``sweep fit-vehicle``: spring and damper of a vehicle from a rigid-wall crash pulse."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from boulder_sweep.cli.options import json_option
+
+if TYPE_CHECKING:
+    from boulder_sweep.crash_tests.fitting import VehicleFit
+
+EXAMPLES = """\b
+Examples:
+  sweep fit-vehicle docs/examples/rigid_wall_pulse.csv --mass "6800 kg"
+  sweep fit-vehicle pulse.csv --mass "15000 lb" --speed "30 mph" --plot fit.png
+
+\b
+The first line of PULSE names what its columns hold, with units:
+  time [ms], displacement [mm], velocity [m/s], acceleration [g]
+One of the three beside time is enough. Time counts from first touch; earlier rows are left out. An acceleration
+is negative while the vehicle slows down; where it is not, name the column deceleration. Empty cells are gaps.
+"""
+
+
+@click.command("fit-vehicle", short_help="Fit spring and damper of a vehicle to a crash pulse.", epilog=EXAMPLES)
+@click.argument("pulse", type=click.Path())
+@click.option("--mass", required=True, metavar="'6800 kg'", help="Mass of the vehicle, with its unit.")
+@click.option("--speed", metavar="'30 mph'", help="Speed of impact, with its unit [default: fitted too].")
+@click.option("--plot", type=click.Path(), metavar="F.png", help="Draw pulse, fit and residuals.")
+@json_option
+def fit_vehicle(pulse: str, mass: str, speed: str | None, plot: str | None, as_json: bool) -> int:
+    """Fit spring and damper of a Maxwell element to PULSE, a vehicle's crash against a rigid wall."""
+    mass_kg = _quantity("--mass", mass, "kg")
+    speed_m_s = None if speed is None else _quantity("--speed", speed, "m/s")
+    from boulder_sweep.crash_tests.fitting import fit_pulse, read_pulse
+    from boulder_sweep.views.figures import checked_kind, require_matplotlib
+
+    if plot is not None:
+        checked_kind(plot)
+        require_matplotlib()
+    fit = fit_pulse(read_pulse(pulse), mass_kg, speed_m_s=speed_m_s)
+    if plot is not None:
+        fit.plot(plot)
+    for warning in fit.warnings:
+        click.echo(f"caution: {warning}", err=True)
+    click.echo(json.dumps(fit.to_dict()) if as_json else "\n".join(lines(fit)))
+    return 0
+
+
+def lines(fit: VehicleFit) -> list[str]:
+    """Return the result for people, and the line for a settings file."""
+    wall = fit.wall
+    speed = f"{wall.speed_m_s:.3f} m/s"
+    speed += " (given)" if fit.speed_error_m_s is None else f" ± {fit.speed_error_m_s:.3f}"
+    damping = (
+        "over-damped: creeps to a stop" if wall.over_damped else f"under-damped: a = {wall.a:.3f}, b = {wall.b:.3f} 1/s"
+    )
+    rows = [
+        ("spring", f"{wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"),
+        ("damper", f"{wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN*s/m"),
+        ("speed of impact", speed),
+        ("damping", damping),
+        ("largest crush", f"{wall.max_displacement_m:.3f} m"),
+        ("peak force", f"{wall.peak_force / 1e3:.0f} kN at {wall.peak_force_time_s:.4f} s"),
+        ("rebound", f"{abs(wall.rebound_speed_m_s):.2f} m/s"),
+    ]
+    for name, misfit in fit.misfits.items():
+        rows.append((f"misfit of {name}", f"{misfit.share:.1%} of its range (root mean square)"))
+    settings = (
+        f"vehicle:  {{mass: {wall.mass_kg:.6g} kg, spring: {wall.spring_N_m / 1e3:.6g} kN/m, "
+        f"damper: {wall.damper_N_s_m / 1e3:.6g} kN*s/m, speed: ...}}"
+    )
+    return [*(f"{name:<24}{text}" for name, text in rows), "", settings]
+
+
+def _quantity(option: str, text: str, unit: str) -> float:
+    """Read a number with its unit from the command line."""
+    from boulder_sweep.settings.numbers import NumberError, split_number
+    from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+
+    try:
+        number, unit_text = split_number(text, unit)
+        if not unit_text:
+            raise click.UsageError(f"{option} '{text}': write the unit too ({EXPECTED[unit].examples})")
+        value = float(number * factor(unit_text, unit))
+    except (NumberError, UnitError) as error:
+        raise click.UsageError(f"{option}: {error}") from None
+    if not value > 0.0:
+        raise click.UsageError(f"{option} '{text}': must be positive")
+    return value

@@ -1,0 +1,21 @@
+"""Settings loaded as every command does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+
+def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
+    """Load settings and show the remarks on them."""
+    from boulder_sweep.cli.console import say
+    from boulder_sweep.settings import load
+
+    sweep = load(path, overrides)
+    if not quiet:
+        for note in sweep.notes:
+            say(f"note: {note}")
+    return sweep

@@ -1,0 +1,104 @@
+"""The command ``sweep``: parse, call, print. It calls the Python interface and adds nothing of its own."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+import click
+
+# Every module of a command imports what is heavy (numba, pandas, pyarrow, even numpy) inside its function:
+# `sweep --help` and `sweep check` answer at once.
+from boulder_sweep.cli.check import check
+from boulder_sweep.cli.explain import explain
+from boulder_sweep.cli.fit_vehicle import fit_vehicle
+from boulder_sweep.cli.options import GROUP_EPILOG, OrderedGroup, version_option
+from boulder_sweep.cli.plot import plot
+from boulder_sweep.cli.run import run
+from boulder_sweep.cli.simulate import simulate
+from boulder_sweep.cli.status import status
+from boulder_sweep.cli.tradeoff import tradeoff
+from boulder_sweep.cli.validate import validate
+from boulder_sweep.errors import EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError, Interrupted
+
+COMMANDS = (run, check, simulate, status, plot, explain, tradeoff, validate, fit_vehicle)
+"""In the order of ``sweep --help``."""
+EXIT_INTERRUPTED = 130
+REPORT = "this is a mistake in boulder-sweep, not in your file; please report it with command and file"
+
+
+@click.group(cls=OrderedGroup, epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+@version_option
+def cli() -> None:
+    """Tell which boulder, buried how deep in which soil, stops a truck.
+
+    A file describes boulders, soils and a vehicle as ranges of values. `sweep run` simulates every
+    combination and writes one table with a verdict for each.
+    """
+
+
+for command in COMMANDS:
+    cli.add_command(command)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and end the process with its exit code."""
+    sys.exit(execute(arguments))
+
+
+def execute(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Words behind ``sweep``; those of this process by default.
+
+    Returns
+    -------
+    int
+        Exit code, as ``sweep --help`` lists them.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        # Not cli.main(): it would replace an interruption by an exception without the signal and the message.
+        with cli.make_context("sweep", words) as context:
+            code = cli.invoke(context)
+        sys.stdout.flush()
+        return int(code)
+    except click.exceptions.Exit as end:  # after --help or --version
+        return end.exit_code
+    except click.ClickException as error:
+        error.show()
+        return EXIT_WRONG_USE
+    except BrokenPipeError:
+        # The reader of our output has gone (sweep status ... | head); keep Python from reporting it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Interrupted as stop:
+        print(stop, file=sys.stderr)
+        return stop.exit_code
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except Exception as error:
+        return _report(error, verbose=bool({"-v", "--verbose"} & set(words)))
+
+
+def _report(error: Exception, verbose: bool) -> int:
+    """Say what went wrong, and return the exit code."""
+    if isinstance(error, BoulderSweepError):
+        print(error.user_message(), file=sys.stderr)
+        return error.exit_code
+    if verbose:
+        import traceback
+
+        traceback.print_exception(error)
+    if isinstance(error, OSError):  # a place that cannot be read or written
+        place = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
+        print(f"error: {place}", file=sys.stderr)
+        return EXIT_WRONG_USE
+    print(f"internal error: {type(error).__name__}: {error}; {REPORT}", file=sys.stderr)
+    return EXIT_INTERNAL

@@ -1,0 +1,98 @@
+"""``sweep run``: every design of a file simulated into one table."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from boulder_sweep.cli.loading import load_sweep
+from boulder_sweep.cli.options import RUN_EXAMPLES, json_option, run_options, set_option, talk_options
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+
+@click.command(short_help="Simulate every design of a file into one table.", epilog=RUN_EXAMPLES)
+@click.argument("grid", type=click.Path())
+@run_options
+@set_option
+@json_option
+@talk_options
+def run(
+    grid: str,
+    out: str | None,
+    overrides: tuple[str, ...],
+    accuracy: str | None,
+    dry_run: bool,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Simulate every design of GRID and write the table of verdicts."""
+    from boulder_sweep.cli import console
+
+    if options["resume"] and options["overwrite"]:
+        raise click.UsageError("--resume and --overwrite exclude each other: go on, or begin again")
+    if options["scheduler"] and options["backend"] != "dask":
+        raise click.UsageError("--scheduler needs --backend dask")
+    sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
+    target = Path(out or f"{sweep.name.replace(' ', '-')}.sweep")
+    if dry_run:
+        return _dry_run(sweep, target, options, as_json)
+    if verbose:
+        console.say("\n".join(console.value_lines(sweep.resolved())))
+    if not quiet:
+        console.say(f"{sweep.name}: {console.counted(sweep.n_designs, 'design')} into {target}")
+    from boulder_sweep.runner.sweeper import run as run_sweep
+
+    with console.progress(quiet) as show:
+        summary = run_sweep(
+            sweep,
+            target,
+            progress=show,
+            command=shlex.join(["sweep", *sys.argv[1:]]),
+            resume_command=_resume_command(grid, target, overrides, accuracy, options),
+            **options,
+        )
+    for note in summary.notes:
+        console.say(f"note: {note}")
+    if as_json:
+        click.echo(json.dumps({"name": sweep.name, **summary.to_dict()}))
+    else:
+        click.echo("\n".join(console.summary_lines(sweep.name, summary)))
+    return summary.exit_code
+
+
+def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) -> int:
+    """Show what a run would do."""
+    from boulder_sweep.cli import console
+    from boulder_sweep.runner.sweeper import estimate
+
+    effort = estimate(sweep, out, jobs=options["jobs"], backend=options["backend"], resume=options["resume"])
+    if as_json:
+        record = {"settings": sweep.resolved(), "out": str(out), "estimate": effort.to_dict()}
+        click.echo(json.dumps(record | {"objections": effort.objections()}))
+    else:
+        click.echo("\n".join(console.dry_run_lines(sweep, out, effort)))
+    return 0
+
+
+def _resume_command(
+    grid: str, out: Path, overrides: Sequence[str], accuracy: str | None, options: dict[str, Any]
+) -> str:
+    """Return the command line that goes on with this run."""
+    words = ["sweep", "run", grid, "-o", str(out)]
+    for name in ("jobs", "backend", "scheduler"):
+        if options[name] is not None and options[name] != "threading":
+            words += [f"--{name}", str(options[name])]
+    words += ["--accuracy", accuracy] if accuracy else []
+    for override in overrides:
+        words += ["--set", override]
+    return shlex.join([*words, "--resume"])

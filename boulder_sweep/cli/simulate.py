@@ -1,0 +1,71 @@
+"""``sweep simulate``: one design with its time history."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from boulder_sweep.cli.loading import load_sweep
+from boulder_sweep.cli.options import SIMULATE_EXAMPLES, json_option, set_option, talk_options
+from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
+
+
+@click.command(short_help="Simulate one design with its time history.", epilog=SIMULATE_EXAMPLES)
+@click.argument("case", type=click.Path())
+@click.option("--design", type=click.IntRange(min=0), metavar="N", help="Number of the design [default: 0].")
+@click.option("--plot", type=click.Path(), metavar="F.png", help="Draw the time history.")
+@click.option("--trajectory", type=click.Path(), metavar="F.parquet", help="Write the time history.")
+@click.option(
+    "--energy",
+    type=click.Path(),
+    metavar="F.png",
+    help="Draw where the energy goes, and add its columns to the time history.",
+)
+@click.option("--animate", type=click.Path(), metavar="F.gif|.mp4|.html", help="Make a film of the side view.")
+@set_option
+@json_option
+@talk_options
+def simulate(
+    case: str,
+    design: int | None,
+    plot: str | None,
+    trajectory: str | None,
+    energy: str | None,
+    animate: str | None,
+    overrides: tuple[str, ...],
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Simulate one design of CASE with its time history, beyond the rotation limit and to the end."""
+    from boulder_sweep.cli import console
+
+    sweep = load_sweep(case, overrides, quiet)
+    number = design or 0
+    if number >= sweep.n_designs:
+        held = console.counted(sweep.n_designs, "design")
+        raise click.UsageError(f"{case} holds {held}, numbered from 0; there is no {number}")
+    if design is None and sweep.n_designs > 1 and not quiet:
+        console.say(f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)")
+    reason = sweep.block(number, number + 1).reasons[0]
+    if reason:
+        console.say(f"design {number} cannot be computed: {reason}")
+        return EXIT_SOME_ROWS_FAILED
+    if verbose:
+        console.say("\n".join(console.value_lines(sweep.resolved())))
+    from boulder_sweep.impact.simulation import simulate as simulate_design
+
+    result = simulate_design(sweep, number)
+    # First of all: a picture may be impossible where nothing moved, a film takes its time.
+    values = result.summary()
+    click.echo(json.dumps(values) if as_json else "\n".join(console.value_lines(values)))
+    if plot is not None:
+        result.plot(plot)
+    if trajectory is not None:
+        result.to_parquet(trajectory, energy=energy is not None)
+    if energy is not None:
+        result.plot_energy(energy)
+    if animate is not None:
+        result.animate(animate)
+    return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0

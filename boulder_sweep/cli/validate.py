@@ -1,0 +1,84 @@
+"""``sweep validate``: the paper's two crash tests, both presets, beside what the paper states."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from boulder_sweep.cli.options import json_option
+
+if TYPE_CHECKING:
+    from boulder_sweep.impact.trajectory import Trajectory
+
+EXAMPLES = """\b
+Examples:
+  sweep validate -o validation
+  sweep validate --measured my_test.csv --case my_test.yaml -o validation
+
+\b
+The first line of a --measured file names what its columns hold, with units, time among them:
+  time [ms], rotation [deg], boulder_displacement [mm], vehicle_displacement [m]
+The boulder's displacement is that of its own centre of mass. Empty cells are gaps in a track.
+"""
+
+
+@click.command("validate", short_help="The paper's crash tests against what the paper states.", epilog=EXAMPLES)
+@click.option("-o", "--output", "out", type=click.Path(), metavar="DIR", help="Folder for pictures and Parquet files.")
+@click.option("--measured", type=click.Path(), metavar="FILE.csv", help="Your own test data, to lay over it.")
+@click.option("--case", metavar="CASE", help="The test they belong to: abg, rwg, or a settings file with one design.")
+@json_option
+def validate(out: str | None, measured: str | None, case: str | None, as_json: bool) -> int:
+    """Simulate both crash tests of the paper, with its formulas as printed and corrected, beside what it says of them.
+
+    With -o the figures of the paper are redrawn for the simulated side and all time histories written. The exit code
+    is 1 if a statement of the paper is contradicted.
+    """
+    if (measured is None) != (case is None):
+        raise click.UsageError("--measured FILE.csv and --case abg|rwg|CASE.yaml go together")
+    from boulder_sweep.crash_tests.validation import NOT_COMPARED
+    from boulder_sweep.crash_tests.validation import validate as run_validation
+
+    found = run_validation(out)
+    content: dict[str, Any] = found.to_dict()
+    text = [found.text(), "", f"note: {NOT_COMPARED}"]
+    if measured is not None and case is not None:
+        overlay, written = _overlay(measured, case, out)
+        content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
+        content["files"] += written
+        from boulder_sweep.crash_tests.comparison import deviation_table
+
+        text = [found.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
+    if out is not None:
+        text += ["", *(f"written  {file}" for file in content["files"])]
+    click.echo(json.dumps(content) if as_json else "\n".join(text))
+    return 0 if found.holds else 1
+
+
+def _overlay(measured: str, case: str, out: str | None) -> tuple[dict[str, Any], list[str]]:
+    """Compare a user's data with both presets, and draw them where there is a folder."""
+    from boulder_sweep.crash_tests.cases import NAMES, crash_test
+    from boulder_sweep.crash_tests.comparison import compare
+    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, read_history
+    from boulder_sweep.impact.simulation import simulate
+    from boulder_sweep.settings import load
+    from boulder_sweep.settings.model import PRESETS
+
+    history = read_history(measured, TEST_SIGNALS)
+    sweep = crash_test(case) if case in NAMES else load(case)
+    if sweep.n_designs != 1:
+        raise click.UsageError(f"--case {case} holds {sweep.n_designs:,} designs; a test is one")
+    end = float(history.time_s[-1])
+    horizon = max(end, 0.0) or None
+    trajectories: dict[str, Trajectory] = {p: simulate(sweep, readings=p, horizon_s=horizon) for p in PRESETS}
+    found = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
+    written = []
+    if out is not None:
+        from boulder_sweep.views.validation import draw_overlay
+
+        target = Path(out) / f"measured_{Path(measured).stem}.png"
+        draw_overlay(sweep.name, trajectories, history, target)
+        written.append(str(target))
+    return found, written

@@ -1,0 +1,1 @@
+"""Crash tests and crash pulses held against the model."""

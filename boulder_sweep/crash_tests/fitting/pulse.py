@@ -1,0 +1,81 @@
+"""A rigid-wall crash pulse: one or more signals over the time since first touch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from boulder_sweep.crash_tests.measured import PULSE_SIGNALS, TimeHistory, read_history
+from boulder_sweep.crash_tests.rigid_wall import RigidWall
+from boulder_sweep.errors import FitError
+
+RESPONSES: dict[str, Callable[[RigidWall, np.ndarray], np.ndarray]] = {
+    "displacement": RigidWall.displacement,
+    "velocity": RigidWall.velocity,
+    "acceleration": RigidWall.acceleration,
+}
+"""What a Maxwell element answers to each signal."""
+UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+FEWEST_SAMPLES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse:
+    """A rigid-wall crash pulse.
+
+    Attributes
+    ----------
+    name : str
+        Where it comes from.
+    time_s : ndarray, shape (n,)
+        Times since first touch [s], ascending, from 0 on.
+    signals : dict of str to ndarray, shape (n,)
+        ``displacement`` [m], ``velocity`` [m/s], ``acceleration`` [m/s^2], one or more; NaN in gaps.
+    """
+
+    name: str
+    time_s: np.ndarray
+    signals: dict[str, np.ndarray]
+
+
+def read_pulse(path: str | Path) -> Pulse:
+    """Read a crash pulse from a CSV file; see `boulder_sweep.crash_tests.measured` for its header.
+
+    Raises
+    ------
+    SettingsError
+        The file is not valid.
+    FitError
+        Its signals contradict the direction of an impact.
+    """
+    return pulse_of(read_history(path, PULSE_SIGNALS))
+
+
+def pulse_of(history: TimeHistory) -> Pulse:
+    """Return the part of a measured history from first touch on; a deceleration becomes an acceleration.
+
+    Raises
+    ------
+    FitError
+        Fewer than 8 samples are left, or the vehicle seems to be accelerated by the wall.
+    """
+    signals = dict(history.signals)
+    if "deceleration" in signals:
+        if "acceleration" in signals:
+            raise FitError(f"{history.path}: holds both acceleration and deceleration; give one of them")
+        signals["acceleration"] = -signals.pop("deceleration")
+    after = history.time_s >= 0.0
+    time = history.time_s[after]
+    signals = {name: values[after] for name, values in signals.items()}
+    for name, values in signals.items():
+        if np.isfinite(values).sum() < FEWEST_SAMPLES:
+            raise FitError(f"{history.path}: {name} has fewer than {FEWEST_SAMPLES} values from first touch (t = 0) on")
+    if "acceleration" in signals and np.nanmean(signals["acceleration"]) > 0.0:
+        raise FitError(
+            f"{history.path}: the acceleration is positive, as if the wall pushed the vehicle on; "
+            f"if it counts slowing down as positive, name the column deceleration"
+        )
+    return Pulse(str(history.path), time, signals)

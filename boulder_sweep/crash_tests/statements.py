@@ -1,0 +1,178 @@
+"""What the paper says of its crash tests in words and numbers, and what the model gives for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_sweep.crash_tests.convergence import PAPERS_N
+from boulder_sweep.crash_tests.tables import Table
+
+if TYPE_CHECKING:
+    from boulder_sweep.crash_tests.convergence import Convergence
+    from boulder_sweep.crash_tests.rigid_wall import RigidWall
+    from boulder_sweep.impact.trajectory import Trajectory
+
+    Trajectories = Mapping[tuple[str, str], Trajectory]
+
+CLOSE_UNTIL_S = 0.1
+CLOSE_ENOUGH_S = 0.03
+"""The paper reads "approximately 0.1 s" off a figure; 20 deg must fall within so much of it."""
+NO_CHANGE_DEG = 0.01
+"""What "no change" may mean in a figure."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One statement of the paper.
+
+    Attributes
+    ----------
+    section : str
+        Where it stands.
+    says : str
+        What it says, in short.
+    model_gives : str
+        What the model gives, under both presets.
+    holds : bool or None
+        Whether that agrees; None where the text gives nothing to check it by.
+    """
+
+    section: str
+    says: str
+    model_gives: str
+    holds: bool | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return asdict(self)
+
+
+def statement_table(found: list[Statement]) -> Table:
+    """Return statements as a table."""
+    table = Table(("section", "the paper says", "the model gives", "consistent"))
+    words = {True: "yes", False: "NO", None: "cannot be checked"}
+    for statement in found:
+        table.add(statement.section, statement.says, statement.model_gives, words[statement.holds])
+    return table
+
+
+def statements(trajectories: Trajectories, study: Convergence, wall: RigidWall) -> list[Statement]:
+    """Hold every statement of the paper against the model.
+
+    Parameters
+    ----------
+    trajectories
+        By test and preset.
+    study
+        Element sums against the closed form.
+    wall
+        The paper's truck against a rigid wall.
+    """
+    presets = list(dict.fromkeys(preset for _, preset in trajectories))
+    abg = {preset: trajectories["abg", preset] for preset in presets}
+    rwg = {preset: trajectories["rwg", preset] for preset in presets}
+    return [*_black(abg), *_white(rwg, abg), *_method(study, wall, presets)]
+
+
+def _black(abg: Mapping[str, Trajectory]) -> list[Statement]:
+    reached = {preset: t.motion.outcome.t_limit for preset, t in abg.items()}
+    near = all(abs(t - CLOSE_UNTIL_S) < CLOSE_ENOUGH_S for t in reached.values())
+    return [
+        Statement(
+            "3.3",
+            "American Black Granite: very large movement of the boulder, penetration by the vehicle (it failed)",
+            _each(abg, lambda t: f"{t.verdict}, {t.reason}"),
+            all(t.verdict == "fail" for t in abg.values()),
+        ),
+        Statement(
+            "3.3",
+            "model and test match very closely until about 0.1 s and diverge after a rotation of 20°",
+            "20° are passed at " + _each(abg, lambda t: f"{t.motion.outcome.t_limit:.4f} s"),
+            near,
+        ),
+        Statement(
+            "3.3",
+            "the boulder flipped up and out of the ground",
+            "largest rotation " + _each(abg, lambda t: f"{_rotation(t):.0f}°") + ", far beyond where the model holds",
+            all(_rotation(t) > 90.0 for t in abg.values()),
+        ),
+    ]
+
+
+def _white(rwg: Mapping[str, Trajectory], abg: Mapping[str, Trajectory]) -> list[Statement]:
+    calmer = all(_rotation(rwg[p]) < _rotation(abg[p]) and _moved(rwg[p]) < _moved(abg[p]) for p in rwg)
+    return [
+        Statement(
+            "3.4",
+            "Rockville White Granite: a pass, the vehicle did not penetrate",
+            _each(rwg, lambda t: f"{t.verdict}, penetration {t.summary()['penetration_m']:.2f} m"),
+            all(t.verdict == "pass" and t.summary()["penetration_m"] <= 1.0 for t in rwg.values()),
+        ),
+        Statement(
+            "3.4",
+            "the boulder translated and rotated slightly, considerably less than the smaller one",
+            _each(rwg, lambda t: f"{_rotation(t):.2f}°, {_moved(t):.3f} m"),
+            calmer,
+        ),
+        Statement(
+            "3.4",
+            "the front of the truck rebounded",
+            "vehicle moves back at up to " + _each(rwg, lambda t: f"{-t.vehicle_velocity_m_s.min():.2f} m/s"),
+            all(t.vehicle_velocity_m_s.min() < 0.0 for t in rwg.values()),
+        ),
+        Statement(
+            "3.4",
+            "vehicle motion matches well until about 1 m of displacement, where the chassis stiffens",
+            "largest displacement " + _each(rwg, lambda t: f"{t.vehicle_displacement_m.max():.2f} m"),
+            all(0.5 < t.vehicle_displacement_m.max() < 2.0 for t in rwg.values()),
+        ),
+        Statement(
+            "4",
+            "the model over-estimates rotation and translation of this boulder: the safe side",
+            "the test must have stayed below " + _each(rwg, lambda t: f"{_rotation(t):.1f}°"),
+            None,
+        ),
+        Statement("4", "vehicle motion was not conservative", "no measured number in the text", None),
+    ]
+
+
+def _method(study: Convergence, wall: RigidWall, presets: list[str]) -> list[Statement]:
+    left = {preset: study.difference("rwg", preset, PAPERS_N) for preset in presets}
+    return [
+        Statement(
+            "3.1",
+            f"no change in the results above N = {PAPERS_N} elements",
+            "rotation differs from N → ∞ by " + _list({p: f"{value:+.4f}°" for p, value in left.items()}),
+            all(abs(value) < NO_CHANGE_DEG for value in left.values()),
+        ),
+        Statement(
+            "3.2",
+            "spring 3103 kN/m and damper 138.91 kN·s/m describe the rigid-wall impact at 13.4 m/s very well",
+            f"largest crush {wall.max_displacement_m:.3f} m, peak force {wall.peak_force / 1e3:.0f} kN, "
+            f"rebound {-wall.rebound_speed_m_s:.2f} m/s",
+            None,
+        ),
+    ]
+
+
+def _rotation(trajectory: Trajectory) -> float:
+    return float(np.degrees(trajectory.motion.outcome.maxima.theta))
+
+
+def _moved(trajectory: Trajectory) -> float:
+    return float(trajectory.motion.outcome.maxima.x_b)
+
+
+def _each(found: Mapping[str, Trajectory], words: Any) -> str:
+    return _list({preset: words(trajectory) for preset, trajectory in found.items()})
+
+
+def _list(texts: Mapping[str, str]) -> str:
+    """Texts by preset in a line; one text where they are all the same."""
+    if len(set(texts.values())) == 1:
+        return next(iter(texts.values()))
+    return "; ".join(f"{text} ({preset.replace('_', ' ')})" for preset, text in texts.items())

@@ -1,0 +1,86 @@
+"""The errors meant for a user, and the exit codes of the command line.
+
+Everything that a user can cause or mend is a `BoulderSweepError`: its text says what is wrong and what would be right,
+and its exit code is what the command ends with. Any other exception is a defect of this package.
+"""
+
+from __future__ import annotations
+
+import signal
+
+EXIT_DONE = 0
+EXIT_INTERNAL = 1
+EXIT_WRONG_USE = 2
+EXIT_SOME_ROWS_FAILED = 3
+EXIT_CONFLICT = 4
+
+
+class BoulderSweepError(Exception):
+    """Base of all errors meant for a user.
+
+    Attributes
+    ----------
+    exit_code : int
+        Exit code of the command line.
+    """
+
+    exit_code = EXIT_WRONG_USE
+
+    def user_message(self) -> str:
+        """Return what the command line prints."""
+        return f"error: {self}"
+
+
+class BackendError(BoulderSweepError):
+    """Workers are not available; the text says why and what to do."""
+
+
+class ComparisonError(BoulderSweepError):
+    """Measurement and simulation cannot be compared."""
+
+
+class FitError(BoulderSweepError):
+    """A crash pulse cannot be fitted."""
+
+
+class HistoryFileError(BoulderSweepError):
+    """A time history cannot be written."""
+
+
+class NothingToMeasureError(BoulderSweepError, ValueError):
+    """None of the designs of a sample can be computed."""
+
+
+class PictureError(BoulderSweepError):
+    """A picture cannot be made."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was stopped by a signal; the rows it finished are safe and it can be resumed.
+
+    Not a `BoulderSweepError`, because code that handles errors must not swallow an interruption.
+
+    Parameters
+    ----------
+    signum
+        The signal.
+    rows_done, rows
+        Rows that are safe on the disk, and rows of the whole table.
+    resume_command
+        Command that resumes the run.
+    """
+
+    def __init__(self, signum: int, rows_done: int = 0, rows: int = 0, resume_command: str = ""):
+        self.signum = signum
+        self.rows_done, self.rows = rows_done, rows
+        self.resume_command = resume_command
+        name = signal.Signals(signum).name
+        text = f"interrupted by {name}"
+        if resume_command:
+            text += f"; {rows_done:,} of {rows:,} rows are safe. Go on with: {resume_command}"
+        super().__init__(text)
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of the process, as the shell expects it: 130 for SIGINT, 143 for SIGTERM."""
+        return 128 + self.signum

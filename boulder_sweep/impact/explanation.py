@@ -1,0 +1,153 @@
+"""One row of a result, computed again from the result alone.
+
+A result says in its metadata what it was computed with. That, and the inputs in the row, are enough to compute the row
+once more, to compare it bit for bit, and to show what happened over time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_kernels import Control, Readings
+from boulder_sweep.columns import INPUT_COLUMNS, OUTCOME_COLUMNS
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge.evaluation import Evaluation
+from boulder_sweep.judge.verdict import Limits
+from boulder_sweep.settings import Sweep
+from boulder_sweep.settings.model import Criterion, Model, ReadingChoice, SolverSettings
+from boulder_sweep.store.errors import OtherVersionError
+from boulder_sweep.store.manifest import load as load_manifest
+from boulder_sweep.store.provenance import differences, identity
+from boulder_sweep.store.reader import read_row
+from boulder_sweep.store.records import version_of
+from boulder_sweep.store.schema import part_table
+
+if TYPE_CHECKING:
+    from boulder_sweep.impact.trajectory import Trajectory
+
+__all__ = ["Explanation", "explain"]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What `explain` found.
+
+    Attributes
+    ----------
+    name : str
+        Name of the sweep.
+    design_id : int
+        Number of the row.
+    inputs : dict
+        Its inputs by the names of the table's columns.
+    stored, recomputed : dict
+        Its outcomes, as the table has them and as they come out now; None stands for null.
+    changed : tuple of str
+        What is different now from when the table was computed: versions, kernels, rules. Empty where nothing is.
+    trajectory : Trajectory or None
+        The impact over time; None where the design cannot be computed.
+    """
+
+    name: str
+    design_id: int
+    inputs: dict[str, float | None]
+    stored: dict[str, Any]
+    recomputed: dict[str, Any]
+    changed: tuple[str, ...]
+    trajectory: Trajectory | None
+
+    @property
+    def unequal(self) -> tuple[str, ...]:
+        """Outcomes that are not the same to the last bit."""
+        return tuple(name for name, value in self.stored.items() if not _same(value, self.recomputed[name]))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything but the trajectory as plain data."""
+        return {
+            "name": self.name,
+            "design_id": self.design_id,
+            "inputs": self.inputs,
+            "outcomes": self.stored,
+            "same_bits": not self.unequal,
+            "unequal": {name: [self.stored[name], self.recomputed[name]] for name in self.unequal},
+            "changed_since": list(self.changed),
+        }
+
+
+def explain(out: str | Path, design_id: int) -> Explanation:
+    """Compute one row of a result again, from the result alone.
+
+    Parameters
+    ----------
+    out
+        Folder that a sweep wrote; the row must be in a finished part.
+    design_id
+        Number of the row.
+
+    Returns
+    -------
+    Explanation
+        The row as stored and as recomputed, and its time history.
+
+    Raises
+    ------
+    StoreError
+        There is no result in the folder, or it is damaged.
+    IndexError
+        The table has no such row, or not yet.
+    """
+    folder = Path(out)
+    there = load_manifest(folder).identity
+    row = read_row(folder, design_id)
+    values = row.to_pylist()[0]
+    inputs = {name: values[name] for name in INPUT_COLUMNS}
+    try:
+        control, readings = Control(**there["control"]), Readings(**there["readings"])
+        sweep = _one_design(there["settings"], inputs, control)
+        stated = [there[part] for part in ("settings", "readings", "control", "accuracy")]
+    except (LookupError, TypeError, ValueError) as unfamiliar:
+        why = f"its settings are not those of this version: {unfamiliar}"
+        raise OtherVersionError(folder, why, version_of({"identity": there})) from unfamiliar
+    limits = Limits(control.theta_limit, sweep.criterion.rating)
+    block = sweep.block(0, 1)
+    judged = Evaluation(readings, control, limits)(block)
+    again = part_table(block, judged, {}).to_pylist()[0]
+    computable = not block.reasons[0]
+    return Explanation(
+        name=sweep.name,
+        design_id=design_id,
+        inputs=inputs,
+        stored={name: values[name] for name in OUTCOME_COLUMNS},
+        recomputed={name: again[name] for name in OUTCOME_COLUMNS},
+        changed=tuple(differences(there, identity(*stated))),
+        trajectory=simulate(sweep) if computable else None,
+    )
+
+
+def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control) -> Sweep:
+    """Return a sweep of the one design, with the model and the step its table was computed with."""
+    readings = ReadingChoice(**settings["model"]["readings"])
+    return Sweep(
+        name=settings["name"],
+        path=None,
+        axes=(),
+        constants={name: float(value) for name, value in inputs.items() if value is not None},
+        criterion=Criterion(**settings["criterion"]),
+        model=Model(readings, control.elements),
+        solver=SolverSettings(
+            accuracy=None,
+            step_s=0.5 * control.h if control.error_estimate else control.h,
+            horizon_s=control.horizon,
+        ),
+    )
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Whether two values are the same to the last bit."""
+    if isinstance(a, float) and isinstance(b, float):
+        return np.float64(a).tobytes() == np.float64(b).tobytes()
+    return a == b

@@ -1,0 +1,213 @@
+"""One design with its time history: from a sweep, a file or a row of a table to a `Trajectory`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boulder_kernels import (
+    Control,
+    DesignTable,
+    Outcome,
+    OutcomeTable,
+    Readings,
+    Record,
+    constants_of,
+    no_record,
+    simulate_design,
+)
+from boulder_kernels.design import design_at
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.impact.trajectory import Motion, Trajectory
+from boulder_sweep.judge.evaluation import control_of, design_table, readings_of
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.verdict import Limits, judge
+from boulder_sweep.settings import Sweep, load
+from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
+
+__all__ = ["Trajectory", "simulate"]
+
+SAMPLE_S = 0.0005
+"""Time between two samples of a trajectory [s]."""
+MOST_SAMPLES = 1_000_000
+BEFORE_THE_END = 1.0 - 1e-14
+"""The last sample is taken so little before the end of the simulation that rounding cannot put it behind."""
+
+_DEFAULTS = {"strain_rate_factor": 1.0, "bumper_height_m": 0.5, "hood_height_m": 1.4, "bed_offset_m": 2.9}
+"""Inputs that a design given as a mapping may leave out, as a file may."""
+
+
+def simulate(
+    design: Sweep | str | Path | Mapping[str, Any],
+    design_id: int = 0,
+    *,
+    readings: str | ReadingChoice | None = None,
+    soil_elements: int | None = None,
+    step_s: float | None = None,
+    horizon_s: float | None = None,
+    sample_s: float = SAMPLE_S,
+) -> Trajectory:
+    """Simulate one design with its time history, beyond the rotation limit: to the horizon or half a turn.
+
+    Parameters
+    ----------
+    design : Sweep, path, or mapping
+        A sweep, a file of settings, or one design by the names and units of the table's input columns (a row
+        of a result table will do; ``embedment_ratio`` may stand in for ``embedment_depth_m``). What else decides a
+        verdict then has the defaults of a file: 20 deg, P1, corrected readings, balanced accuracy, 1 s.
+    design_id : int
+        Number of the design within the sweep.
+    readings : str or ReadingChoice, optional
+        ``as_printed``, ``corrected``, or single readings; those of the sweep by default.
+    soil_elements : int, optional
+        Number of soil elements, 0 for the closed form; as the sweep says by default.
+    step_s : float, optional
+        Step of the integrator [s], used as it is; by default what the accuracy of the sweep asks for.
+    horizon_s : float, optional
+        Time simulated [s]; that of the sweep by default.
+    sample_s : float
+        Time between two samples of the trajectory [s]. Maxima do not depend on it.
+
+    Returns
+    -------
+    Trajectory
+        Arrays in SI units. No samples where the truck passes over the boulder or the design cannot be
+        computed; ``summary()`` then says why.
+
+    Raises
+    ------
+    SettingsError
+        The file is not valid.
+    IndexError
+        There is no such design.
+    ValueError
+        An input is missing, or the times asked for make no sense.
+
+    Notes
+    -----
+    A row of ``sweep run`` stops where the rotation reaches its limit, and as soon as it is proved that nothing
+    reported can still grow. This simulation does neither, so for a boulder that overturns the maxima are those
+    of the whole time and not those up to the limit. Verdict, reason and time to the limit follow the same
+    rules and agree. (Not where a design is so stiff, thousands of times what is met in practice, that it needs more
+    steps than are allowed beyond the limit and not before it: it is refused here.) Beyond the limit the model no
+    longer holds: what is shown there is how it goes wrong.
+    """
+    sweep = _as_sweep(design)
+    sweep = _changed(sweep, readings, soil_elements, step_s, horizon_s)
+    block = sweep.block(design_id, design_id + 1)
+    inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
+    if block.reasons[0]:
+        raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
+    table = design_table(block)
+    one, how = design_at(table, 0), readings_of(sweep)
+    control = _control(sweep)
+    times = _sample_times(control.horizon, sample_s)
+    record = _empty_record(times)
+    outcome = simulate_design(one, how, control, record)
+    limits = Limits(control.theta_limit, sweep.criterion.rating)
+    row = _outcome_row(outcome)
+    if control.error_estimate:
+        coarser = simulate_design(one, how, control._replace(halved=False), no_record())
+        _estimate(row, _outcome_row(coarser), table, how)
+    judged = judge(row, table.L, np.array([inputs["bed_offset_m"]]), limits)
+    motion = Motion(one, how, constants_of(one, how, control.elements), control, _kept(record, times, outcome), outcome)
+    return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
+
+
+def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
+    """Return what was asked for as a sweep."""
+    if isinstance(design, Sweep):
+        return design
+    if isinstance(design, str | Path):
+        return load(design)
+    given = dict(design.items())
+    names = (*INPUT_COLUMNS, "embedment_ratio")
+    constants = _DEFAULTS | {name: float(given[name]) for name in names if name in given}
+    if "embedment_depth_m" in constants:
+        constants.pop("embedment_ratio", None)
+    optional = {"impact_height_m", "embedment_depth_m" if "embedment_ratio" in constants else ""}
+    missing = [name for name in INPUT_COLUMNS if name not in constants and name not in optional]
+    if missing:
+        raise ValueError(f"the design lacks {', '.join(missing)}")
+    return Sweep(name="design", path=None, axes=(), constants=constants)
+
+
+def _changed(
+    sweep: Sweep,
+    readings: str | ReadingChoice | None,
+    soil_elements: int | None,
+    step_s: float | None,
+    horizon_s: float | None,
+) -> Sweep:
+    """Return the sweep with what the caller wants otherwise."""
+    model, solver = sweep.model, sweep.solver
+    if readings is not None:
+        choice = ReadingChoice.of_preset(readings) if isinstance(readings, str) else readings
+        if isinstance(readings, str) and choice.preset != readings:
+            raise ValueError(f"readings are 'as_printed', 'corrected' or a ReadingChoice, not {readings!r}")
+        model = Model(choice, model.soil_elements)
+    if soil_elements is not None:
+        if soil_elements < 0:
+            raise ValueError("soil_elements must be 0 (closed form) or the number of elements")
+        model = Model(model.readings, soil_elements)
+    if step_s is not None or horizon_s is not None:
+        for name, value in (("step_s", step_s), ("horizon_s", horizon_s)):
+            if value is not None and not 0.0 < value < math.inf:
+                raise ValueError(f"{name} must be a positive time in seconds, not {value}")
+        solver = SolverSettings(
+            accuracy=solver.accuracy if step_s is None else None,
+            step_s=solver.step_s if step_s is None else float(step_s),
+            horizon_s=solver.horizon_s if horizon_s is None else float(horizon_s),
+        )
+    return dataclasses.replace(sweep, model=model, solver=solver)
+
+
+def _control(sweep: Sweep) -> Control:
+    """How the reported solution is integrated: with half the step where a coarser one estimates its error."""
+    control = control_of(sweep, accuracy_of(sweep))
+    return control._replace(stop_at_limit=False, halved=control.error_estimate)
+
+
+def _sample_times(horizon: float, sample_s: float) -> np.ndarray:
+    """Times of the samples [s], both ends included."""
+    if not sample_s > 0.0 or horizon / sample_s > MOST_SAMPLES:
+        raise ValueError(
+            f"sample_s must be positive and give at most {MOST_SAMPLES:,} samples over {horizon} s, not {sample_s}"
+        )
+    count = max(round(horizon / sample_s), 1)
+    return np.linspace(0.0, horizon, count + 1)
+
+
+def _empty_record(times: np.ndarray) -> Record:
+    """Return a record to be filled at the given times; NaN where the simulation does not get."""
+    n = len(times)
+    asked = np.minimum(times, times[-1] * BEFORE_THE_END)
+    states, exchanged = np.full((n, 6), np.nan), np.full((n, 4), np.nan)
+    return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged)
+
+
+def _outcome_row(outcome: Outcome) -> OutcomeTable:
+    """Return one outcome as a table of one row, without an estimate of its error."""
+    m = outcome.maxima
+    row = (m.theta, m.x_b, m.x_v, m.F_v, outcome.t_limit, outcome.t_end, math.nan, math.nan)
+    return OutcomeTable(np.array([outcome.status], np.int8), *(np.array([value]) for value in row))
+
+
+def _estimate(row: OutcomeTable, coarser: OutcomeTable, table: DesignTable, how: Readings) -> None:
+    """Write into a row its numerical errors, by the rule that a sweep has for its rows."""
+    estimate_errors(coarser, row, table, SAFETY if how.restoring_gravity else SAFETY_PRINTED)
+    if math.isnan(coarser.t_limit[0]) != math.isnan(row.t_limit[0]):
+        # That rule tells by the status which solution reached the limit; here they go on beyond it.
+        row.theta_error[0] = row.x_error[0] = math.inf
+
+
+def _kept(record: Record, times: np.ndarray, outcome: Outcome) -> Record:
+    """Return the samples that the simulation reached, at the times asked for; none where it failed."""
+    reached = np.isfinite(record.states).all(axis=1) & math.isfinite(outcome.t_end)
+    return Record(times[reached], *(field[reached] for field in record[1:]))

@@ -1,0 +1,266 @@
+"""The time history of one impact: arrays in SI units, what they amount to, and how to draw and keep them."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
+from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.drawing import draw
+from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
+from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY
+from boulder_sweep.judge.judged import RATINGS, VERDICTS, Judged
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_PEAK_TIMES = {
+    "max_rotation_deg": ("time_of_max_rotation_s", "t_theta"),
+    "max_displacement_m": ("time_of_max_displacement_s", "t_x_b"),
+    "max_vehicle_displacement_m": ("time_of_max_vehicle_displacement_s", "t_x_v"),
+    "peak_force_kN": ("time_of_peak_force_s", "t_F_v"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What the kernels were given and what they returned, in their own terms."""
+
+    design: Design
+    readings: Readings
+    constants: Constants
+    control: Control
+    record: Record
+    outcome: Outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One impact over time. Made by `boulder_sweep.simulate`.
+
+    Arrays have the shape (n,), one value per sample, in SI units and radians; n is 0 where nothing moved because
+    the truck passes over the boulder, or where the design could not be computed.
+
+    Attributes
+    ----------
+    name : str
+        Name of the sweep the design belongs to.
+    design_id : int
+        Its number there.
+    inputs : dict of str to float
+        The design by the names and units of the table's input columns.
+    settings : dict
+        The resolved settings of the sweep.
+    time_s : ndarray
+        Time since the first touch.
+    boulder_displacement_m, boulder_velocity_m_s : ndarray
+        Displacement x_b and velocity of the common centre of mass of boulder and lumped soil.
+    boulder_centre_displacement_m : ndarray
+        Displacement of the boulder's own centre of mass, what a camera tracks:
+        x_b + (L/2 - c_x)(cos theta - 1) + (H/2 - c_y) sin theta (Eqs 53 to 55, with the bracket of Eq 55 in its
+        place, its sign put right, and the value at rest subtracted).
+    rotation_rad, angular_velocity_rad_s : ndarray
+        Rotation theta_b of the boulder, positive with its top away from the vehicle, and its rate.
+    vehicle_displacement_m, vehicle_velocity_m_s, vehicle_acceleration_m_s2 : ndarray
+        Motion of the vehicle.
+    contact_force_N, contact_moment_N_m : ndarray
+        Force F_v of the vehicle on the boulder (Eq 47), and its moment about the common centre of mass (Eq 48).
+    soil_force_N, soil_moment_N_m : ndarray
+        Sums of the soil's forces and moments (Eqs 19, 20).
+    restoring_moment_N_m : ndarray
+        Restoring moment M_R of the boulder's weight (Eqs 37 to 39).
+    rotation_mode, in_contact : ndarray of str
+        Modes of the motion in words, see `boulder_sweep.impact.history.MODE_NAMES`; ``touching`` or ``coasting``.
+    judged : Judged
+        The outcome columns of this one row.
+    motion : Motion
+        What the kernels were given and what they returned.
+    """
+
+    name: str
+    design_id: int
+    inputs: dict[str, float]
+    settings: dict[str, Any]
+    time_s: np.ndarray
+    boulder_displacement_m: np.ndarray
+    boulder_centre_displacement_m: np.ndarray
+    boulder_velocity_m_s: np.ndarray
+    rotation_rad: np.ndarray
+    angular_velocity_rad_s: np.ndarray
+    vehicle_displacement_m: np.ndarray
+    vehicle_velocity_m_s: np.ndarray
+    vehicle_acceleration_m_s2: np.ndarray
+    contact_force_N: np.ndarray
+    contact_moment_N_m: np.ndarray
+    soil_force_N: np.ndarray
+    soil_moment_N_m: np.ndarray
+    restoring_moment_N_m: np.ndarray
+    rotation_mode: np.ndarray
+    in_contact: np.ndarray
+    judged: Judged
+    motion: Motion
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        design_id: int,
+        inputs: dict[str, float],
+        settings: dict[str, Any],
+        motion: Motion,
+        judged: Judged,
+    ) -> Trajectory:
+        """Work out the whole time history from what the kernels recorded."""
+        record, c = motion.record, motion.constants
+        x_b, v_b, theta, omega, x_v, v_v = record.states.T
+        along, up = 0.5 * motion.design.L - c.c_x, 0.5 * motion.design.H - c.c_y
+        forces = forces_along(record, motion.design, motion.readings, c)
+        return cls(
+            name=name,
+            design_id=design_id,
+            inputs=inputs,
+            settings=settings,
+            time_s=record.times,
+            boulder_displacement_m=x_b,
+            boulder_centre_displacement_m=x_b - along * 2.0 * np.sin(0.5 * theta) ** 2 + up * np.sin(theta),
+            boulder_velocity_m_s=v_b,
+            rotation_rad=theta,
+            angular_velocity_rad_s=omega,
+            vehicle_displacement_m=x_v,
+            vehicle_velocity_m_s=v_v,
+            **forces,
+            rotation_mode=np.array([MODE_NAMES[int(mode)] for mode in record.turning], dtype=object),
+            in_contact=np.where(record.touching, "touching", "coasting").astype(object),
+            judged=judged,
+            motion=motion,
+        )
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.time_s)
+
+    def __repr__(self) -> str:
+        """Say what it is in a line."""
+        words = " / ".join(word for word in (self.verdict, self.reason) if word)
+        return f"<Trajectory {self.name} design {self.design_id}: {len(self)} samples, {words}>"
+
+    @property
+    def verdict(self) -> str:
+        """``pass``, ``fail``, ``undecided`` or ``error``."""
+        return VERDICTS[int(self.judged.verdict[0])]
+
+    @property
+    def reason(self) -> str:
+        """Why; empty for a pass."""
+        return self.judged.reasons[int(self.judged.reason[0])]
+
+    def energy(self) -> EnergyLedger:
+        """Return where the vehicle's energy is at every sample."""
+        return ledger_of(self.motion.record, self.motion.design, self.motion.readings, self.motion.constants)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the outcome in the names and units of the table, with the times of the maxima.
+
+        Returns
+        -------
+        dict
+            Plain data; None where there is no value. ``energy_residual`` is what the energy ledger fails to account
+            for, at most, as a share of the energy at first touch: a check of this very simulation. The readings and
+            the representation of the soil close it.
+        """
+        found: dict[str, Any] = {"name": self.name, "design_id": self.design_id}
+        for name in OUTCOME_COLUMNS:
+            value = getattr(self.judged, name)[0]
+            if name in ("verdict", "reason"):
+                found[name] = getattr(self, name)
+            elif name == "rating":
+                found[name] = RATINGS[int(value)] if value >= 0 else None
+            else:
+                found[name] = _plain(value)
+            if name in _PEAK_TIMES:
+                key, field = _PEAK_TIMES[name]
+                found[key] = _plain(getattr(self.motion.outcome.maxima, field))
+        model = self.settings["model"]
+        found["energy_residual"] = _plain(self.energy().largest_residual)
+        return found | {"preset": model["preset"], "readings": model["readings"], "soil": model["soil"]}
+
+    def columns(self, *, energy: bool = False) -> dict[str, np.ndarray]:
+        """Return the time history by the names of its columns, with the energy ledger where asked for."""
+        found = {spec.name: getattr(self, spec.name) for spec in HISTORY}
+        if energy:
+            ledger = self.energy()
+            for spec in ENERGY:
+                found[spec.name] = getattr(ledger, spec.name.removeprefix("energy_"))
+        return found
+
+    def to_arrow(self, *, energy: bool = False) -> pa.Table:
+        """Return the time history as an Arrow table with unit and meaning of every column in its field metadata."""
+        # pyarrow is heavy, and only files need it.
+        from boulder_sweep.impact.trajectory_file import arrow_table
+        from boulder_sweep.store.provenance import file_metadata, identity
+
+        found = identity(self.settings, self.settings["model"]["readings"], self.motion.control._asdict())
+        repeat = f"boulder_sweep.simulate({self.name!r}, {self.design_id})"
+        return arrow_table(self.columns(energy=energy), file_metadata(found, repeat))
+
+    def to_parquet(self, path: str | Path, *, energy: bool = False) -> None:
+        """Write the time history to a Parquet file.
+
+        Parameters
+        ----------
+        path
+            The file; replaced where it exists.
+        energy
+            Also write the energy ledger.
+
+        Raises
+        ------
+        HistoryFileError
+            The name does not end in ``.parquet``, its folder does not exist, or it cannot be written.
+        """
+        from boulder_sweep.impact.trajectory_file import write  # pyarrow is heavy, and only files need it
+
+        write(self.to_arrow(energy=energy), path)
+
+    def plot(self, path: str | Path) -> None:
+        """Draw rotation, displacements and force over time.
+
+        Parameters
+        ----------
+        path
+            Picture to write, its kind by its ending (.png, .svg, .pdf).
+
+        Raises
+        ------
+        PictureError
+            There is nothing to draw, the kind is unknown, or matplotlib is not installed.
+        """
+        draw("trajectory", "draw_trajectory", self, path)
+
+    def plot_energy(self, path: str | Path) -> None:
+        """Draw where the vehicle's energy goes, stacked over time; see `plot`."""
+        draw("energy", "draw_energy", self, path)
+
+    def plot_side_view(self, path: str | Path, *, time_s: float | None = None) -> None:
+        """Draw the impact from the side at one instant, by default when the contact force peaks; see `plot`."""
+        draw("side_view", "draw_still", self, path, time_s=time_s)
+
+    def animate(self, path: str | Path) -> None:
+        """Draw a moving side view: .gif, .mp4 (needs ffmpeg) or .html; see `plot`."""
+        draw("animation", "animate", self, path)
+
+    def to_json(self) -> str:
+        """Return the summary as one JSON object."""
+        return json.dumps(self.summary())
+
+
+def _plain(value: Any) -> float | None:
+    """Number for JSON; None for NaN."""
+    number = float(value)
+    return number if math.isfinite(number) else None

@@ -1,0 +1,1 @@
+"""A block of designs becomes judged rows: simulation, accuracy, verdict."""

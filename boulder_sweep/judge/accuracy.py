@@ -1,0 +1,80 @@
+"""From an accuracy asked for to the step that gives it, and what to say of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+
+class Steps(NamedTuple):
+    """How the time is cut into steps."""
+
+    step_s: float
+    """Length of a step [s]; where errors are estimated, the solution reported has half of it."""
+    locate_yield: bool = False
+    """Whether steps also end where the soil reaches its ultimate resistance. A step costs a little more then, and the
+    error falls with the fifth power of its length in place of the third."""
+
+
+STEPS = {"fast": Steps(0.012), "balanced": Steps(0.008), "fine": Steps(0.004, locate_yield=True)}
+"""What is behind each named accuracy."""
+STEPS_PRINTED = {"fast": Steps(0.006), "balanced": Steps(0.004), "fine": Steps(0.002, locate_yield=True)}
+"""The same where the restoring moment is read as printed: it jumps where the angular velocity passes zero, and a
+design that grazes this edge needs shorter steps to come down on the right side."""
+LADDER = (
+    *(Steps(0.012), Steps(0.008)),
+    *(Steps(1e-3 * step, locate_yield=True) for step in (8, 6, 4, 3, 2, 1.5, 1, 0.75, 0.5, 0.375, 0.25, 0.125)),
+)
+"""What a pilot chooses from, the cheapest first. Longer steps save nothing: a design's events cost the same."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How accurately a sweep is computed.
+
+    Parameters
+    ----------
+    asked
+        ``fast``, ``balanced``, ``fine``, ``0.01 deg`` or ``step``.
+    steps
+        Steps of the integrator; where the error is estimated, the finer of two solutions, by half of them, is reported.
+    error_estimate
+        Whether the error of every row is estimated, and verdicts nearer to a limit than it are undecided.
+    achieved_deg
+        Quantile `QUANTILE` of the estimated error of the rotation over the designs of a pilot [deg]; None where the
+        accuracy asked for is no number.
+    pilot_designs
+        Designs of the pilot; 0 without one.
+    met
+        Whether what was asked for was achieved.
+    """
+
+    asked: str
+    steps: Steps
+    error_estimate: bool
+    achieved_deg: float | None = None
+    pilot_designs: int = 0
+    met: bool = True
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data, for the metadata of the table."""
+        found: dict[str, Any] = {
+            "asked": self.asked,
+            "step_s": self.steps.step_s,
+            "reported_step_s": 0.5 * self.steps.step_s if self.error_estimate else self.steps.step_s,
+            "yield_located": self.steps.locate_yield,
+            "verdicts": "guarded by the estimated error" if self.error_estimate else "unguarded: no error is estimated",
+        }
+        if self.achieved_deg is not None:
+            found["pilot_designs"] = self.pilot_designs
+            found["estimated_error_p99_9_deg"] = self.achieved_deg
+            found["met"] = self.met
+        return found
+
+
+def steps_of(sweep: Sweep) -> dict[str, Steps]:
+    """Return what is behind the named accuracies, for the readings of a sweep."""
+    return STEPS_PRINTED if sweep.model.readings.restoring == "printed" else STEPS

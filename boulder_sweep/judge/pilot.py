@@ -1,0 +1,129 @@
+"""From an accuracy asked for to the time steps: by its name, or by a pilot that simulates a sample of the designs."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, simulate_table
+from boulder_sweep.judge.accuracy import LADDER, Accuracy, Steps, steps_of
+from boulder_sweep.judge.evaluation import design_table, readings_of
+from boulder_sweep.judge.sampling import sampled_rows
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+DESIGNS = 4096
+"""Designs of a pilot with the soil in closed form."""
+FEWEST_DESIGNS = 256
+"""And at least, with any number of soil elements."""
+ELEMENTS_AS_FAST = 16
+"""Number of soil elements that take about the time of the closed form."""
+QUANTILE = 0.999
+"""Share of the designs whose estimated error shall be no larger than what was asked for."""
+AT_ONCE = 256
+"""Designs simulated at once: an interruption waits for so many."""
+
+
+def accuracy_of(sweep: Sweep) -> Accuracy:
+    """Return how accurately a sweep is computed.
+
+    Where the accuracy is a number, a pilot on a sample of the sweep chooses the step. The sample and so the step depend
+    on nothing but the settings.
+
+    Parameters
+    ----------
+    sweep
+        The sweep, with a step, an accuracy by name, or the error admitted [deg].
+    """
+    solver = sweep.solver
+    if solver.step_s is not None:
+        return Accuracy("step", Steps(solver.step_s), error_estimate=False)
+    if isinstance(solver.accuracy, float):
+        return pilot(sweep, solver.accuracy)
+    name = str(solver.accuracy)
+    return Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
+
+
+@lru_cache(maxsize=8)
+def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
+    """Choose the step of a sweep by a pilot on a sample of its designs.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    wanted_deg
+        Error of the rotation admitted [deg], in `QUANTILE` of the designs.
+
+    Returns
+    -------
+    Accuracy
+        The first steps of `LADDER` that meet it or, where none does, those that come nearest.
+    """
+    table, _ = sampled_columns(sweep, pilot_size(sweep.model.soil_elements))
+    readings = readings_of(sweep)
+    found: list[tuple[float, int]] = []
+    limit = math.radians(sweep.criterion.max_rotation_deg)
+    for rung, steps in enumerate(LADDER):
+        control = Control(
+            steps.step_s,
+            sweep.solver.horizon_s,
+            limit,
+            sweep.model.soil_elements,
+            error_estimate=True,
+            locate_yield=steps.locate_yield,
+        )
+        # Rounded so that another processor, off in the last bits, finds the same.
+        achieved = float(f"{estimated_error_deg(table, readings, control):.3g}")
+        found.append((achieved, rung))
+        if achieved <= wanted_deg:
+            break
+    achieved, rung = min(found)
+    return Accuracy(
+        asked=f"{wanted_deg:g} deg",
+        steps=LADDER[rung],
+        error_estimate=True,
+        achieved_deg=achieved,
+        pilot_designs=table.L.size,
+        met=achieved <= wanted_deg,
+    )
+
+
+def pilot_size(elements: int) -> int:
+    """Return how many designs a pilot has, by the number of soil elements (0: closed form)."""
+    return max(FEWEST_DESIGNS, DESIGNS * ELEMENTS_AS_FAST // max(elements, ELEMENTS_AS_FAST))
+
+
+def sampled_columns(sweep: Sweep, count: int) -> tuple[DesignTable, np.ndarray]:
+    """Return about so many designs of a sweep that can be computed, in the units of the kernels, and bed offsets."""
+    blocks = [sweep.block(row, row + 1) for row in sampled_rows(sweep, count).tolist()]
+    blocks = [block for block in blocks if not block.reasons.any]
+    if not blocks:
+        return DesignTable(*(np.empty(0) for _ in DesignTable._fields)), np.empty(0)
+    tables = [design_table(block) for block in blocks]
+    table = DesignTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
+    return table, np.concatenate([block.columns["bed_offset_m"].to_numpy() for block in blocks])
+
+
+def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+    """Simulate a table in pieces short enough for an interruption to wait for."""
+    pieces = [
+        simulate_table(DesignTable(*(column[at : at + AT_ONCE] for column in table)), readings, control)
+        for at in range(0, table.L.size, AT_ONCE)
+    ]
+    if not pieces:
+        return simulate_table(table, readings, control)
+    return OutcomeTable(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+
+
+def estimated_error_deg(table: DesignTable, readings: Readings, control: Control) -> float:
+    """Quantile of the estimated errors of the rotation [deg] where the limit was not reached; 0 where it always was."""
+    outcomes = simulated(table, readings, control)
+    counts = ~np.isnan(outcomes.theta_error) & (outcomes.status != Status.LIMIT)
+    if not counts.any():
+        return 0.0
+    return math.degrees(float(np.quantile(outcomes.theta_error[counts], QUANTILE, method="higher")))

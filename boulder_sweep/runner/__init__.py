@@ -1,0 +1,1 @@
+"""A whole sweep: blocks on workers, results in order, interruption and resume."""

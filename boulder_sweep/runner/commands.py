@@ -1,0 +1,29 @@
+"""The commands that repeat a run or go on with it, for people to copy."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+
+def repeat_command(sweep: Sweep) -> str:
+    """Return the command that computes the same table, the same on every machine."""
+    return f"sweep run {shlex.quote(sweep.path.name)}" if sweep.path else "boulder_sweep.run(sweep, out)"
+
+
+def resume_command(sweep: Sweep, out: Path, jobs: int | None, backend: str, scheduler: str | None) -> str:
+    """Return the command that goes on with a run of the given arguments."""
+    if sweep.path is None:
+        return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"
+    words = ["sweep", "run", str(sweep.path), "-o", str(out)]
+    if jobs is not None:
+        words += ["--jobs", str(jobs)]
+    if backend != "threading":
+        words += ["--backend", backend]
+    if scheduler is not None:
+        words += ["--scheduler", scheduler]
+    return shlex.join([*words, "--resume"])

@@ -1,0 +1,159 @@
+"""What a run tells of itself: progress on the way, a summary at the end."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
+
+if TYPE_CHECKING:
+    from boulder_sweep.store.manifest import Manifest
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is; handed to the `progress` function of `run` up to ten times a second.
+
+    Parameters
+    ----------
+    rows_done, rows
+        Computed so far, rows of earlier runs included; rows of the whole table.
+    seconds
+        Since the computing began.
+    rows_per_second
+        Computed by this run.
+    seconds_left
+        By that speed; None before there is one.
+    """
+
+    rows_done: int
+    rows: int
+    seconds: float
+    rows_per_second: float
+    seconds_left: float | None
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a finished run did.
+
+    Parameters
+    ----------
+    out
+        Folder of the table.
+    rows
+        Rows of the table.
+    rows_computed
+        Rows computed by this run; the others were there before.
+    verdicts
+        Rows of each verdict.
+    reasons
+        Rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` where there is none.
+    seconds
+        From the call to the finished table.
+    jobs, backend
+        Workers.
+    parts, bytes
+        Files of the table and their size.
+    accuracy
+        What accuracy was asked for, the step chosen for it, and the estimated error that a pilot found.
+    notes
+        What the user should know: damaged parts that were computed again, workers that died.
+    """
+
+    out: Path
+    rows: int
+    rows_computed: int
+    verdicts: dict[str, int]
+    reasons: dict[str, int]
+    seconds: float
+    jobs: int
+    backend: str
+    parts: int
+    bytes: int
+    accuracy: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rows_per_second(self) -> float:
+        """Rows computed by this run in a second, everything included."""
+        return self.rows_computed / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def errors(self) -> int:
+        """Rows that could not be computed."""
+        return self.verdicts.get("error", 0)
+
+    @property
+    def exit_code(self) -> int:
+        """0, or 3 where some rows could not be computed."""
+        return EXIT_SOME_ROWS_FAILED if self.errors else EXIT_DONE
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            **asdict(self),
+            "out": str(self.out),
+            "rows_per_second": self.rows_per_second,
+            "errors": self.errors,
+            "exit_code": self.exit_code,
+        }
+
+
+def progress_of(rows_before: int, rows_computed: int, rows: int, seconds: float) -> Progress:
+    """Return how far a run is.
+
+    Parameters
+    ----------
+    rows_before
+        Rows that were there when the run began.
+    rows_computed
+        Rows computed since.
+    rows
+        Rows of the whole table.
+    seconds
+        Since the computing began.
+    """
+    speed = rows_computed / seconds if seconds > 0 else 0.0
+    done = rows_before + rows_computed
+    return Progress(
+        rows_done=done,
+        rows=rows,
+        seconds=seconds,
+        rows_per_second=speed,
+        seconds_left=(rows - done) / speed if speed > 0 else None,
+    )
+
+
+def summary_of(
+    out: Path,
+    manifest: Manifest,
+    *,
+    rows_computed: int,
+    seconds: float,
+    jobs: int,
+    backend: str,
+    notes: list[str],
+) -> Summary:
+    """Return the summary of a finished run from the manifest it left."""
+    reasons = manifest.verdicts
+    verdicts: dict[str, int] = {}
+    for key, count in reasons.items():
+        verdict = key.partition("/")[0]
+        verdicts[verdict] = verdicts.get(verdict, 0) + count
+    return Summary(
+        out=out,
+        rows=manifest.rows,
+        rows_computed=rows_computed,
+        verdicts=verdicts,
+        reasons=reasons,
+        seconds=seconds,
+        jobs=jobs,
+        backend=backend,
+        parts=len(manifest.parts),
+        bytes=sum(part.bytes for part in manifest.parts.values()),
+        accuracy=manifest.identity.get("accuracy", {}),
+        notes=tuple(notes),
+    )

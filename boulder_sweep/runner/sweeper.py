@@ -1,0 +1,196 @@
+"""A whole sweep: every design of a grid simulated, judged and stored.
+
+The calling thread only looks after the run: it passes results on, reports progress and watches for signals.
+The `Workers` thread hands out blocks, the `Collector` thread writes parts in order while others are computed.
+What the table holds depends on the settings alone, not on workers, blocks, speed or interruptions.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from boulder_sweep.errors import Interrupted
+from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.runner.backends import available_cores
+from boulder_sweep.runner.collector import COMMIT_EVERY_S
+from boulder_sweep.runner.commands import repeat_command
+from boulder_sweep.runner.commands import resume_command as default_resume_command
+from boulder_sweep.runner.estimate import MOST_ROWS, Estimate, estimated, take_sample
+from boulder_sweep.runner.interruption import Signals
+from boulder_sweep.runner.running import Report, Run
+from boulder_sweep.runner.summary import Progress, Summary, summary_of
+from boulder_sweep.store.errors import DoesNotFitError, NotASweepError
+from boulder_sweep.store.manifest import Manifest, load
+from boulder_sweep.store.opening import open_output
+from boulder_sweep.store.provenance import file_metadata, identity, new_session
+from boulder_sweep.store.writer import ROWS_PER_PART
+
+if TYPE_CHECKING:
+    from boulder_sweep.judge.accuracy import Accuracy
+    from boulder_sweep.judge.evaluation import Evaluation
+    from boulder_sweep.settings import Sweep
+
+__all__ = ["Estimate", "Interrupted", "Progress", "Summary", "estimate", "run"]
+
+
+def run(
+    sweep: Sweep,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    backend: str = "threading",
+    scheduler: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    force: bool = False,
+    progress: Report | None = None,
+    command: str | None = None,
+    resume_command: str | None = None,
+    rows_per_part: int = ROWS_PER_PART,
+    commit_every_s: float = COMMIT_EVERY_S,
+    simulate: Simulate = by_kernels,
+) -> Summary:
+    """Simulate every design of a sweep and store the table.
+
+    Parameters
+    ----------
+    sweep
+        What `boulder_sweep.load` returned.
+    out
+        Folder of the table; it is made.
+    jobs
+        Workers; as many as this process may use cores by default.
+    backend
+        ``threading``, ``loky`` (processes) or ``dask``.
+    scheduler
+        Address of a Dask scheduler; with ``dask`` only.
+    resume
+        Go on with what `out` holds, if it is the same sweep; damaged parts are computed again. Begins anew
+        where there is nothing.
+    overwrite
+        Replace what a sweep wrote into `out` before.
+    force
+        Run even if the result does not seem to fit on the disk or in memory.
+    progress
+        Called up to ten times a second, from the calling thread.
+    command
+        The command this run was started with, for the record.
+    resume_command
+        The command that goes on with it; made up from the arguments by default.
+    rows_per_part
+        Rows of a file of a new table.
+    commit_every_s
+        How often a file that is still growing is written [s].
+    simulate
+        What simulates a table of designs: for tests that inject faults.
+
+    Returns
+    -------
+    Summary
+        Counts and times of the finished run.
+
+    Raises
+    ------
+    StoreError
+        `out` cannot be used, see `boulder_sweep.store.errors`; nothing has been computed then. `WriteError`
+        also when the disk fills up during the run: what is written is whole, and the run can go on.
+    BackendError
+        The workers cannot be had.
+    Interrupted
+        SIGINT or SIGTERM came (main thread only); the run can go on.
+    """
+    begun = time.monotonic()
+    out = Path(out)
+    _check_rows(sweep)
+    again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
+    jobs = jobs or available_cores()
+    whole: Run | None = None
+    with Signals() as signals:
+        try:
+            accuracy = accuracy_of(sweep)
+            evaluation = evaluation_of(sweep, accuracy, simulate)
+            manifest = Manifest(_identity(sweep, evaluation, accuracy), sweep.n_designs, rows_per_part, again)
+            session = new_session(command or "boulder_sweep.run", jobs, backend)
+            folder = open_output(out, manifest, session, resume=resume, overwrite=overwrite)
+            whole = Run(sweep, evaluation, folder, signals)
+            whole.prepare(backend, jobs, scheduler, force)
+            whole.compute(progress, commit_every_s)
+        except Interrupted as stop:
+            done = whole.end(f"interrupted by signal {stop.signum}") if whole else 0
+            raise Interrupted(stop.signum, done, sweep.n_designs, again) from None
+        except BaseException as problem:
+            if whole:
+                whole.end(f"stopped by {type(problem).__name__}: {problem}")
+            raise
+        whole.end("finished")
+    return summary_of(
+        out,
+        folder.manifest,
+        rows_computed=whole.rows_computed,
+        seconds=time.monotonic() - begun,
+        jobs=jobs,
+        backend=backend,
+        notes=whole.notes,
+    )
+
+
+def estimate(
+    sweep: Sweep,
+    out: str | Path | None = None,
+    *,
+    jobs: int | None = None,
+    backend: str = "threading",
+    resume: bool = False,
+    simulate: Simulate = by_kernels,
+) -> Estimate:
+    """Find out what a run will take, from a timed sample of a tenth of a second; nothing is written.
+
+    Parameters
+    ----------
+    sweep, out, jobs, backend, simulate
+        As of `run`.
+    resume
+        Count only the rows that `out` lacks.
+
+    Returns
+    -------
+    Estimate
+        Rows, time, disk and memory; `Estimate.objections` says what does not fit.
+    """
+    _check_rows(sweep)
+    accuracy = accuracy_of(sweep)
+    evaluation = evaluation_of(sweep, accuracy, simulate)
+    folder = None if out is None else Path(out)
+    rows_there, rows_per_part = 0, ROWS_PER_PART
+    if resume and folder is not None:
+        try:
+            there = load(folder)
+            rows_there, rows_per_part = there.rows_done, there.rows_per_part
+        except NotASweepError:
+            pass
+    evaluation.warm_up()
+    metadata = file_metadata(_identity(sweep, evaluation, accuracy), repeat_command(sweep))
+    return estimated(
+        take_sample(evaluation, sweep.block, sweep.n_designs, metadata),
+        rows=sweep.n_designs,
+        rows_to_compute=sweep.n_designs - rows_there,
+        jobs=jobs or available_cores(),
+        out=folder,
+        rows_per_part=rows_per_part,
+        worker_processes=backend == "loky",
+    )
+
+
+def _check_rows(sweep: Sweep) -> None:
+    """Refuse more rows than can be numbered."""
+    if sweep.n_designs > MOST_ROWS:
+        raise DoesNotFitError(f"{sweep.n_designs:,} designs are more than a design_id of 64 bits can number")
+
+
+def _identity(sweep: Sweep, evaluation: Evaluation, accuracy: Accuracy) -> dict[str, object]:
+    """Return what all rows of a sweep's table have in common."""
+    readings, control = evaluation.readings._asdict(), evaluation.control._asdict()
+    return identity(sweep.resolved(), readings, control, accuracy.to_dict())

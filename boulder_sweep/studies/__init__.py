@@ -1,1 +1,0 @@
-"""Studies whose results stand in the documentation. ``python -m boulder_sweep.studies`` repeats them all."""

@@ -1,0 +1,1 @@
+"""Speed against accuracy, measured on a user's own grid."""

@@ -1,0 +1,189 @@
+"""One way of simulating a sample of designs: what it costs, and how far it is from a far finer solution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from boulder_kernels import OutcomeTable, Status
+from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED
+
+if TYPE_CHECKING:
+    from boulder_sweep.judge.judged import Judged
+
+
+ROUNDING_DEG = 1e-9
+"""Errors below it are rounding, of the finer solution as well [deg]."""
+
+
+class Way(NamedTuple):
+    """How designs are simulated."""
+
+    readings: str
+    """``corrected``, ``as_printed``, or ``mixed``: the readings of the file."""
+    soil_elements: int
+    """N; 0 for the closed form."""
+    step_ms: float
+    locate_yield: bool
+    """Whether steps end where the soil yields."""
+    error_estimate: bool
+    """Whether a second solution by half the step is reported, and its difference from the first as the error."""
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is what a file gets with ``solver: {step: ...}`` and the soil in closed form."""
+        return not (self.soil_elements or self.locate_yield or self.error_estimate)
+
+    @property
+    def soil(self) -> str:
+        """Representation of the soil in words."""
+        return f"N = {self.soil_elements}" if self.soil_elements else "closed form"
+
+    @property
+    def steps(self) -> str:
+        """Steps in words."""
+        steps = f"{self.step_ms:g} + {0.5 * self.step_ms:g} ms" if self.error_estimate else f"{self.step_ms:g} ms"
+        return f"{steps}, yield located" if self.locate_yield else steps
+
+
+@dataclass
+class Point:
+    """What one way costs and how accurate it is.
+
+    Parameters
+    ----------
+    way
+        How the designs were simulated.
+    accuracy
+        Name of the accuracy that stands for this way; empty where none does.
+    designs
+        Designs of the sample.
+    cpu_us
+        CPU time per design, one core [us].
+    rotation_rms_deg, rotation_p99_deg, rotation_max_deg
+        Error of the largest rotation, over the designs that neither solution stopped at the limit [deg].
+    displacement_rms_m, displacement_p99_m, displacement_max_m
+        Error of the largest displacement of boulder or truck, the larger, over the designs that both solutions or
+        neither stopped at the limit [m].
+    flips
+        Designs that pass by one solution and fail by the other.
+    undecided
+        Designs left undecided.
+    not_computed
+        Designs that the finer solution has and this one has not.
+    estimated_p99_9_deg
+        99.9 % quantile of the estimated errors of the rotation [deg], over the designs that were not stopped at the
+        limit: what to ask for to get these steps. NaN without an estimate.
+    covered
+        Share of the designs that neither solution stopped at the limit whose estimated error is no smaller than their
+        error. NaN without an estimate.
+    pareto
+        Whether no other way with these readings is both cheaper and more accurate (rotation, 99 %).
+    """
+
+    way: Way
+    accuracy: str
+    designs: int
+    cpu_us: float
+    rotation_rms_deg: float
+    rotation_p99_deg: float
+    rotation_max_deg: float
+    displacement_rms_m: float
+    displacement_p99_m: float
+    displacement_max_m: float
+    flips: int
+    undecided: int
+    not_computed: int
+    estimated_p99_9_deg: float
+    covered: float
+    pareto: bool = False
+
+    def to_dict(self) -> dict[str, object]:
+        """Return one row of the table of results; None where there is no value."""
+        own = {name: None if value != value else value for name, value in vars(self).items() if name != "way"}
+        return {**self.way._asdict(), **own}
+
+
+class Spread(NamedTuple):
+    """How large the errors of many designs are."""
+
+    rms: float
+    p99: float
+    largest: float
+
+
+def spread(errors: np.ndarray) -> Spread:
+    """Return root mean square, 99 % quantile and largest of some errors; zeros where there are none."""
+    if not errors.size:
+        return Spread(0.0, 0.0, 0.0)
+    return Spread(
+        float(np.sqrt(np.mean(errors**2))), float(np.quantile(errors, 0.99, method="higher")), float(errors.max())
+    )
+
+
+def compared(
+    way: Way,
+    accuracy: str,
+    cpu_us: float,
+    found: tuple[OutcomeTable, Judged],
+    known: tuple[OutcomeTable, Judged],
+) -> Point:
+    """Compare the outcomes of one way with those of a far finer solution.
+
+    Parameters
+    ----------
+    way, accuracy, cpu_us
+        As of `Point`.
+    found, known
+        Outcomes and verdicts of this way and of the finer solution, n designs each.
+    """
+    (out, judged), (ref, truth) = found, known
+    limit = Status.LIMIT
+    both = np.isfinite(out.theta_max) & np.isfinite(ref.theta_max)
+    standing = both & (out.status != limit) & (ref.status != limit)
+    alike = both & ((out.status == limit) == (ref.status == limit))
+    errors = np.degrees(np.abs(out.theta_max - ref.theta_max))[standing]
+    rotation = spread(errors)
+    boulder, truck = np.abs(out.x_b_max - ref.x_b_max), np.abs(out.x_v_max - ref.x_v_max)
+    displacement = spread(np.maximum(boulder, truck)[alike])
+    verdicts = judged.verdict, truth.verdict
+    estimated_p99_9_deg, covered = _estimates(way, out, errors, standing)
+    decided = np.isin(verdicts[0], (PASS, FAIL)) & np.isin(verdicts[1], (PASS, FAIL))
+    return Point(
+        way,
+        accuracy,
+        len(out.status),
+        cpu_us,
+        *rotation,
+        *displacement,
+        flips=int((decided & (verdicts[0] != verdicts[1])).sum()),
+        undecided=int((verdicts[0] == UNDECIDED).sum()),
+        not_computed=int((np.isfinite(ref.theta_max) & ~np.isfinite(out.theta_max)).sum()),
+        estimated_p99_9_deg=estimated_p99_9_deg,
+        covered=covered,
+    )
+
+
+def _estimates(way: Way, out: OutcomeTable, errors: np.ndarray, standing: np.ndarray) -> tuple[float, float]:
+    """Quantile of the estimated errors [deg], and how often they cover the errors of the standing designs."""
+    if not way.error_estimate:
+        return math.nan, math.nan
+    estimated = np.degrees(out.theta_error[standing])
+    if not estimated.size:
+        return 0.0, 1.0
+    covers = estimated + ROUNDING_DEG >= errors
+    return float(np.quantile(estimated, 0.999, method="higher")), float(np.mean(covers))
+
+
+def mark_front(points: Iterable[Point]) -> None:
+    """Mark the points that no other one with the same readings beats in both cost and accuracy."""
+    points = list(points)
+    for point in points:
+        rivals = (p for p in points if p.way.readings == point.way.readings and p is not point)
+        point.pareto = not any(
+            p.cpu_us <= point.cpu_us and p.rotation_p99_deg <= point.rotation_p99_deg for p in rivals
+        )

@@ -1,0 +1,265 @@
+"""Speed against accuracy, measured on the designs of a sweep.
+
+A sample of the grid, its corners included, is simulated in many ways: by longer and shorter steps, with the soil in
+closed form and by sums over N elements, as printed and corrected. Each is compared with one far finer solution of the
+same readings, with the soil in closed form, which the sums approach.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_kernels import OutcomeTable, Readings, as_printed, corrected
+from boulder_sweep.drawing import draw
+from boulder_sweep.errors import NothingToMeasureError
+from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
+from boulder_sweep.judge.evaluation import readings_of
+from boulder_sweep.judge.pilot import sampled_columns
+from boulder_sweep.judge.verdict import Limits
+from boulder_sweep.tradeoff.points import Point, Way, mark_front
+from boulder_sweep.tradeoff.sample import Sample
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from boulder_sweep.settings import Sweep
+
+DESIGNS = 4096
+"""Designs of the sample."""
+STEPS_MS = (16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
+STEPS_LOCATED_MS = (8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
+STEPS_WITH_ERROR_MS = (12.0, 8.0, 6.0, 4.0, 2.0)
+STEPS_OF_SUMS_MS = (12.0, 4.0, 2.0)
+ELEMENTS = (50, 200, 1000, 5000)
+REFERENCE_STEP_S = 5e-5
+SECONDS = 60.0
+TARGETS_DEG = (0.1, 0.01, 1e-3, 1e-4, 1e-5)
+
+Told = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """What was measured.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    points
+        Every way of simulating, in the order they were measured.
+    reference_deg
+        By how much the finer solution itself differs from one by twice its step, at most [deg], by readings.
+    left_out
+        Ways for which the time did not suffice.
+    """
+
+    sweep: Sweep
+    points: tuple[Point, ...]
+    reference_deg: dict[str, float]
+    left_out: tuple[Way, ...]
+
+    reference_step_ms = 1e3 * REFERENCE_STEP_S
+
+    @property
+    def own_readings(self) -> str:
+        """Readings of the sweep itself."""
+        return self.sweep.model.preset
+
+    def best(self, wanted_deg: float, *, error_estimate: bool) -> Point | None:
+        """Return the cheapest way with the readings of the sweep whose largest error keeps to an angle [deg].
+
+        Parameters
+        ----------
+        wanted_deg
+            The angle.
+        error_estimate
+            Whether to look among the ways with an error for every design, or among plain steps.
+        """
+        fit = [
+            point
+            for point in self._own()
+            if (point.way.error_estimate if error_estimate else point.way.is_plain)
+            and point.rotation_max_deg <= wanted_deg
+            and not point.flips
+        ]
+        return min(fit, key=lambda point: point.cpu_us, default=None)
+
+    def recommendation(self) -> list[str]:
+        """Return what to use for which accuracy on this grid, and what it costs, in sentences."""
+        if not self.points:
+            return ["Nothing was measured in so little time."]
+        asked = self.sweep.solver.accuracy
+        targets = (asked, *TARGETS_DEG) if isinstance(asked, float) else TARGETS_DEG
+        by_words: dict[str, list[str]] = {}
+        for target in dict.fromkeys(targets):
+            by_words.setdefault(self._advice(target), []).append(f"{target:g}")
+        found = [f"For {' or '.join(values)} deg {advice}." for advice, values in by_words.items()]
+        best = (self.best(target, error_estimate=True) for target in targets)
+        if any(point is not None and not point.accuracy for point in best):
+            found.append(
+                "An accuracy given as a number bounds the estimated errors, which are larger than the true ones."
+            )
+        sums = [p for p in self._own() if p.way.soil_elements == max(ELEMENTS)]
+        closed = {p.way.step_ms: p.cpu_us for p in self._own() if p.way.is_plain}
+        if sums:
+            ratio = sums[0].cpu_us / closed[sums[0].way.step_ms]
+            found.append(
+                f"Sums over {max(ELEMENTS)} soil elements cost {ratio:,.0f} times the closed form, which is their "
+                f"limit, and are {min(p.rotation_max_deg for p in sums):.1g} deg off it at most: for comparison only."
+            )
+        return found
+
+    def _own(self) -> Iterator[Point]:
+        """Yield the points with the readings of the sweep."""
+        return (point for point in self.points if point.way.readings == self.own_readings)
+
+    def _advice(self, wanted_deg: float) -> str:
+        """Say what to use for an accuracy [deg]."""
+        guarded, plain = (self.best(wanted_deg, error_estimate=estimate) for estimate in (True, False))
+        if guarded is None:
+            return "none of the steps measured is short enough"
+        ask = guarded.accuracy or f"{_rounded_up(guarded.estimated_p99_9_deg):g} deg"
+        text = (
+            f"use solver: {{accuracy: {ask}}} (steps of {guarded.way.steps}): {guarded.cpu_us:.3g} us a design, "
+            f"{_duration(guarded, self.sweep.n_designs)} for this grid on one core, with an error for every design"
+        )
+        if plain is not None:
+            text += f"; without one, solver: {{step: {plain.way.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
+        return text
+
+    def table(self) -> pa.Table:
+        """Return one row for every way."""
+        import pyarrow as pa  # heavy, and the measuring does without it
+
+        return pa.Table.from_pylist([point.to_dict() for point in self.points])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            "name": self.sweep.name,
+            "designs": self.sweep.n_designs,
+            "reference_step_s": REFERENCE_STEP_S,
+            "reference_error_deg": self.reference_deg,
+            "points": [point.to_dict() for point in self.points],
+            "left_out": [way._asdict() for way in self.left_out],
+            "recommendation": self.recommendation(),
+        }
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write table and picture into a folder, which is made; return the files: none where nothing was measured."""
+        import pyarrow.csv as pa_csv
+        import pyarrow.parquet as pq
+
+        target = Path(folder)
+        draw("figures", "require_matplotlib")
+        draw("figures", "make_folder", target)
+        if not self.points:
+            return []
+        files = [target / f"tradeoff.{kind}" for kind in ("parquet", "csv", "png")]
+        pq.write_table(self.table(), files[0])
+        pa_csv.write_csv(self.table(), files[1])
+        draw("tradeoff", "draw_tradeoff", self, files[2])
+        return files
+
+
+def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, tell: Told | None = None) -> Tradeoff:
+    """Measure speed against accuracy on a sample of a sweep's designs.
+
+    Parameters
+    ----------
+    sweep
+        The sweep. Its readings, criterion and horizon count; both presets are measured anyway.
+    designs
+        Size of the sample. The sample depends on the sweep alone, and so do the errors; the times do not.
+    seconds
+        After so much time no further way is begun [s].
+    tell
+        Told what is being measured.
+
+    Raises
+    ------
+    NothingToMeasureError
+        No design of the sample can be computed.
+    """
+    begun = time.monotonic()
+    table, bed_offset = sampled_columns(sweep, designs)
+    if not table.L.size:
+        raise NothingToMeasureError(
+            f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
+            "the table of a run says why"
+        )
+    limits = Limits(math.radians(sweep.criterion.max_rotation_deg), sweep.criterion.rating)
+    presets = {"corrected": corrected(), "as_printed": as_printed()}
+    if sweep.model.preset not in presets:
+        presets = {sweep.model.preset: readings_of(sweep), **presets}
+    presets = dict(sorted(presets.items(), key=lambda item: item[0] != sweep.model.preset))
+
+    points: list[Point] = []
+    left_out: list[Way] = []
+    references: dict[str, float] = {}
+    for name, readings in presets.items():
+        if time.monotonic() - begun > seconds:
+            left_out += _ways(name)
+            continue
+        sample = Sample(table, bed_offset, readings, limits, sweep.solver.horizon_s)
+        if tell is not None:
+            tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {table.L.size:,}")
+        known = sample.solve(REFERENCE_STEP_S, locate_yield=True)
+        twice = sample.solve(2.0 * REFERENCE_STEP_S, locate_yield=True)
+        references[name] = _largest_difference_deg(known, twice)
+        for way in _ways(name):
+            if time.monotonic() - begun > seconds:
+                left_out.append(way)
+                continue
+            if tell is not None:
+                tell(f"{name}: {way.soil}, {way.steps}")
+            points.append(sample.measured(way, known, _name_of(way, readings)))
+    mark_front(points)
+    return Tradeoff(sweep, tuple(points), references, tuple(left_out))
+
+
+def _ways(readings: str) -> Iterator[Way]:
+    """Yield the ways of simulating, cheap ones first."""
+    yield from (Way(readings, 0, step, False, False) for step in STEPS_MS)
+    yield from (Way(readings, 0, step, True, False) for step in STEPS_LOCATED_MS)
+    yield from (Way(readings, 0, step, False, True) for step in STEPS_WITH_ERROR_MS)
+    yield from (Way(readings, 0, step, True, True) for step in STEPS_LOCATED_MS)
+    yield from (Way(readings, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
+
+
+def _name_of(way: Way, readings: Readings) -> str:
+    """Name of the accuracy that a way stands for, or nothing."""
+    if way.soil_elements:
+        return ""
+    own = Steps(1e-3 * way.step_ms, way.locate_yield)
+    for name, steps in (STEPS if readings.restoring_gravity else STEPS_PRINTED).items():
+        if steps == own and way.error_estimate == (name != "fast"):
+            return name
+    return ""
+
+
+def _largest_difference_deg(one: OutcomeTable, other: OutcomeTable) -> float:
+    """Largest difference of the rotations of two solutions [deg]."""
+    difference = np.abs(one.theta_max - other.theta_max)
+    return math.degrees(float(np.nanmax(difference, initial=0.0)))
+
+
+def _rounded_up(value: float) -> float:
+    """Round up to one digit."""
+    if value <= 0.0:
+        return 1e-9
+    unit = 10.0 ** math.floor(math.log10(value))
+    return math.ceil(value / unit * (1.0 - 1e-12)) * unit
+
+
+def _duration(point: Point, rows: int) -> str:
+    seconds = 1e-6 * point.cpu_us * rows
+    return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:,.0f} min"

@@ -1,0 +1,158 @@
+"""Every block of the documentation that holds computed numbers, and the function that makes its text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import cache
+from pathlib import Path
+
+from boulder_sweep.crash_tests.cases import rigid_wall_test
+from boulder_sweep.crash_tests.statements import statement_table
+from boulder_sweep.crash_tests.tables import Table
+from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
+from docs.studies import energy
+from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
+from docs.studies.extremes import admitted_table, refusal_table
+from docs.studies.knife_edge import knife_edge_words
+from docs.studies.readings import ReadingsStudy, readings_study
+from docs.studies.settings_tables import choices_table, columns_table, entries_table
+from docs.studies.wording import balance_words, convergence_words, fit_text, readings_words
+
+GRID = Path("configs/m30_sizing.yaml")
+EVERY = 7
+"""Every so many-th design of the grid is in the readings study; 7 divides the length of none of its axes."""
+
+
+def compute(root: Path, names: Iterable[str] | None = None) -> dict[str, str]:
+    """Return the text of blocks by name; all of them by default.
+
+    Parameters
+    ----------
+    root
+        Folder of the repository.
+    names
+        Which blocks.
+    """
+    return {name: CONTENTS[name](root).strip() for name in (CONTENTS if names is None else names)}
+
+
+@cache
+def _validation() -> Validation:
+    return validate()
+
+
+@cache
+def readings_of_grid(root: Path) -> ReadingsStudy:
+    """Return the readings study of the documentation."""
+    return readings_study(root / GRID, EVERY)
+
+
+@cache
+def _balances() -> list[energy.Balance]:
+    return energy.balances()
+
+
+def _validation_table(_: Path) -> str:
+    return _validation().table().markdown()
+
+
+def _statements(_: Path) -> str:
+    return statement_table(_validation().statements).markdown()
+
+
+def _convergence(_: Path) -> str:
+    return _validation().convergence.table().markdown()
+
+
+def _convergence_words(_: Path) -> str:
+    return convergence_words(_validation().convergence)
+
+
+def _rigid_wall(_: Path) -> str:
+    table = Table(("of the paper's truck against a rigid wall", "value"))
+    units = {"per_s": "1/s", "m": "m", "s": "s", "kN": "kN", "m_s": "m/s"}
+    for name, value in wall_figures(rigid_wall_test()).items():
+        suffix = next(text for text in ("per_s", "m_s", "kN", "m", "s") if name.endswith(f"_{text}"))
+        table.add(name.removesuffix(f"_{suffix}").replace("_", " "), f"{value:.4f} {units[suffix]}")
+    return table.markdown()
+
+
+def _readings_crash_tests(root: Path) -> str:
+    return readings_of_grid(root).crash_test_table().markdown()
+
+
+def _readings_grid(root: Path) -> str:
+    return readings_of_grid(root).grid_table().markdown()
+
+
+def _readings_words(root: Path) -> str:
+    return readings_words(readings_of_grid(root))
+
+
+def _balance_table(_: Path) -> str:
+    return energy.balance_table(_balances()).markdown()
+
+
+def _balance_words(_: Path) -> str:
+    return balance_words(_balances())
+
+
+def _audit(_: Path) -> str:
+    return energy.audit_table().markdown()
+
+
+def _fit(_: Path) -> str:
+    return fit_text()
+
+
+def _coverage(root: Path) -> str:
+    tables = {"random": random_table(16_384, 1), "M30 grid": grid_table(root / GRID, 8192)}
+    return coverage_table(list(coverages(tables))).markdown()
+
+
+def _knife_edge(_: Path) -> str:
+    return knife_edge_words()
+
+
+def _admitted_box(_: Path) -> str:
+    return admitted_table().markdown()
+
+
+def _refusals(_: Path) -> str:
+    return refusal_table().markdown()
+
+
+def _settings_entries(_: Path) -> str:
+    return entries_table().markdown()
+
+
+def _settings_choices(_: Path) -> str:
+    return choices_table().markdown()
+
+
+def _result_columns(_: Path) -> str:
+    return columns_table().markdown()
+
+
+CONTENTS: dict[str, Callable[[Path], str]] = {
+    "validation-table": _validation_table,
+    "statements": _statements,
+    "rigid-wall": _rigid_wall,
+    "convergence": _convergence,
+    "convergence-words": _convergence_words,
+    "readings-crash-tests": _readings_crash_tests,
+    "readings-grid": _readings_grid,
+    "readings-words": _readings_words,
+    "energy-balance": _balance_table,
+    "energy-words": _balance_words,
+    "energy-audit": _audit,
+    "vehicle-fit": _fit,
+    "coverage": _coverage,
+    "knife-edge": _knife_edge,
+    "admitted-box": _admitted_box,
+    "refusals": _refusals,
+    "settings-entries": _settings_entries,
+    "settings-choices": _settings_choices,
+    "result-columns": _result_columns,
+}
+"""Function of every block by its name."""

@@ -1,0 +1,168 @@
+"""How often the estimated error of a design covers its true error, and how large the true errors are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
+from boulder_sweep.crash_tests.tables import Table
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps
+from boulder_sweep.judge.pilot import sampled_columns
+from boulder_sweep.settings import load
+from docs.studies.random_designs import random_designs
+
+PRESETS: dict[str, Readings] = {"corrected": corrected(), "as printed": as_printed()}
+LIMIT = math.radians(20.0)
+HORIZON_S = 1.0
+REFERENCE_STEP_S = 5e-5
+ROUNDING_RAD, ROUNDING_M = 1e-11, 1e-11
+"""Errors below these are rounding, of the reference as well."""
+NUMBERS = tuple(steps for steps in LADDER if steps.step_s in (0.012, 0.006, 0.001, 0.00025))
+"""Some of those that an accuracy given as a number may come to."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Estimated and true errors of some designs, by one reading and one step.
+
+    Attributes
+    ----------
+    designs : str
+        Which designs.
+    readings, accuracy : str
+        How they were read, and what was asked for.
+    steps : Steps
+        The longer one of the two, and whether the yield is located.
+    standing : int
+        Designs that turn no further than the limit.
+    rotation : float
+        Share of them whose estimated error of the rotation is no smaller than the true one.
+    displacement : float
+        Share of all designs whose estimated error of the displacements is no smaller than the true one.
+    largest_miss_deg : float
+        Largest error of the rotation that is not covered [deg].
+    p99_9_deg, largest_deg : float
+        True errors of the rotation: 99.9 % of the standing designs, and the largest [deg].
+    p99_9_m, largest_m : float
+        The same of the displacements, over all designs whose verdict is not undecided [m].
+    flips : int
+        Designs that come down on the wrong side of the limit without being undecided.
+    undecided : int
+        Designs nearer to the limit than their estimated error.
+    """
+
+    designs: str
+    readings: str
+    accuracy: str
+    steps: Steps
+    standing: int
+    rotation: float
+    displacement: float
+    largest_miss_deg: float
+    p99_9_deg: float
+    largest_deg: float
+    p99_9_m: float
+    largest_m: float
+    flips: int
+    undecided: int
+
+
+def random_table(count: int, seed: int) -> DesignTable:
+    """Return random realistic designs as columns."""
+    designs = random_designs(count, seed)
+    return DesignTable(*(np.array(column, dtype=float) for column in zip(*designs, strict=True)))
+
+
+def grid_table(path: Path, count: int) -> DesignTable:
+    """Return a sample of the designs of a file."""
+    return sampled_columns(load(path), count)[0]
+
+
+def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:
+    """Yield one entry for each set of designs, preset and accuracy.
+
+    Parameters
+    ----------
+    tables
+        Sets of designs by what they are called.
+    """
+    for designs, table in tables.items():
+        for preset, readings in PRESETS.items():
+            known = _solved(table, readings, Steps(REFERENCE_STEP_S, locate_yield=True), estimate=False)
+            named = STEPS if readings.restoring_gravity else STEPS_PRINTED
+            ways = [(name, named[name]) for name in ("balanced", "fine")] + [("a number", steps) for steps in NUMBERS]
+            for accuracy, steps in ways:
+                found = _solved(table, readings, steps, estimate=True)
+                yield _compared(designs, preset, accuracy, steps, found, known)
+
+
+def coverage_table(found: list[Coverage]) -> Table:
+    """Return the entries as a table; a star marks steps that end where the soil yields."""
+    head: tuple[str, ...] = ("designs", "readings", "accuracy", "steps [ms]", "rotation covered", "largest miss [°]")
+    head += (
+        "movement covered",
+        "rotation: 99.9 %, largest [°]",
+        "movement: 99.9 %, largest [mm]",
+        "wrong",
+        "undecided",
+    )
+    table = Table(head)
+    for c in found:
+        table.add(
+            c.designs,
+            c.readings,
+            c.accuracy,
+            f"{1e3 * c.steps.step_s:g} + {0.5e3 * c.steps.step_s:g}{' *' if c.steps.locate_yield else ''}",
+            f"{c.rotation:.1%} of {c.standing}",
+            f"{c.largest_miss_deg:.0e}" if c.largest_miss_deg else "none",
+            f"{c.displacement:.1%}",
+            f"{c.p99_9_deg:.0e}, {c.largest_deg:.0e}",
+            f"{1e3 * c.p99_9_m:.0e}, {1e3 * c.largest_m:.0e}",
+            str(c.flips),
+            str(c.undecided),
+        )
+    return table
+
+
+def _solved(table: DesignTable, readings: Readings, steps: Steps, *, estimate: bool) -> OutcomeTable:
+    """Simulate a table of designs."""
+    control = Control(steps.step_s, HORIZON_S, LIMIT, 0, estimate, True, steps.locate_yield)
+    return simulate_table(table, readings, control)
+
+
+def _compared(
+    designs: str, readings: str, accuracy: str, steps: Steps, found: OutcomeTable, known: OutcomeTable
+) -> Coverage:
+    """Compare estimated with true errors."""
+    computed = np.isfinite(found.theta_max) & np.isfinite(known.theta_max)
+    fell, falls = found.status == Status.LIMIT, known.status == Status.LIMIT
+    standing = computed & ~fell & ~falls
+    alike = computed & (fell == falls)
+    unsure = computed & ~fell & (LIMIT - found.theta_max < found.theta_error)
+    rotation = np.abs(found.theta_max - known.theta_max)
+    x = np.maximum(np.abs(found.x_b_max - known.x_b_max), np.abs(found.x_v_max - known.x_v_max))
+    missed = standing & (rotation > found.theta_error + ROUNDING_RAD)
+    missed_x = alike & (x > found.x_error + ROUNDING_M)
+    decided = x[alike & ~unsure]
+    degrees = np.degrees(rotation[standing])
+    return Coverage(
+        designs=designs,
+        readings=readings,
+        accuracy=accuracy,
+        steps=steps,
+        standing=int(standing.sum()),
+        rotation=1.0 - float(missed.sum() / max(standing.sum(), 1)),
+        displacement=1.0 - float(missed_x.sum() / max(alike.sum(), 1)),
+        largest_miss_deg=math.degrees(float(rotation[missed].max(initial=0.0))),
+        p99_9_deg=float(np.quantile(degrees, 0.999, method="higher")),
+        largest_deg=float(degrees.max()),
+        p99_9_m=float(np.quantile(decided, 0.999, method="higher")),
+        largest_m=float(decided.max()),
+        flips=int((computed & (fell != falls) & ~unsure).sum()),
+        undecided=int(unsure.sum()),
+    )

@@ -1,0 +1,94 @@
+"""Numbers in the documentation: blocks between markers, each made by a function, written and checked by a command.
+
+A block stands between ``<!-- name -->`` and ``<!-- end -->``; everything in between is replaced.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from docs.studies.drift import drift
+
+_BLOCK = re.compile(r"<!-- (?P<name>[a-z0-9-]+) -->\n(?P<text>.*?)\n?<!-- end -->", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a page."""
+
+    page: Path
+    name: str
+    text: str
+
+
+class DocumentError(Exception):
+    """A page holds a block that nothing computes, or none that something does."""
+
+
+def pages(root: Path) -> list[Path]:
+    """Return the pages whose numbers are computed."""
+    return sorted((root / "docs").rglob("*.md"))
+
+
+def blocks(root: Path) -> Iterator[Block]:
+    """Yield every block of every page."""
+    for page in pages(root):
+        for match in _BLOCK.finditer(page.read_text(encoding="utf-8")):
+            yield Block(page, match["name"], match["text"])
+
+
+def differences(root: Path, computed: Mapping[str, str]) -> list[str]:
+    """Return where pages differ from what is computed now.
+
+    Parameters
+    ----------
+    root
+        Folder of the repository.
+    computed
+        Text of every block by its name.
+
+    Returns
+    -------
+    list of str
+        One entry for each line that differs, for each block that is unknown, and for each that stands nowhere.
+    """
+    found = []
+    seen = set()
+    for block in blocks(root):
+        seen.add(block.name)
+        where = f"{block.page.relative_to(root)}: {block.name}"
+        if block.name not in computed:
+            found.append(f"{where}: nothing computes this block")
+            continue
+        found += [f"{where}:\n{line}" for line in drift(block.text, computed[block.name])]
+    return [*found, *(f"{name}: stands on no page" for name in computed if name not in seen)]
+
+
+def write(root: Path, computed: Mapping[str, str]) -> list[Path]:
+    """Put what is computed into the pages; return those that changed.
+
+    Raises
+    ------
+    DocumentError
+        A page holds a block that nothing computes.
+    """
+    changed = []
+    for page in pages(root):
+        text = page.read_text(encoding="utf-8")
+        renewed = _BLOCK.sub(lambda match: _renewed(match, computed), text)
+        if renewed != text:
+            page.write_text(renewed, encoding="utf-8")
+            changed.append(page)
+    return changed
+
+
+def _renewed(match: re.Match[str], computed: Mapping[str, str]) -> str:
+    name = match["name"]
+    if name not in computed:
+        raise DocumentError(f"nothing computes the block {name}")
+    if not drift(match["text"], computed[name]):
+        return match[0]  # rounding alone is no reason to change a page
+    return f"<!-- {name} -->\n{computed[name].strip()}\n<!-- end -->"

@@ -1,0 +1,166 @@
+"""Where the energy goes in the crash tests, and whether the ledger closes over many designs."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from boulder_kernels import Control, Readings, Record, as_printed, constants_of, corrected, simulate_design
+from boulder_sweep.crash_tests.cases import NAMES, crash_test
+from boulder_sweep.crash_tests.tables import Table
+from boulder_sweep.impact.history import EnergyLedger, ledger_of
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge.accuracy import Steps
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.settings.model import ACCURACIES, Model, ReadingChoice, SolverSettings
+from docs.studies.random_designs import random_designs
+
+PARTS = (
+    ("crush_damper_J", "crush of the vehicle, lasting"),
+    ("crush_spring_J", "crush of the vehicle, springs back"),
+    ("soil_elastic_J", "springs of the soil"),
+    ("soil_drag_J", "drag of the soil"),
+    ("gravity_J", "weight of the boulder lifted"),
+    ("boulder_linear_J", "boulder and soil wedge, translation"),
+    ("boulder_angular_J", "boulder and soil wedge, rotation"),
+    ("vehicle_kinetic_J", "vehicle"),
+)
+AUDIT_DESIGNS = 1000
+AUDIT_SAMPLES = 41
+AUDIT_HORIZON_S = 0.5
+PRESETS: dict[str, Readings] = {"as_printed": as_printed(), "corrected": corrected()}
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """The ledger of one crash test at one instant.
+
+    Attributes
+    ----------
+    test : str
+        ``abg`` or ``rwg``.
+    when : str
+        Which instant, in words.
+    time_s : float
+        The instant.
+    parts_J : dict of str to float
+        Energies by part.
+    initial_J : float
+        Energy of the vehicle at first touch.
+    """
+
+    test: str
+    when: str
+    time_s: float
+    parts_J: dict[str, float]
+    initial_J: float
+
+
+def balances() -> list[Balance]:
+    """Return the ledgers of both crash tests, corrected, at the instant that decides each."""
+    found = []
+    for test in NAMES:
+        trajectory = simulate(crash_test(test), readings="corrected")
+        limit = trajectory.motion.outcome.t_limit
+        settled = math.isnan(limit)
+        time, when = (
+            (trajectory.motion.outcome.maxima.t_theta, "largest rotation") if settled else (limit, "20° passed")
+        )
+        found.append(_balance(test, when, time, trajectory.energy()))
+    return found
+
+
+def balance_table(found: list[Balance]) -> Table:
+    """Return the ledgers as a table."""
+    head = ["energy in"]
+    for balance in found:
+        head += [f"{NAMES[balance.test]} at {balance.time_s:.3f} s ({balance.when}) [kJ]", "share"]
+    table = Table(tuple(head))
+    for name, words in PARTS:
+        cells = [words]
+        for balance in found:
+            cells += [f"{balance.parts_J[name] / 1e3:.1f}", f"{balance.parts_J[name] / balance.initial_J:.1%}"]
+        table.add(*cells)
+    sums = []
+    for balance in found:
+        sums += [
+            f"{sum(balance.parts_J.values()) / 1e3:.1f}",
+            f"{sum(balance.parts_J.values()) / balance.initial_J:.1%}",
+        ]
+    table.add("sum", *sums)
+    return table
+
+
+def audit(preset: str, steps: Steps, count: int = AUDIT_DESIGNS, seed: int = 0) -> np.ndarray:
+    """Return the largest residual of the ledger of many random designs.
+
+    Parameters
+    ----------
+    preset
+        ``as_printed`` or ``corrected``.
+    steps
+        Step of the integrator, and whether steps end where the soil yields.
+    count, seed
+        How many designs, and which.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        Largest residual over 0.5 s as a share of the vehicle's energy at first touch.
+    """
+    readings = PRESETS[preset]
+    control = Control(
+        steps.step_s,
+        AUDIT_HORIZON_S,
+        math.radians(20.0),
+        elements=0,
+        error_estimate=False,
+        stop_at_limit=False,
+        locate_yield=steps.locate_yield,
+    )
+    residuals = np.empty(count)
+    for row, design in enumerate(random_designs(count, seed)):
+        record = _blank_record()
+        simulate_design(design, readings, control, record)
+        reached = np.isfinite(record.states).all(axis=1)
+        kept = Record(*(field[reached] for field in record))
+        residuals[row] = ledger_of(kept, design, readings, constants_of(design, readings, 0)).largest_residual
+    return residuals
+
+
+def audit_table() -> Table:
+    """Return how well the ledger closes, for every named accuracy and both presets."""
+    table = Table(("accuracy", "step [ms]", "readings", "median", "99 %", "largest"))
+    for accuracy in ACCURACIES:
+        for preset in PRESETS:
+            steps = reported_steps(accuracy, preset)
+            found = audit(preset, steps)
+            values = (np.median(found), np.quantile(found, 0.99), found.max())
+            table.add(
+                accuracy, f"{1e3 * steps.step_s:g}", preset.replace("_", " "), *(f"{value:.0e}" for value in values)
+            )
+    return table
+
+
+def reported_steps(accuracy: str, preset: str) -> Steps:
+    """Return the steps of the solution that a row reports, by the names of an accuracy and of a preset."""
+    model, solver = Model(ReadingChoice.of_preset(preset)), SolverSettings(accuracy=accuracy)
+    sweep = dataclasses.replace(crash_test("rwg"), model=model, solver=solver)
+    chosen = accuracy_of(sweep)
+    return Steps(float(chosen.to_dict()["reported_step_s"]), chosen.steps.locate_yield)
+
+
+def _balance(test: str, when: str, time_s: float, ledger: EnergyLedger) -> Balance:
+    """Read a ledger at an instant."""
+    parts = {name: float(np.interp(time_s, ledger.time_s, getattr(ledger, name))) for name, _ in PARTS}
+    return Balance(test, when, time_s, parts, ledger.initial)
+
+
+def _blank_record() -> Record:
+    """Return a record to be filled at evenly spaced times."""
+    times = np.linspace(0.0, AUDIT_HORIZON_S * (1.0 - 1e-14), AUDIT_SAMPLES)
+    n = len(times)
+    return Record(times, np.full((n, 6), np.nan), np.zeros(n, np.int8), np.zeros(n, np.bool_), np.full((n, 4), np.nan))

@@ -1,0 +1,65 @@
+"""The pictures of the documentation, each drawn by the same code that users call."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from boulder_sweep import load, read, run
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.crash_tests.fitting import fit_pulse, read_pulse
+from boulder_sweep.crash_tests.validation import validate
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.views.validation import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
+from boulder_sweep.views.verdict_map import draw_verdict_map
+from docs.studies.contents import EVERY, GRID
+from docs.studies.example_pulse import example_pulse
+from docs.studies.knife_edge import draw_knife_edge
+from docs.studies.readings import readings_study
+from docs.studies.readings_plot import draw_readings
+
+FOLDER = Path("docs/images")
+STILL_AT_S = 0.06
+
+
+def draw_all(root: Path) -> list[Path]:
+    """Draw every picture of the documentation.
+
+    Parameters
+    ----------
+    root
+        Folder of the repository.
+
+    Returns
+    -------
+    list of Path
+        What was drawn.
+    """
+    folder = root / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn: list[Path] = []
+
+    def named(name: str) -> Path:
+        drawn.append(folder / name)
+        return drawn[-1]
+
+    for test in ("abg", "rwg"):
+        trajectory = simulate(crash_test(test))
+        trajectory.plot(named(f"trajectory_{test}.png"))
+        trajectory.plot_energy(named(f"energy_{test}.png"))
+        trajectory.plot_side_view(named(f"side_view_{test}.png"), time_s=STILL_AT_S)
+    found = validate()
+    draw_rigid_wall(found.wall, named("figure_10_rigid_wall.png"))
+    draw_convergence(found.convergence, named("convergence.png"))
+    for test, (_, name) in FIGURES.items():
+        draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, named(name))
+    draw_readings(readings_study(root / GRID, EVERY), named("readings.png"))
+    draw_knife_edge(named("knife_edge.png"))
+    with tempfile.TemporaryDirectory() as scratch:
+        pulse = Path(scratch) / "pulse.csv"
+        pulse.write_text(example_pulse(), encoding="utf-8")
+        fit_pulse(read_pulse(pulse), 6800.0).plot(named("vehicle_fit.png"))
+        sweep = load(root / GRID)
+        run(sweep, Path(scratch) / "grid.sweep")
+        draw_verdict_map(read(Path(scratch) / "grid.sweep"), named("m30_sizing.png"), title=sweep.name)
+    return sorted(drawn)

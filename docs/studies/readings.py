@@ -1,0 +1,225 @@
+"""What each of the five doubtful formulas does: to both crash tests, and to the designs that pass of a whole grid."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from boulder_kernels import simulate_table
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.crash_tests.tables import Table, number
+from boulder_sweep.designs import DesignBlock
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge.evaluation import Evaluation, design_table, evaluation_of
+from boulder_sweep.judge.judged import ERROR, PASS
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.verdict import judge
+from boulder_sweep.settings import Sweep, load
+from boulder_sweep.settings.model import PRESETS, PRINTED, SWITCHES, Model, ReadingChoice
+
+BLOCK = 32_768
+EQUATIONS = {
+    "inertia": "16",
+    "impact_arm": "5, 6",
+    "contact": "45, 48, 52",
+    "restoring": "37–39",
+    "separation": "47",
+}
+"""Equations that each switch belongs to."""
+
+
+@dataclass(frozen=True)
+class ReadingRow:
+    """Results under one choice of readings.
+
+    Attributes
+    ----------
+    base : str
+        Preset it starts from.
+    switch : str
+        The one reading that differs from it; empty for the preset itself.
+    abg_verdict, rwg_verdict : str
+        Verdicts of the crash tests, reason included.
+    abg_time_to_limit_s : float
+        When American Black Granite passes 20 deg; NaN where never.
+    rwg_rotation_deg, rwg_displacement_m : float
+        Largest rotation and x_b of Rockville White Granite.
+    passes : ndarray of bool, shape (n,)
+        Which designs of the grid pass.
+    """
+
+    base: str
+    switch: str
+    abg_verdict: str
+    rwg_verdict: str
+    abg_time_to_limit_s: float
+    rwg_rotation_deg: float
+    rwg_displacement_m: float
+    passes: np.ndarray
+
+    @property
+    def share(self) -> float:
+        """Share of the grid that passes."""
+        return float(self.passes.mean())
+
+    @property
+    def label(self) -> str:
+        """Name of the row."""
+        if not self.switch:
+            return f"**{self.base}**"
+        other = SWITCHES[self.switch] if self.base == "as_printed" else PRINTED
+        return f"{self.switch}: {other}"
+
+
+@dataclass(frozen=True)
+class ReadingsStudy:
+    """Results under both presets and under every single change of them.
+
+    Attributes
+    ----------
+    grid : str
+        Name of the grid.
+    every : int
+        Every so many-th of its designs was simulated.
+    rows : list of ReadingRow
+        Each preset, followed by its five single changes.
+    """
+
+    grid: str
+    every: int
+    rows: list[ReadingRow]
+
+    def row(self, base: str, switch: str = "") -> ReadingRow:
+        """Return one row."""
+        return next(row for row in self.rows if (row.base, row.switch) == (base, switch))
+
+    @property
+    def designs(self) -> int:
+        """Number of designs simulated."""
+        return len(self.rows[0].passes)
+
+    def changed(self, row: ReadingRow) -> tuple[int, int]:
+        """How many designs pass under a row but not under its preset, and the other way round."""
+        base = self.row(row.base).passes
+        return int((row.passes & ~base).sum()), int((base & ~row.passes).sum())
+
+    def crash_test_table(self) -> Table:
+        """What every reading does to the crash tests."""
+        table = Table(
+            (
+                "readings",
+                "equations",
+                "ABG: 20° at [s]",
+                "ABG verdict",
+                "RWG: largest rotation [deg]",
+                "RWG: largest x_b [m]",
+                "RWG verdict",
+            )
+        )
+        for row in self.rows:
+            table.add(
+                row.label,
+                EQUATIONS.get(row.switch, ""),
+                number(row.abg_time_to_limit_s, 4, "never"),
+                row.abg_verdict,
+                number(row.rwg_rotation_deg, 3),
+                number(row.rwg_displacement_m, 4),
+                row.rwg_verdict,
+            )
+        return table
+
+    def grid_table(self) -> Table:
+        """What every reading does to the designs that pass."""
+        table = Table(("readings", "designs that pass", "pass only with it", "pass only without it"))
+        for row in self.rows:
+            moved = [f"{count / self.designs:.1%}" for count in self.changed(row)] if row.switch else ["", ""]
+            table.add(row.label, f"{row.share:.1%}", *moved)
+        return table
+
+    def deciding(self) -> list[tuple[str, int]]:
+        """Switches by how many verdicts of the grid they change from ``corrected``, most first."""
+        rows = [row for row in self.rows if row.base == "corrected" and row.switch]
+        return sorted(((row.switch, sum(self.changed(row))) for row in rows), key=lambda item: -item[1])
+
+
+def choices() -> list[tuple[str, str, ReadingChoice]]:
+    """Return both presets and every single change of them: preset, switch (or ""), readings."""
+    found = []
+    for base in PRESETS:
+        whole = ReadingChoice.of_preset(base)
+        found.append((base, "", whole))
+        for switch, corrected in SWITCHES.items():
+            other = corrected if base == "as_printed" else PRINTED
+            found.append((base, switch, dataclasses.replace(whole, **{switch: other})))
+    return found
+
+
+def readings_study(grid: Sweep | str | Path, every: int = 1) -> ReadingsStudy:
+    """Simulate both crash tests and a whole grid under both presets and every single change of them.
+
+    Parameters
+    ----------
+    grid
+        Settings of the grid; its own readings do not matter.
+    every
+        Simulate only every so many-th design of the grid.
+    """
+    sweep = grid if isinstance(grid, Sweep) else load(grid)
+    rows = []
+    for base, switch, choice in choices():
+        abg, rwg = (simulate(crash_test(test), readings=choice) for test in ("abg", "rwg"))
+        outcome = rwg.motion.outcome.maxima
+        rows.append(
+            ReadingRow(
+                base=base,
+                switch=switch,
+                abg_verdict=_verdict(abg.verdict, abg.reason),
+                rwg_verdict=_verdict(rwg.verdict, rwg.reason),
+                abg_time_to_limit_s=abg.motion.outcome.t_limit,
+                rwg_rotation_deg=math.degrees(outcome.theta),
+                rwg_displacement_m=outcome.x_b,
+                passes=passing(sweep, choice, every),
+            )
+        )
+    return ReadingsStudy(sweep.name, every, rows)
+
+
+def passing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
+    """Return which designs of a grid pass under some readings, bool, shape (n,).
+
+    Parameters
+    ----------
+    sweep
+        The grid.
+    choice
+        Readings in place of its own.
+    every
+        Only every so many-th design, from the first on.
+    """
+    read_so = dataclasses.replace(sweep, model=Model(choice, sweep.model.soil_elements))
+    evaluation = evaluation_of(read_so, accuracy_of(read_so))
+    passes = []
+    for start in range(0, sweep.n_designs, BLOCK):
+        block = sweep.block(start, min(start + BLOCK, sweep.n_designs))
+        chosen = block.design_id() % every == 0
+        computable = chosen & (np.asarray(block.reasons.codes) == 0)
+        verdict = np.full(len(block), ERROR, dtype=np.int8)
+        verdict[computable] = _judged(evaluation, block, computable)
+        passes.append(verdict[chosen] == PASS)
+    return np.concatenate(passes)
+
+
+def _judged(evaluation: Evaluation, block: DesignBlock, rows: np.ndarray) -> np.ndarray:
+    """Verdict codes of some rows of a block."""
+    table = design_table(block, rows)
+    outcomes = simulate_table(table, evaluation.readings, evaluation.control)
+    bed_offset = block.columns["bed_offset_m"].to_numpy()[rows]
+    return judge(outcomes, table.L, bed_offset, evaluation.limits).verdict
+
+
+def _verdict(verdict: str, reason: str) -> str:
+    return f"{verdict}, {reason}" if reason else verdict

@@ -1,0 +1,102 @@
+"""Measured time histories from CSV: units in the header, every mistake with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boulder_sweep.crash_tests.measured import PULSE_SIGNALS, TEST_SIGNALS, read_history
+from boulder_sweep.settings import SettingsError
+
+
+def write(folder: Path, text: str) -> Path:
+    file = folder / "data.csv"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "name", "expected"),
+    [
+        ("time [ms],displacement [mm]", "10,250", "displacement", 0.25),
+        ("time [ms],displacement (in)", "10,10", "displacement", 0.254),
+        ("time_ms,displacement_m", "10,0.25", "displacement", 0.25),
+        ("t [ms],x [ft]", "10,1", "displacement", 0.3048),
+        ("time [ms],velocity [mph]", "10,30", "velocity", 13.4112),
+        ("time [ms],speed [km/h]", "10,36", "velocity", 10.0),
+        ("time_ms,vehicle_velocity_m_s", "10,12.5", "velocity", 12.5),
+        ("Time [ms],Vehicle Acceleration [g]", "10,-20", "acceleration", -196.133),
+        ("time [ms],acceleration [m/s^2]", "10,-20", "acceleration", -20.0),
+        ("time [ms],acceleration [m/s²]", "10,-20", "acceleration", -20.0),
+        ("time_ms,vehicle_acceleration_m_s2", "10,-20", "acceleration", -20.0),
+        ("time [ms],acceleration [ft/s2]", "10,-10", "acceleration", -3.048),
+        ("time [ms];displacement [m]", "10;0.25", "displacement", 0.25),
+        ("time [ms]\tdisplacement [m]", "10\t0.25", "displacement", 0.25),
+    ],
+)
+def test_units_of_the_header(tmp_path: Path, head: str, row: str, name: str, expected: float) -> None:
+    sign = next(sign for sign in ",;\t" if sign in head)
+    found = read_history(write(tmp_path, f"# a comment\n{head}\n0{sign}0\n\n{row}\n"), PULSE_SIGNALS)
+    assert found.time_s == pytest.approx([0.0, 0.01])
+    assert found.signals[name] == pytest.approx([0.0, expected])
+
+
+def test_empty_cells_are_gaps(tmp_path: Path) -> None:
+    file = write(tmp_path, "time [s],rotation [rad],boulder_displacement [mm]\n0,,0\n0.1,0.1,\n0.2,0.2,30\n")
+    found = read_history(file, TEST_SIGNALS)
+    assert np.isnan(found.signals["rotation"][0])
+    assert found.signals["rotation"][1:] == pytest.approx(np.degrees([0.1, 0.2]))
+    assert found.signals["boulder_displacement"][2] == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        ("time [ms],weight [kg]\n0,1\n1,2\n", ["1: weight [kg]: is not known", "displacement, velocity"]),
+        ("time [ms],displacment [mm]\n0,1\n1,2\n", ["did you mean displacement?"]),
+        ("time [ms],displacement\n0,1\n1,2\n", ["1: displacement: has no unit", "'displacement [m]'"]),
+        ("time [ms],displacement [kg]\n0,1\n1,2\n", ["a length is needed"]),
+        ("time [ms],acceleration [m/s]\n0,1\n1,2\n", ["no unit of acceleration"]),
+        ("time [ms],acceleration [furlong]\n0,1\n1,2\n", ["no unit of acceleration"]),
+        ("velocity [m/s],displacement [m]\n0,1\n1,2\n", ["has no column of time"]),
+        ("time [ms]\n0\n1\n", ["has nothing beside time"]),
+        ("time [ms],x [m],displacement [m]\n0,1,1\n1,2,2\n", ["displacement: stands in two columns"]),
+        ("time [ms],x [m]\n0,1\n0,2\n", ["3: time: 0 s comes after 0 s; times must ascend"]),
+        ("time [ms],x [m]\n0,1\n,2\n", ["3: time: is missing in this row"]),
+        ("time [ms],x [m]\n0,1\n1,two\n", ["3:3: displacement: 'two' is not a number"]),
+        ("time [ms],x [m]\n0,1\n1,2 mm\n", ["3:3: displacement: '2 mm' has a unit; the column has one"]),
+        ("time [ms],x [m]\n0,1\n1,nan\n", ["3:3: displacement: 'nan' is not a finite number"]),
+        ("time [ms],x [m]\n0,1\n1,1_0\n", ["3:3: displacement:"]),
+        ("time [ms],x [m]\n0,1\n1,2,3\n", ["3:1: has 3 cells; the first line has 2"]),
+        ("time [ms],x [m]\n", ["at least two rows"]),
+        ("", ["at least two rows"]),
+        ('time [ms],x [m]\n0,"1\n1,2\n', ["runs over the end of its line"]),
+    ],
+)
+def test_mistakes_with_their_place(tmp_path: Path, text: str, messages: list[str]) -> None:
+    file = write(tmp_path, text)
+    with pytest.raises(SettingsError) as caught:
+        read_history(file, PULSE_SIGNALS)
+    for message in messages:
+        assert message in str(caught.value)
+    assert str(caught.value).startswith(str(file))
+
+
+def test_all_mistakes_at_once(tmp_path: Path) -> None:
+    file = write(tmp_path, "time [ms],x [m]\n0,a\n1,b\n2,c\n")
+    with pytest.raises(SettingsError) as caught:
+        read_history(file, PULSE_SIGNALS)
+    assert len(caught.value.problems) == 3
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="cannot be read"):
+        read_history(tmp_path / "missing.csv", PULSE_SIGNALS)
+    with pytest.raises(SettingsError, match="cannot be read"):
+        read_history(tmp_path, PULSE_SIGNALS)
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"\xff\xfe\x00\x01" * 100)
+    with pytest.raises(SettingsError, match="not UTF-8"):
+        read_history(binary, PULSE_SIGNALS)

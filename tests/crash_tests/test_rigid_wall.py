@@ -1,0 +1,118 @@
+"""A Maxwell element against a rigid wall: the exact response, and the whole model with a boulder that cannot move."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from boulder_sweep.crash_tests.cases import crash_test, rigid_wall_test
+from boulder_sweep.crash_tests.rigid_wall import RigidWall, spring_and_damper
+from boulder_sweep.impact.simulation import simulate
+from tests.oracle.vehicle import WallImpact
+
+MASS, SPRING = 6800.0, 3103.3e3
+CRITICAL = math.sqrt(MASS * SPRING) / 2
+DAMPERS = [2e3, 0.5 * CRITICAL, CRITICAL, 138.91e3, 5 * CRITICAL]
+
+
+def test_figures_of_the_papers_truck() -> None:
+    wall = rigid_wall_test()
+    assert wall.a == pytest.approx(-11.170, abs=5e-4)
+    assert wall.b == pytest.approx(18.210, abs=5e-4)
+    assert wall.max_displacement_m == pytest.approx(0.8267, abs=5e-5)
+    assert wall.max_displacement_time_s == pytest.approx(0.1165, abs=5e-5)
+    assert wall.peak_force / 1e3 == pytest.approx(1040.8, abs=0.06)
+    assert wall.peak_force_time_s == pytest.approx(0.0560, abs=5e-5)
+    assert wall.separation_time_s == pytest.approx(0.1725, abs=5e-5)
+    assert wall.rebound_speed_m_s == pytest.approx(-1.951, abs=5e-4)
+
+
+def test_response_is_eq_49_put_right() -> None:
+    wall = rigid_wall_test()
+    a, b, v_0 = wall.a, wall.b, wall.speed_m_s
+    t = np.linspace(0.0, wall.separation_time_s, 60)
+    P = (v_0 - 2 * a**2 * v_0 / (a**2 + b**2)) / b
+    Q = 2 * a * v_0 / (a**2 + b**2)
+    eq_49 = -Q + np.exp(a * t) * (P * np.sin(b * t) + Q * np.cos(b * t))
+    assert wall.displacement(t) == pytest.approx(eq_49, abs=1e-13)
+
+
+@pytest.mark.parametrize("damper", DAMPERS)
+def test_response_is_that_of_the_oracle(damper: float) -> None:
+    wall, known = RigidWall(MASS, 13.4, SPRING, damper), WallImpact(MASS, 13.4, SPRING, damper)
+    t = np.linspace(0.0, min(wall.separation_time_s, 1.0), 80)
+    for found, expected, scale in zip(wall.response(t), known.response(t), (1.0, 10.0, 200.0), strict=True):
+        assert found == pytest.approx(expected, abs=1e-12 * scale)
+    assert wall.max_displacement_m == pytest.approx(known.largest_displacement()[0], rel=1e-12)
+    assert wall.peak_force == pytest.approx(known.peak_force()[0], rel=1e-12)
+    assert wall.peak_force_time_s == pytest.approx(known.peak_force()[1], rel=1e-9)
+    assert (wall.separation_time_s, wall.rebound_speed_m_s) == pytest.approx(known.separation(), rel=1e-12)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    ratio=st.floats(0.01, 50.0),
+    rate=st.floats(1.0, 100.0),
+    speed=st.floats(0.1, 100.0),
+)
+def test_response_solves_its_equation(ratio: float, rate: float, speed: float) -> None:
+    """m v' = -F, and the spring between the wall and the damper, integrated; both branches and what lies between."""
+    wall = RigidWall(MASS, speed, MASS * rate**2, ratio * rate * MASS)
+    end = min(wall.separation_time_s, 5.0 / rate)
+    t = np.linspace(0.0, end, 20)
+
+    def slope(_t: float, y: np.ndarray) -> list[float]:
+        x, v, crushed = y
+        force = wall.spring_N_m * (x - crushed)
+        return [v, -force / MASS, force / wall.damper_N_s_m]
+
+    solved = solve_ivp(slope, (0.0, end), [0.0, speed, 0.0], t_eval=t, method="Radau", rtol=1e-8, atol=1e-10)
+    x, v, acceleration = wall.response(t)
+    assert x == pytest.approx(solved.y[0], abs=1e-5 * speed / rate)
+    assert v == pytest.approx(solved.y[1], abs=1e-5 * speed)
+    force = wall.spring_N_m * (solved.y[0] - solved.y[2])
+    assert -MASS * acceleration == pytest.approx(force, abs=1e-4 * MASS * speed * rate)
+
+
+def test_it_coasts_after_separation() -> None:
+    wall = rigid_wall_test()
+    t = wall.separation_time_s + np.array([0.0, 0.01, 0.1])
+    x, v, acceleration = wall.response(t)
+    assert np.all(acceleration == 0.0)
+    assert v == pytest.approx(wall.rebound_speed_m_s)
+    assert np.diff(x) == pytest.approx(wall.rebound_speed_m_s * np.diff(t))
+
+
+def test_an_over_damped_vehicle_never_comes_off() -> None:
+    wall = RigidWall(MASS, 13.4, SPRING, 0.3 * CRITICAL)
+    assert wall.over_damped
+    assert math.isnan(wall.b)
+    assert (wall.separation_time_s, wall.max_displacement_time_s) == (math.inf, math.inf)
+    x, v, acceleration = wall.response(np.linspace(0.0, 10.0, 1001))
+    assert np.all(v >= 0.0)
+    assert np.all(acceleration <= 0.0)
+    assert x[-1] == pytest.approx(wall.max_displacement_m, rel=1e-9)
+
+
+def test_fitting_constants_give_spring_and_damper_back() -> None:
+    """Eqs 50 and 51."""
+    wall = rigid_wall_test()
+    assert spring_and_damper(wall.mass_kg, wall.a, wall.b) == pytest.approx((wall.spring_N_m, wall.damper_N_s_m))
+
+
+@pytest.mark.parametrize("damper", [138.91e3, 0.5 * CRITICAL])
+def test_a_boulder_that_cannot_move_is_a_rigid_wall(damper: float) -> None:
+    """The whole simulation against the exact response: a boulder a million times too dense."""
+    heavy = {"boulder_density_kg_m3": 2596e6, "vehicle_damper_N_s_m": damper, "vehicle_mass_kg": MASS}
+    found = simulate(crash_test("rwg").constants | heavy, step_s=0.001, horizon_s=0.16)
+    wall = RigidWall(MASS, 14.5, SPRING, damper)
+    x, v, acceleration = wall.response(found.time_s)
+    assert found.vehicle_displacement_m == pytest.approx(x, abs=2e-5)
+    assert found.vehicle_velocity_m_s == pytest.approx(v, abs=1e-3)
+    assert found.contact_force_N == pytest.approx(-MASS * acceleration, abs=1e-4 * wall.peak_force)
+    assert found.summary()["peak_force_kN"] == pytest.approx(wall.peak_force / 1e3, rel=1e-5)

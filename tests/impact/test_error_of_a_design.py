@@ -1,0 +1,48 @@
+"""The numerical error of one design over time is estimated by the rule of a row of a sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import boulder_sweep
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import VERDICTS
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.settings.model import PRESETS
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("change", ["vehicle.spring=1e8 N/m", "soil.subgrade_reaction=60000 MN/m^3"])
+def test_error_is_estimated_also_where_the_step_is_shortened(preset: str, change: str) -> None:
+    """Both solutions are shortened for a stiff design, and the finer still has half the step of the coarser."""
+    sweep = boulder_sweep.load(
+        CONFIGS / "rwg.yaml", [change, "solver.accuracy=balanced", f"model.readings={preset}", "solver.horizon=1 s"]
+    )
+    row = evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, 1))
+    found = simulate(sweep).summary()
+    assert found["verdict"] == VERDICTS[row.verdict[0]]
+    assert found["rotation_error_deg"] > 0.0
+    # A row stops at the limit and may take longer steps; each is known to within its own error.
+    apart = abs(found["max_rotation_deg"] - row.max_rotation_deg[0])
+    assert apart <= found["rotation_error_deg"] + row.rotation_error_deg[0]
+
+
+def test_error_is_infinite_where_only_one_solution_reaches_the_limit() -> None:
+    """A limit between the peaks of the two solutions: neither says by how much it is wrong."""
+    sweep = boulder_sweep.load(CONFIGS / "rwg.yaml", ["solver.accuracy=balanced"])
+    coarse, fine = (simulate(sweep, step_s=step).summary()["max_rotation_deg"] for step in (0.008, 0.004))
+    limit = 0.75 * coarse + 0.25 * fine
+    between = boulder_sweep.load(
+        CONFIGS / "rwg.yaml", ["solver.accuracy=balanced", f"criterion.max_rotation={limit!r} deg"]
+    )
+    row = evaluation_of(between, accuracy_of(between))(between.block(0, 1))
+    found = simulate(between)
+    assert found.verdict == VERDICTS[row.verdict[0]]
+    assert np.isinf(row.displacement_error_m[0])
+    assert np.isinf(found.judged.displacement_error_m[0])

@@ -1,0 +1,271 @@
+"""One design over time: its arrays obey the equations, its summary agrees with a row of a sweep."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import boulder_sweep
+from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.crash_tests.cases import NAMES, crash_test
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import REASONS, VERDICTS
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.settings.model import PRESETS, ReadingChoice
+from tests import oracle
+from tests.conftest import Trajectories
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+BOTH = [(test, preset) for test in NAMES for preset in PRESETS]
+CASES = {"abg": oracle.ABG, "rwg": oracle.RWG}
+ORACLE_READINGS = {"as_printed": oracle.AS_PRINTED, "corrected": oracle.CORRECTED}
+
+# case, preset: max |theta| [deg], its time [s], max x_b [m], max x_v [m], peak F_v [kN], 20 deg at [s]
+KNOWN = {
+    ("abg", "as_printed"): (114.258, 0.389, 1.6555, 2.0859, 776.55, 0.0795),
+    ("abg", "corrected"): (157.742, 0.407, 1.4096, 3.5016, 855.44, 0.0769),
+    ("rwg", "as_printed"): (7.6940, 0.2369, 0.1505, 0.9209, 1079.79, None),
+    ("rwg", "corrected"): (13.7612, 0.3039, 0.2820, 1.3243, 1027.73, None),
+}
+
+
+@pytest.mark.parametrize("key", BOTH)
+def test_summary_of_the_crash_tests(trajectories: Trajectories, key: tuple[str, str]) -> None:
+    found = trajectories[key].summary()
+    theta, t_theta, x_b, x_v, force, reached = KNOWN[key]
+    assert found["max_rotation_deg"] == pytest.approx(theta, abs=6e-4)
+    assert found["time_of_max_rotation_s"] == pytest.approx(t_theta, abs=6e-4)
+    assert found["max_displacement_m"] == pytest.approx(x_b, abs=6e-5)
+    assert found["max_vehicle_displacement_m"] == pytest.approx(x_v, abs=6e-5)
+    assert found["peak_force_kN"] == pytest.approx(force, abs=0.03)
+    assert found["time_to_limit_s"] == (None if reached is None else pytest.approx(reached, abs=6e-5))
+    assert (found["verdict"], found["reason"]) == (("fail", "overturns") if key[0] == "abg" else ("pass", ""))
+    assert found["preset"] == key[1]
+    assert 0.0 < found["energy_residual"] < 1e-7
+    assert list(found["readings"]) == ["inertia", "impact_arm", "contact", "restoring", "separation"]
+    assert set(OUTCOME_COLUMNS) < set(found)
+    json.dumps(found, allow_nan=False)
+
+
+@pytest.mark.parametrize("key", BOTH)
+def test_time_history_is_that_of_the_oracle(trajectories: Trajectories, key: tuple[str, str]) -> None:
+    found = trajectories[key]
+    test, preset = key
+    known = oracle.simulate(CASES[test], ORACLE_READINGS[preset])
+    some = slice(0, 241, 20)  # the first 0.12 s; what comes after 20 deg amplifies every difference
+    states = known.states(found.time_s[some])
+    names = (
+        "boulder_displacement_m",
+        "boulder_velocity_m_s",
+        "rotation_rad",
+        "angular_velocity_rad_s",
+        "vehicle_displacement_m",
+        "vehicle_velocity_m_s",
+        "vehicle_acceleration_m_s2",
+    )
+    for name, values in zip(names, states, strict=False):
+        expected = values
+        if name == "vehicle_acceleration_m_s2" and preset == "corrected":
+            expected = np.where(found.in_contact[some] == "touching", values, 0.0)
+        scale = 1e-6 if "acceleration" not in name else 1e-3
+        assert getattr(found, name)[some] == pytest.approx(expected, abs=scale)
+    assert found.contact_force_N[some] == pytest.approx(known.force(found.time_s[some]), abs=5.0)
+
+
+@pytest.mark.parametrize("key", BOTH)
+def test_forces_and_moments_give_the_accelerations(trajectories: Trajectories, key: tuple[str, str]) -> None:
+    """Newton's second law by central differences, wherever no mode changes between the samples."""
+    t = trajectories[key]
+    c = t.motion.constants
+    step = t.time_s[1] - t.time_s[0]
+    force = t.soil_force_N + t.contact_force_N
+    moment = t.soil_moment_N_m + t.contact_moment_N_m + t.restoring_moment_N_m
+    same = (t.rotation_mode[2:] == t.rotation_mode[:-2]) & (t.in_contact[2:] == t.in_contact[:-2])
+    same &= np.abs(np.diff(moment, 2)) < 2e-3 * np.abs(moment).max()  # nor a kink in the soil
+    assert same.mean() > 0.9
+    a_b = (t.boulder_velocity_m_s[2:] - t.boulder_velocity_m_s[:-2]) / (2 * step)
+    alpha = (t.angular_velocity_rad_s[2:] - t.angular_velocity_rad_s[:-2]) / (2 * step)
+    assert (c.m_eff * a_b)[same] == pytest.approx(force[1:-1][same], abs=2e-3 * np.abs(force).max())
+    assert (c.J_eff * alpha)[same] == pytest.approx(moment[1:-1][same], abs=2e-3 * np.abs(moment).max())
+    touching = (t.in_contact == "touching").astype(bool)
+    mass = t.motion.design.m_v
+    assert t.contact_force_N[touching] == pytest.approx(-mass * t.vehicle_acceleration_m_s2[touching])
+    assert np.all(t.contact_force_N[~touching] == 0.0)
+
+
+def test_displacement_of_the_boulders_own_centre(trajectories: Trajectories) -> None:
+    """Eqs 53 to 55: a marker on the boulder's centre, followed through translation and rotation of the rigid body."""
+    for t in trajectories.values():
+        c, design, theta = t.motion.constants, t.motion.design, t.rotation_rad
+        # From the common centre of mass, X ahead and Y down; a clockwise turn with Y down is the usual rotation.
+        marker = np.array([design.L / 2 - c.c_x, c.c_y - design.H / 2])
+        turned = np.cos(theta) * marker[0] - np.sin(theta) * marker[1]
+        assert t.boulder_centre_displacement_m == pytest.approx(
+            t.boulder_displacement_m + turned - marker[0], abs=1e-12
+        )
+        radius, angle = math.hypot(*marker), math.atan2(marker[1], marker[0])
+        polar = t.boulder_displacement_m + radius * (np.cos(angle + theta) - math.cos(angle))
+        assert t.boulder_centre_displacement_m == pytest.approx(polar, abs=1e-12)
+        assert t.boulder_centre_displacement_m[0] == 0.0
+
+
+def test_arrays_have_one_value_per_sample(trajectories: Trajectories) -> None:
+    t = trajectories["rwg", "corrected"]
+    assert len(t) == 1001
+    assert t.time_s[[0, -1]] == pytest.approx([0.0, 0.5], abs=0)
+    for name, values in t.columns(energy=True).items():
+        assert len(values) == len(t), name
+    assert "1001 samples, pass" in repr(t)
+
+
+def test_maxima_do_not_depend_on_the_samples() -> None:
+    coarse, fine = (simulate(crash_test("rwg"), sample_s=dt).summary() for dt in (0.05, 0.0005))
+    assert coarse.pop("energy_residual") <= fine.pop("energy_residual")  # the largest over the samples there are
+    assert coarse == fine
+
+
+def test_verdict_is_that_of_a_row_of_a_sweep() -> None:
+    grid = boulder_sweep.load(CONFIGS / "m30_sizing.yaml")
+    for number in range(0, grid.n_designs, grid.n_designs // 40):
+        row = evaluation_of(grid, accuracy_of(grid))(grid.block(number, number + 1))
+        found = simulate(grid, number).summary()
+        assert found["verdict"] == VERDICTS[row.verdict[0]]
+        assert found["reason"] == REASONS[row.reason[0]]
+        if found["reason"] == "overturns":
+            assert found["time_to_limit_s"] == pytest.approx(row.time_to_limit_s[0], abs=1e-6)
+        elif found["reason"] == "":
+            for name in ("margin", "max_rotation_deg", "max_displacement_m", "peak_force_kN", "penetration_m"):
+                assert found[name] == pytest.approx(getattr(row, name)[0], rel=1e-6), name
+            for name in ("rotation_error_deg", "displacement_error_m"):
+                assert found[name] == pytest.approx(getattr(row, name)[0], rel=1e-3), name
+
+
+def test_a_design_may_be_a_file_a_mapping_or_a_row_of_a_table(tmp_path: Path) -> None:
+    sweep = boulder_sweep.load(CONFIGS / "crash_tests.yaml")
+    from_sweep = simulate(sweep, 1).summary()
+    from_file = simulate(str(CONFIGS / "crash_tests.yaml"), 1).summary()
+    assert from_file == from_sweep
+    boulder_sweep.run(sweep, tmp_path / "out")
+    row = boulder_sweep.read(tmp_path / "out").iloc[1]
+    of_row = simulate(row).summary()
+    assert of_row["max_rotation_deg"] == from_sweep["max_rotation_deg"]
+    assert of_row["verdict"] == row["verdict"]
+    plain = {name: value for name, value in from_sweep_inputs(sweep).items() if name != "embedment_depth_m"}
+    ratio = simulate(plain | {"embedment_ratio": 2.03 / 3.44}).summary()
+    assert ratio["max_rotation_deg"] == pytest.approx(from_sweep["max_rotation_deg"], rel=1e-9)
+
+
+def from_sweep_inputs(sweep: boulder_sweep.Sweep) -> dict[str, float]:
+    return {name: float(column.to_numpy()[0]) for name, column in sweep.block(1, 2).columns.items()}
+
+
+def test_a_mapping_that_lacks_something_is_refused() -> None:
+    with pytest.raises(ValueError, match="boulder_height_m"):
+        simulate({"boulder_length_m": 1.0})
+
+
+def test_readings_soil_step_and_horizon_can_be_changed() -> None:
+    sweep = crash_test("rwg")
+    single = simulate(sweep, readings=ReadingChoice(impact_arm="printed"))
+    assert single.summary()["max_rotation_deg"] == pytest.approx(6.772, abs=6e-4)
+    assert single.summary()["preset"] == "mixed"
+    sums = simulate(sweep, readings="as_printed", soil_elements=2000, step_s=0.002)
+    assert sums.summary()["max_rotation_deg"] == pytest.approx(7.6997, abs=6e-5)
+    assert sums.summary()["soil"] == 2000
+    assert simulate(sweep, horizon_s=0.1).time_s[-1] == 0.1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"readings": "right"},
+        {"soil_elements": -1},
+        {"step_s": 0.0},
+        {"horizon_s": -1.0},
+        {"horizon_s": math.nan},
+        {"sample_s": 0.0},
+        {"sample_s": 1e-9},
+        {"sample_s": math.nan},
+    ],
+)
+def test_what_makes_no_sense_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        simulate(crash_test("rwg"), **wrong)
+
+
+def test_a_truck_that_passes_over_leaves_no_samples() -> None:
+    low = simulate(crash_test("rwg").constants | {"boulder_height_m": 2.5})
+    assert len(low) == 0
+    found = low.summary()
+    assert (found["verdict"], found["reason"]) == ("fail", "no_contact")
+    assert found["max_rotation_deg"] is None
+    assert found["time_of_max_rotation_s"] is None
+    assert math.isnan(low.energy().largest_residual)
+    assert low.to_arrow(energy=True).num_rows == 0
+
+
+def test_an_impossible_design_is_refused_in_words() -> None:
+    with pytest.raises(ValueError, match=r"cannot be computed: .*embedment"):
+        simulate(crash_test("rwg").constants | {"embedment_depth_m": 5.0})
+    with pytest.raises(IndexError):
+        simulate(crash_test("rwg"), 7)
+
+
+def test_parquet_holds_units_meanings_and_settings(trajectories: Trajectories, tmp_path: Path) -> None:
+    t = trajectories["rwg", "corrected"]
+    t.to_parquet(tmp_path / "plain.parquet")
+    t.to_parquet(tmp_path / "energy.parquet", energy=True)
+    table = pq.read_table(tmp_path / "energy.parquet")
+    assert table.column_names == [spec.name for spec in (*HISTORY, *ENERGY)]
+    assert pq.read_schema(tmp_path / "plain.parquet").names == [spec.name for spec in HISTORY]
+    for spec in (*HISTORY, *ENERGY):
+        metadata = table.schema.field(spec.name).metadata
+        assert metadata == {b"unit": spec.unit.encode(), b"meaning": spec.meaning.encode()}
+    assert table["rotation_rad"].to_numpy() == pytest.approx(t.rotation_rad, abs=0)
+    settings = json.loads(table.schema.metadata[b"boulder_sweep.settings"])
+    assert settings["model"]["preset"] == "corrected"
+    assert json.loads(t.to_json()) == t.summary()
+
+
+def test_crash_tests_are_those_of_the_settings_files() -> None:
+    for test in NAMES:
+        file = boulder_sweep.load(CONFIGS / f"{test}.yaml").resolved()
+        assert crash_test(test).resolved()["inputs"] == file["inputs"]
+        assert file["solver"]["horizon_s"] == crash_test(test).solver.horizon_s
+
+
+EXTREMES = {
+    "at rest": {"impact_speed_m_s": 0.0},
+    "a touch": {"impact_speed_m_s": 1e-3},
+    "thrown over": {"boulder_density_kg_m3": 300.0, "impact_speed_m_s": 60.0},
+    "a splinter": {"boulder_length_m": 0.01, "boulder_width_m": 0.01},
+    "a mountain": {"boulder_density_kg_m3": 1e9},
+    "a rigid damper": {"vehicle_damper_N_s_m": 1e12},
+    "on the ground": {"embedment_depth_m": 1e-3},
+    "in mud": {"subgrade_reaction_MN_m3": 1e-3},
+}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("name", EXTREMES)
+def test_extremes_have_a_history_that_adds_up(name: str, preset: str) -> None:
+    found = simulate(crash_test("rwg").constants | EXTREMES[name], readings=preset, horizon_s=0.5)
+    assert found.verdict in ("pass", "fail", "undecided")
+    for values in found.columns(energy=True).values():
+        assert values.dtype == object or np.isfinite(values).all()
+    assert found.energy().largest_residual < 1e-4
+    json.dumps(found.summary(), allow_nan=False)
+
+
+def test_a_design_that_cannot_be_integrated_says_why() -> None:
+    found = simulate(crash_test("rwg").constants | {"vehicle_damper_N_s_m": 1.0})
+    assert (found.verdict, len(found)) == ("error", 0)
+    assert "damper" in found.reason
+    assert found.summary()["max_rotation_deg"] is None

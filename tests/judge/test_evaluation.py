@@ -1,0 +1,91 @@
+"""From a block of designs to judged rows."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from boulder_kernels import simulate_table
+from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.judge.evaluation import by_kernels, control_of, design_table, evaluation_of, readings_of
+from boulder_sweep.judge.judged import ERROR, VERDICTS
+from boulder_sweep.judge.pilot import accuracy_of
+from tests.runner.grids import grid, partly_impossible, plausible
+
+
+def test_the_kernels_get_si_and_radians():
+    sweep = grid()
+    block = sweep.block(0, sweep.n_designs)
+    table = design_table(block)
+    assert table.phi == pytest.approx(np.radians(block.columns["friction_angle_deg"].to_numpy()))
+    assert table.beta == pytest.approx(block.columns["subgrade_reaction_MN_m3"].to_numpy())
+    assert table.e_bumper[0] == 0.5
+    assert table.e == pytest.approx(0.5 * (np.minimum(table.H - table.d, 1.4) + 0.5))
+    for column in table:
+        assert column.dtype == np.float64
+        assert column.flags["C_CONTIGUOUS"]
+        assert len(column) == sweep.n_designs
+
+
+def test_readings_and_control_are_those_of_the_settings():
+    sweep = grid(soil="{elements: 50}", rotation="10 deg", step="2 ms")
+    assert all(readings_of(sweep))
+    control = control_of(sweep, accuracy_of(sweep))
+    assert control.elements == 50
+    assert control.h == 0.002
+    assert control.horizon == 1.0
+    assert control.theta_limit == pytest.approx(np.radians(10.0))
+
+
+def test_impossible_rows_never_enter_the_kernels_and_keep_their_place():
+    sweep = partly_impossible()
+    seen = []
+
+    def watching(table, readings, control):
+        seen.append(table)
+        return plausible(table, readings, control)
+
+    block = sweep.block(0, sweep.n_designs)
+    rows = evaluation_of(sweep, accuracy_of(sweep), watching)(block)
+    impossible = block.reasons.codes != 0
+    assert 0 < impossible.sum() < len(impossible)
+    (table,) = seen
+    assert len(table.L) == (~impossible).sum()
+    assert (table.d < table.H).all()
+    for row in range(0, sweep.n_designs, 7):
+        alone = evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(row, row + 1))
+        for name in OUTCOME_COLUMNS:
+            if name != "reason":
+                assert np.array_equal(getattr(alone, name), getattr(rows, name)[row : row + 1], equal_nan=True)
+        assert alone.reasons[alone.reason[0]] == rows.reasons[rows.reason[row]]
+        assert (VERDICTS[alone.verdict[0]] == "error" and bool(block.reasons[row])) == impossible[row]
+
+
+def test_a_block_of_impossible_rows_only():
+    sweep = grid(height="[2 m, 3 m]", site="embedment_depth: 3.5 m")
+    rows = evaluation_of(sweep, accuracy_of(sweep), _never)(sweep.block(0, sweep.n_designs))
+    assert (rows.verdict == ERROR).all()
+    assert all(rows.reasons[code] for code in rows.reason)
+
+
+def _never(table, readings, control):
+    raise AssertionError("nothing to simulate")
+
+
+def test_an_evaluation_is_sent_by_name_not_as_source():
+    evaluation = evaluation_of(grid(), accuracy_of(grid()))
+    assert evaluation.simulate is by_kernels
+    sent = pickle.dumps(evaluation)
+    assert len(sent) < 2_000
+    assert pickle.loads(sent) == evaluation
+
+
+def test_the_plain_function_is_the_kernel():
+    sweep = grid()
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    table = design_table(sweep.block(0, 9))
+    direct = simulate_table(table, evaluation.readings, evaluation.control)
+    for one, other in zip(direct, by_kernels(table, evaluation.readings, evaluation.control), strict=True):
+        assert np.array_equal(one, other, equal_nan=True)

@@ -1,0 +1,90 @@
+"""An accuracy given as a number: the step is chosen on the grid itself, and the same every time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED
+from boulder_sweep.judge.evaluation import control_of
+from boulder_sweep.judge.pilot import accuracy_of, pilot, pilot_size
+from boulder_sweep.judge.sampling import sampled_rows
+from boulder_sweep.runner.sweeper import run
+from boulder_sweep.settings import Sweep, load_text
+from boulder_sweep.store.manifest import load as load_manifest
+from tests.runner.grids import DEFAULTS, GRID, grid, grid_of
+
+
+def asked(accuracy: str, **changes: str) -> Sweep:
+    text = GRID.format(**{**DEFAULTS, **changes}).replace(f"step: {DEFAULTS['step']}", f"accuracy: {accuracy}")
+    return load_text(text, Path("grid.yaml"))
+
+
+@pytest.mark.parametrize("name", ["fast", "balanced", "fine"])
+def test_names_stand_for_steps(name: str) -> None:
+    assert accuracy_of(asked(name)).steps == STEPS[name]
+    text = GRID.format(**DEFAULTS).replace("step: 4 ms", f"accuracy: {name}").replace("corrected", "as_printed")
+    assert accuracy_of(load_text(text, Path("grid.yaml"))).steps == STEPS_PRINTED[name]
+    assert accuracy_of(asked(name)).error_estimate == (name != "fast")
+
+
+def test_smaller_numbers_get_shorter_steps_that_meet_them() -> None:
+    rungs = []
+    for wanted in (1.0, 1e-2, 1e-4, 1e-6):
+        found = accuracy_of(asked(f"{wanted} deg"))
+        assert found.met
+        assert found.achieved_deg is not None
+        assert found.achieved_deg <= wanted
+        rungs.append(LADDER.index(found.steps))
+    assert rungs == sorted(rungs)
+    assert rungs[-1] > rungs[0]
+
+
+def test_what_cannot_be_met_is_said() -> None:
+    found = accuracy_of(asked("1e-9 deg", subgrade="[25, 95] MN/m^3", friction="40 deg"))
+    assert found.met == (found.achieved_deg is not None and found.achieved_deg <= 1e-9)
+    assert found.to_dict()["met"] == found.met
+
+
+def test_a_pilot_repeats_itself_to_the_bit() -> None:
+    one, other = asked("0.001 deg"), asked("0.001 deg")
+    assert pilot(one, 1e-3) == pilot(other, 1e-3)
+    assert control_of(one, accuracy_of(one)) == control_of(other, accuracy_of(other))
+
+
+def test_chosen_and_achieved_stand_in_summary_and_metadata_and_survive_a_resume(tmp_path: Path) -> None:
+    sweep, out = asked("0.001 deg"), tmp_path / "out"
+    summary = run(sweep, out, jobs=1)
+    told = accuracy_of(sweep).to_dict()
+    assert summary.accuracy == told
+    assert load_manifest(out).identity["accuracy"] == told
+    assert told["asked"] == "0.001 deg"
+    assert told["estimated_error_p99_9_deg"] <= 1e-3
+    again = run(asked("0.001 deg"), out, jobs=2, resume=True)
+    assert (again.rows_computed, again.accuracy) == (0, told)
+
+
+def test_pilots_of_element_sums_are_smaller() -> None:
+    assert pilot_size(0) == pilot_size(16) > pilot_size(50) > pilot_size(5000) == 256
+
+
+@pytest.mark.parametrize("count", [10, 100, 441, 5000])
+def test_samples_hold_the_corners_and_no_row_twice(count: int) -> None:
+    sweep = grid()
+    found = sampled_rows(sweep, count)
+    assert len(np.unique(found)) == len(found) <= min(count, sweep.n_designs)
+    assert (np.diff(found) > 0).all()
+    assert {0, sweep.n_designs - 1} <= set(found.tolist())
+    assert np.array_equal(found, sampled_rows(grid(), count))
+
+
+def test_samples_reach_every_value_of_every_axis() -> None:
+    sweep = grid_of(100_000)
+    rows = sampled_rows(sweep, 1000)
+    assert len(np.unique(rows * 100 // sweep.n_designs)) == 100
+    sweep = grid()
+    rows = sampled_rows(sweep, 120)
+    for stride, length in zip(sweep.plan.strides, sweep.plan.lengths, strict=True):
+        assert len(np.unique(rows // stride % length)) == length

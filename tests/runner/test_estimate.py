@@ -1,0 +1,235 @@
+"""Limits before work: blocks, counts, estimates."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.runner import estimate as limits
+from boulder_sweep.runner.admission import Admission
+from boulder_sweep.runner.estimate import (
+    LARGEST_BLOCK,
+    Estimate,
+    Sample,
+    blocks,
+    estimated,
+    peak_memory,
+    rows_per_block,
+    rows_under_way,
+    size_text,
+    take_sample,
+)
+from boulder_sweep.runner.sweeper import estimate, run
+from boulder_sweep.store.errors import DoesNotFitError
+from boulder_sweep.store.schema import encode, part_table
+from tests.runner.grids import grid, grid_of, plausible
+
+HUGE = {
+    "width": "{from: 1 m, to: 2.5 m, count: 10000}",
+    "height": "{from: 1.6 m, to: 3.4 m, count: 10000}",
+    "subgrade": "{from: 20 MN/m^3, to: 100 MN/m^3, count: 10000}",
+    "site": "embedment_ratio: 0.5",
+    "friction": "40 deg",
+}
+
+
+@given(
+    st.lists(st.integers(1, 50), min_size=1, max_size=10),
+    st.integers(1, 20),
+)
+def test_blocks_cover_every_row_once_in_order_and_stay_within_their_range(lengths, size):
+    ranges, start = [], 0
+    for length in lengths:
+        ranges.append((start, start + length))
+        start += length + 3  # a gap: rows that are there already
+    cut = list(blocks(iter(ranges), size))
+    assert [row for a, b in cut for row in range(a, b)] == [row for a, b in ranges for row in range(a, b)]
+    assert all(b - a <= size for a, b in cut)
+    assert all(any(a >= first and b <= last for first, last in ranges) for a, b in cut)
+
+
+@settings(max_examples=100)
+@given(st.floats(1e-9, 100.0), st.integers(1, 10**12), st.integers(1, 256))
+def test_blocks_are_short_and_there_is_one_for_every_worker(seconds, rows, jobs):
+    size = rows_per_block(seconds, rows, jobs)
+    assert 1 <= size <= LARGEST_BLOCK
+    assert size == 1 or size * seconds <= 0.2
+    assert size == 1 or rows / size >= jobs
+
+
+def test_a_whole_part_can_always_be_under_way():
+    for jobs in (1, 2, 64):
+        for block in (1, 100, LARGEST_BLOCK):
+            assert rows_under_way(block, jobs, 131_072) >= 2 * 131_072
+
+
+def test_admission_bounds_the_rows_under_way_but_lets_one_block_through():
+    admission = Admission(100)
+    assert admission.admit(60)
+    assert not admission.admit(60)
+    assert admission.admit(40)
+    admission.release(60)
+    assert admission.admit(30)
+    tight = Admission(1)
+    assert tight.admit(50)
+    assert not tight.admit(1)
+
+
+def test_sizes_for_people():
+    assert size_text(512) == "512 bytes"
+    assert size_text(60e12) == "60 TB"
+    assert size_text(1.5e6) == "1.5 MB"
+    assert size_text(2e18) == "2,000 PB"
+
+
+def test_a_sample_sees_time_and_bytes():
+    sweep = grid()
+    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), plausible), sweep.block, sweep.n_designs, {})
+    assert sample.seconds_per_row > 0
+    assert 10 < sample.bytes_per_row < 500
+    assert sample.bytes_per_part > 1000
+
+
+def test_a_sample_survives_rows_that_raise():
+    sweep = grid()
+
+    def broken(table, readings, control):
+        raise ValueError("no")
+
+    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), broken), sweep.block, sweep.n_designs, {})
+    assert sample.seconds_per_row > 0
+
+
+class Clock:
+    """A clock that stands still but for the work that is done."""
+
+    def __init__(self, free_up_to: float, seconds_per_row: float, seconds_per_block: float):
+        self.now = 0.0
+        self._free_up_to, self._per_row, self._per_block = free_up_to, seconds_per_row, seconds_per_block
+
+    def perf_counter(self) -> float:
+        return self.now
+
+    def simulate(self, table, readings, control):
+        """Let soils up to some stiffness cost nothing, as designs that are not touched do."""
+        self.now += self._per_block + self._per_row * int(np.count_nonzero(table.beta > self._free_up_to))
+        return plausible(table, readings, control)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("slow_axis", [False, True])
+def test_a_sample_sees_how_many_designs_cost_nothing(monkeypatch, share, slow_axis):
+    """Whether those are the first of the table or spread all over it."""
+    stiffness = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 200}"
+    width = "{from: 1 m, to: 2 m, count: 5000}"
+    finely = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 1000000}"
+    sweep = grid_of(1, subgrade=finely) if slow_axis else grid_of(1, subgrade=stiffness, width=width)
+    clock = Clock(200 * share, seconds_per_row=8e-6, seconds_per_block=2e-4)
+    monkeypatch.setattr(limits, "time", clock)
+    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), clock.simulate), sweep.block, sweep.n_designs, {})
+    truth = 8e-6 * (1.0 - share)
+    assert truth / 1.3 < sample.seconds_per_row < 1.3 * truth + 5e-7
+    assert clock.now < 0.35
+
+
+def test_a_sample_of_slow_designs_behind_quick_ones_stays_short(monkeypatch):
+    sweep = grid_of(1, subgrade="{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 100000}")
+    for seconds in (1e-3, 0.05):
+        clock = Clock(40.0, seconds_per_row=seconds, seconds_per_block=2e-4)
+        monkeypatch.setattr(limits, "time", clock)
+        sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), clock.simulate), sweep.block, sweep.n_designs, {})
+        assert 0.8 * seconds / 2 < sample.seconds_per_row < 2 * 0.8 * seconds
+        assert clock.now < 0.5 + 64 * seconds
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
+    sweep = grid(
+        **({"width": "{from: 1 m, to: 2 m, count: 50}"} if wide else {"height": "{from: 2 m, to: 3 m, count: 80}"})
+    )
+    evaluation = evaluation_of(sweep, accuracy_of(sweep), plausible)
+    sample = take_sample(evaluation, sweep.block, sweep.n_designs, {})
+    block = sweep.block(0, sweep.n_designs)
+    written = len(encode(part_table(block, evaluation(block), {})))
+    assert 0.75 < (sample.bytes_per_row * sweep.n_designs + sample.bytes_per_part) / written < 1.33
+
+
+def test_an_estimate_is_in_proportion():
+    sample = Sample(1e-6, 50.0, 10_000.0)
+    common = {"jobs": 2, "out": None}
+    one = estimated(sample, rows=10**6, rows_to_compute=10**6, **common)
+    ten = estimated(sample, rows=10**7, rows_to_compute=10**7, **common)
+    assert ten.seconds == pytest.approx(10 * one.seconds)
+    assert ten.disk_bytes == pytest.approx(10 * one.disk_bytes, rel=0.05)
+    assert ten.memory_bytes == pytest.approx(one.memory_bytes, rel=0.05)
+    assert estimated(sample, rows=10**7, rows_to_compute=10**6, **common).seconds == one.seconds
+
+
+def test_objections_name_the_numbers():
+    fits = Estimate(
+        rows=10, rows_to_compute=10, seconds=1.0, disk_bytes=100, disk_free_bytes=200, memory_bytes=100,
+        memory_free_bytes=200, rows_per_second=10.0, rows_per_block=1, jobs=1,
+    )  # fmt: skip
+    assert fits.objections() == []
+    (disk,) = replace(fits, disk_bytes=3_000_000_000, disk_free_bytes=1_000_000).objections()
+    assert "3 GB" in disk
+    assert "1 MB" in disk
+    (memory,) = replace(fits, memory_bytes=3_000_000_000, memory_free_bytes=1_000_000).objections()
+    assert "3 GB" in memory
+
+
+def test_an_estimate_writes_nothing(tmp_path):
+    found = estimate(grid(), tmp_path / "out", simulate=plausible)
+    assert found.rows == grid().n_designs
+    assert found.disk_free_bytes > 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_grid_of_ten_to_the_twelve_is_refused_before_memory_grows(tmp_path):
+    sweep = grid(**HUGE)
+    assert sweep.n_designs == 10**12
+    estimate(grid_of(10), simulate=plausible)  # what is imported counts for nothing here
+    tracemalloc.start()
+    try:
+        with pytest.raises(DoesNotFitError, match=r"1,000,000,000,000 rows.*TB.*free.*--force"):
+            run(sweep, tmp_path / "out", simulate=plausible)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 50e6
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_estimate_of_ten_to_the_twelve_is_exact_in_rows():
+    found = estimate(grid(**HUGE), simulate=plausible)
+    assert found.rows == found.rows_to_compute == 10**12
+    assert found.memory_bytes < 2e9
+
+
+_LARGE_PARENT = """
+import subprocess, sys
+large = bytearray(b"1") * 600_000_000
+subprocess.run([sys.executable, "-c", "from boulder_sweep.runner.estimate import peak_memory; print(peak_memory())"], check=True)
+"""
+
+
+def test_memory_of_the_process_that_started_this_one_does_not_count():
+    """A notebook with large tables starts a sweep: an estimate shall not take the notebook's memory for the sweep's."""
+    output = subprocess.run([sys.executable, "-u", "-c", _LARGE_PARENT], check=True, capture_output=True, text=True)
+    assert 10_000_000 < int(output.stdout.split()[-1]) < 500_000_000
+
+
+def test_memory_grows_with_what_is_held():
+    before = peak_memory()
+    held = bytearray(b"1") * 200_000_000
+    assert peak_memory() >= before
+    assert peak_memory() > len(held)
