@@ -38,15 +38,15 @@ class KernelClock:
 
 def main() -> None:
     begun, record = float(sys.argv[1]), Path(sys.argv[2])
-    from boulder_sweep.cli.main import main as cli
+    from boulder_sweep.cli.main import main
     from boulder_sweep.judge import evaluation
     from boulder_sweep.runner.estimate import peak_memory
 
     clock = KernelClock(evaluation.simulate_table)
     vars(evaluation)["simulate_table"] = clock
-    code: str | int | None
+    code: str | int | None = None
     try:
-        code = cli.main(sys.argv[3:])
+        main(sys.argv[3:])
     except SystemExit as end:
         code = end.code
     first = None if clock.first_block is None else clock.first_block - begun

@@ -218,7 +218,8 @@ def test_an_estimate_of_ten_to_the_twelve_is_exact_in_rows():
 _LARGE_PARENT = """
 import subprocess, sys
 large = bytearray(b"1") * 600_000_000
-subprocess.run([sys.executable, "-c", "from boulder_sweep.runner.estimate import peak_memory; print(peak_memory())"], check=True)
+code = "from boulder_sweep.runner.estimate import peak_memory; print(peak_memory())"
+subprocess.run([sys.executable, "-c", code], check=True)
 """
 
 
