@@ -33,7 +33,7 @@ def filled_workspace(table: DesignTable, readings: Readings, control: Control, s
         attempt_steps(ws)
         take_over_steps(ws, control.horizon)
         for lane in range(LANES):
-            if field(ws, ATTENTION, 0, lane) != 0.0:
+            if field(ws, ATTENTION, lane) != 0.0:
                 attend(ws, lane, readings, control)
     return ws
 
@@ -100,7 +100,7 @@ def count_attempts(table: DesignTable, readings: Readings, control: Control, out
         attempt_steps(ws)
         take_over_steps(ws, control.horizon)
         for lane in range(LANES):
-            if field(ws, ATTENTION, 0, lane) != 0.0 and rows[lane] != EMPTY:
+            if field(ws, ATTENTION, lane) != 0.0 and rows[lane] != EMPTY:
                 attended += 1
                 status = attend(ws, lane, readings, control)
                 if status != RUNNING:

@@ -38,7 +38,7 @@ KEPT = ("design", "readings", "stability")
 ORDER = (
     *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "soil", "tableau"),
     *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
-    *("energy", "settling", "workspace", "impact"),
+    *("energy", "settling", "after_step", "workspace", "impact"),
     "lanes",
 )
 CHANGES = {

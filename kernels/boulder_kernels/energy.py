@@ -1,4 +1,9 @@
-"""Where the energy of the truck goes: stored at a state, and exchanged along the motion by quadrature."""
+"""Where the energy of the truck goes: stored at a state, and exchanged along the motion by quadrature.
+
+Every entry comes from its own law: stored energies are potentials, exchanged ones integrals of their own power, and
+none is what the others leave over. So the sum of all of them stays at the truck's initial energy only if the forces of
+the motion are the ones these laws describe.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,8 @@ from .dense_output import DenseOutput, state_at
 from .design import Constants
 from .dynamics import State, acceleration
 from .modes import Modes, Switches
-from .soil import Kinematics, soil_energy, soil_kinematics, soil_reaction
+from .restoring import couple_moment
+from .soil import drag_power, soil_energy, soil_kinematics
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, contact_lever, spring_compression
 
@@ -87,16 +93,13 @@ def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, 
 def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> Exchanged:
     """Powers at a state [W], in the places of the energies they add up to."""
     sin, versin = sine_versine(y.theta_b)
-    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
-    soil = soil_reaction(k, c)
-    springs = soil_reaction(Kinematics(k.A, k.slope_x, 0.0, 0.0, k.q, k.lever_d), c)
-    drag = (springs.F - soil.F) * y.v_b + (springs.M - soil.M) * y.omega_b
+    drag = drag_power(soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), c)
     u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
     F_truck = s.k_truck * u / c.k_m * c.k_v
     # tau_v = m_v/c_v and k_v/k_m = m_v, so 1/c_v = tau_v k_m / k_v.
     damper = F_truck * F_truck * c.tau_v * c.k_m / c.k_v
-    a = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, s, c)
-    M_R = a.alpha_b * c.J_eff - a.M
+    M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, s, c).M
+    M_R = (s.net - 1.0) * M + couple_moment(sin, versin, s, c)
     pull = 0.0
     if not modes.touching:
         v_c = y.v_b + y.omega_b * contact_lever(sin, versin, c)

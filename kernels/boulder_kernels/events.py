@@ -38,9 +38,7 @@ def gap_within(
     switches: Switches,
     c: Constants,
 ) -> float:
-    """Gap of one event at the fraction tau of a step."""
-    if event == LIMIT:
-        return g.limit - abs(displacement_at(dense.rotation, tau))
+    """Gap of one event but LIMIT at the fraction tau of a step."""
     y = state_at(dense, tau)
     if event == CONTACT:
         sin, versin = sine_versine(y.theta_b)
@@ -67,7 +65,7 @@ def locate(
     Parameters
     ----------
     event
-        Which gap.
+        Which gap, but for LIMIT: see `locate_limit`.
     gap_start, gap_end
         Its values at the start of the step and at the end, where it is negative.
     dense, g, switches, c
@@ -88,7 +86,7 @@ def locate(
                 break
         if gap_low <= 0.0:
             return low
-    exact = event == LIMIT or event == CORNER or (event == ROTATION and not needs_moment(g))
+    exact = event == CORNER or (event == ROTATION and not needs_moment(g))
     tolerance = JUMP_TOLERANCE if exact else KINK_TOLERANCE
     bracket = Bracket(low, gap_low, 1.0, gap_end, 0)
     tau = 1.0
@@ -163,7 +161,7 @@ def first_event(
     first, earliest = -1, 1.0
     for event in range(EVENTS):
         if end[event] < 0.0 and (event in (YIELD_TOP, YIELD_BASE)) == yielding:
-            if event == LIMIT and start[event] > 0.0:
+            if event == LIMIT:
                 tau = locate_limit(start[event], end[event], dense.rotation, g.limit, 1.0)
             else:
                 tau = locate(event, start[event], end[event], dense, g, switches, c)

@@ -108,6 +108,7 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
     couple_0, couple_M, couple_abs_M, couple_limit = NEVER, 0.0, 0.0, 0.0
     corner_0, corner_theta = NEVER, 0.0
     arm_0, arm = NEVER, 0.0
+    contact = 1.0 if modes.touching else -1.0
     turning = modes.turning
     if turning == SEATED:
         rotation_0, rotation_abs_M = c.C_cos, -1.0
@@ -140,28 +141,28 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
         base = float(modes.yielded_base)
         base_0, base_abs = (c.x_yield, -1.0) if modes.yielded_base == 0 else (-c.x_yield, 0.0)
     return GapFactors(
-        CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v),
-        1.0 if modes.touching else -1.0,
-        rotation_0,
-        rotation_M,
-        rotation_abs_M,
-        rotation_theta,
-        rotation_omega,
-        couple_0,
-        couple_M,
-        couple_abs_M,
-        couple_limit,
-        corner_0,
-        corner_theta,
-        arm_0,
-        arm,
-        top_0,
-        top_abs,
-        top,
-        base_0,
-        base_abs,
-        base,
-        theta_stop,
+        contact_0=CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v),
+        contact=contact,
+        rotation_0=rotation_0,
+        rotation_M=rotation_M,
+        rotation_abs_M=rotation_abs_M,
+        rotation_theta=rotation_theta,
+        rotation_omega=rotation_omega,
+        couple_0=couple_0,
+        couple_M=couple_M,
+        couple_abs_M=couple_abs_M,
+        couple_limit=couple_limit,
+        corner_0=corner_0,
+        corner_theta=corner_theta,
+        arm_0=arm_0,
+        arm=arm,
+        top_0=top_0,
+        top_abs=top_abs,
+        top=top,
+        base_0=base_0,
+        base_abs=base_abs,
+        base=base,
+        limit=theta_stop,
     )
 
 

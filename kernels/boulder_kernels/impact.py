@@ -7,44 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import kernel
+from .after_step import RUNNING, SHORTEN, cross_event, keep_step, start_motion
 from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
-from .dynamics import Acceleration, State, acceleration
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import first_event, locate_limit
-from .gaps import COUPLE, LIMIT, ROTATION, GapFactors, gap_factors, gaps_at
-from .modes import Modes, Switches, switches_of
-from .outcomes import (
-    Maxima,
-    Outcome,
-    Status,
-    no_maxima,
-    undefined_maxima,
-    updated_maxima,
-)
+from .events import locate_limit
+from .modes import Modes, Switches
+from .outcomes import Outcome, Status, no_maxima, undefined_maxima
 from .readings import Readings
-from .settling import (
-    NO_PROOF,
-    barrier_energy,
-    boulder_energy,
-    inside_maxima,
-    proof_is_possible,
-)
+from .settling import NO_PROOF, proof_is_possible
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
-from .transitions import change_mode, initial_modes
 
 FULL_TURN = math.pi
 """Rotation at which a simulation without a stop ends all the same [rad]: the boulder lies upside down."""
-AT_ONCE = 1e-5
-"""Fraction of a step before which a kink counts as passed already."""
-LANDED = 0.99
-"""Fraction of a step behind which a kink may lie without spoiling it."""
-BEYOND = 1.002
-"""A step that is tried again ends so much behind the kink, which therefore lies in it and not in the next one."""
-SHORTEN = -2
-"""In place of an event: the step is to be tried again, shorter."""
 ATTEMPTS_PER_STEP = 4
 ATTEMPTS_SPARE = 10_000
 """A simulation gives up after so many attempts per nominal step, and these to spare for events."""
@@ -136,156 +113,15 @@ def write_samples(
 
 
 @kernel
-def is_finite(y: State) -> bool:
-    """Whether no component of a state is NaN or infinite."""
-    return bool(np.isfinite(y.x_b + y.v_b + y.theta_b + y.omega_b + y.x_v + y.v_v))
-
-
-@kernel
-def horizon_status(y: State, m: Maxima) -> int:
-    """Status of a design that reached the horizon: outward where a maximum is still being set there."""
-    turning_out = y.theta_b * y.omega_b > 0.0 and abs(y.theta_b) >= m.theta
-    driving_on = y.v_v > 0.0 and y.x_v >= m.x_v
-    return Status.OUTWARD.value if turning_out or driving_on else Status.HORIZON.value
-
-
-@kernel
 def failed(status: int) -> Outcome:
     """Outcome of a design that was not simulated, or not to its end."""
     return Outcome(status, undefined_maxima(), np.nan, np.nan, 0)
 
 
 @kernel
-def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
-    """Acceleration at a state."""
-    return acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c)
-
-
-@kernel
 def attempt_budget(h: float, horizon: float) -> float:
     """Steps after which a simulation gives up: those to the horizon [s] by steps h [s], and spare for events."""
     return ATTEMPTS_PER_STEP * horizon / h + ATTEMPTS_SPARE
-
-
-@kernel
-def keep_up_to_event(
-    t: float,
-    h: float,
-    y: State,
-    M: float,
-    y_end: State,
-    M_end: float,
-    dense: DenseOutput,
-    factors: GapFactors,
-    switches: Switches,
-    m: Maxima,
-    c: Constants,
-) -> tuple[int, float, State, Maxima]:
-    """Keep a step up to its first event.
-
-    Parameters
-    ----------
-    t, h
-        Start [s] and length [s] of the step.
-    y, M
-        State and net moment [N m] at its start.
-    y_end, M_end
-        The same at its end.
-    dense, factors, switches, c
-        The step.
-    m
-        Maxima before it.
-
-    Returns
-    -------
-    event, tau, y, m
-        The event or -1, the fraction of the step that is kept, the state there, and the maxima up to there. Where the
-        event is SHORTEN, nothing is kept, and the step is to be tried again with the fraction tau of its length.
-
-    Notes
-    -----
-    The modes are frozen in the right-hand side, but the ultimate resistance of the soil is not: a step that ran across
-    its kink is no better for the kink being located. So it is tried again, to end just behind the kink.
-    """
-    start, end = gaps_at(y, M, factors, c), gaps_at(y_end, M_end, factors, c)
-    event, tau = first_event(start, end, dense, factors, switches, c, False)
-    if min(end.top, end.base) < 0.0:
-        kink, tau_kink = first_event(start, end, dense, factors, switches, c, True)
-        # Where another event comes at once, next to nothing of the step is kept, and it need not be shorter.
-        if min(tau, tau_kink) > AT_ONCE and min(tau, tau_kink) < LANDED:
-            return SHORTEN, min(BEYOND * min(tau, tau_kink), 1.0), y, m
-        if event < 0:
-            event = kink
-    if tau < 1.0:
-        y_end = state_at(dense, tau)
-    m_end = updated_maxima(m, t, h, tau, y, y_end, dense, switches, c)
-    if m_end.theta >= factors.limit and event != LIMIT:
-        event = LIMIT
-        tau, y_end, m_end = keep_up_to_limit(t, h, y, dense, factors, switches, m, m_end, c)
-    return event, tau, y_end, m_end
-
-
-@kernel
-def keep_up_to_limit(
-    t: float,
-    h: float,
-    y: State,
-    dense: DenseOutput,
-    factors: GapFactors,
-    switches: Switches,
-    m: Maxima,
-    m_end: Maxima,
-    c: Constants,
-) -> tuple[float, State, Maxima]:
-    """Keep a step that turns beyond the limit and back again up to the limit.
-
-    Parameters
-    ----------
-    m, m_end
-        Maxima before the step and after it.
-    t, h, y, dense, factors, switches, c
-        As of `keep_up_to_event`.
-
-    Returns
-    -------
-    tau, y, m
-        The fraction of the step that is kept, the state there, and the maxima up to there.
-    """
-    tau_top = (m_end.t_theta - t) / h
-    gap, gap_top = factors.limit - abs(y.theta_b), factors.limit - m_end.theta
-    tau = locate_limit(gap, gap_top, dense.rotation, factors.limit, tau_top)
-    y_limit = state_at(dense, tau)
-    return tau, y_limit, updated_maxima(m, t, h, tau, y, y_limit, dense, switches, c)
-
-
-@inlined
-def cross_event(
-    event: int,
-    y: State,
-    modes: Modes,
-    switches: Switches,
-    readings: Readings,
-    theta_stop: float,
-    locate_yield: bool,
-    c: Constants,
-) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
-    """Go over into the modes that follow an event: state, modes, their factors, and the acceleration to start with."""
-    M = rate_of(y, switches, c).M if event in (ROTATION, COUPLE) else np.nan
-    y, modes = change_mode(event, y, M, modes, c)
-    switches = switches_of(modes, readings, c)
-    return (
-        y,
-        modes,
-        switches,
-        gap_factors(modes, c, theta_stop, locate_yield),
-        rate_of(y, switches, c),
-    )
-
-
-@inlined
-def turned_back(y: State, y_end: State) -> bool:
-    """Whether a motion that is reported changed its direction in a step, so that its maximum may now be final."""
-    return y.omega_b * y_end.omega_b < 0.0 or y.v_b > 0.0 >= y_end.v_b or y.v_v > 0.0 >= y_end.v_v
 
 
 @kernel
@@ -351,11 +187,7 @@ def simulate_by_steps(
 ) -> Outcome:
     """Simulate one impact by steps of a given length [s]; see `simulate_design`."""
     budget = attempt_budget(h_full, control.horizon)
-    y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
-    modes = initial_modes(readings, c)
-    switches = switches_of(modes, readings, c)
-    factors = gap_factors(modes, c, theta_stop, control.locate_yield)
-    k1 = rate_of(y, switches, c)
+    y, modes, switches, factors, k1 = start_motion(readings, theta_stop, control.locate_yield, c)
     m = no_maxima()
     exchanged = nothing_exchanged()
     recording = record.times.size > 0
@@ -364,44 +196,34 @@ def simulate_by_steps(
     attempts = 0
     h_next = h_full
     barrier = NO_PROOF
-    seeking_proof = control.stop_at_limit and control.elements == 0 and proof_is_possible(readings)
-    while t < control.horizon:
+    proving = control.stop_at_limit and control.elements == 0 and proof_is_possible(readings)
+    while attempts < budget:
         attempts += 1
-        if attempts > budget:
-            return failed(Status.STEP_BUDGET.value)
         h = min(h_next, control.horizon - t)
-        last = h >= control.horizon - t
         y_end, k_end = step(y, k1, h, switches, c)
-        if not is_finite(y_end):
-            return failed(Status.UNSTABLE.value)
         dense = dense_output(y, k1, y_end, k_end, h)
-        event, tau, y_end, m = keep_up_to_event(t, h, y, k1.M, y_end, k_end.M, dense, factors, switches, m, c)
-        if event == SHORTEN:
-            h_next = tau * h
+        kept = keep_step(t, h, y, k1, y_end, k_end, dense, factors, switches, m, barrier, proving, control.horizon, c)
+        if kept.status == Status.UNSTABLE.value:
+            return failed(kept.status)
+        if kept.event == SHORTEN:
+            h_next = kept.tau * h
             continue
-        h_next = h_full
+        h_next, m, barrier = h_full, kept.m, kept.barrier
         if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
             gap_start, gap = control.theta_limit - abs(y.theta_b), control.theta_limit - m.theta
             t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, (m.t_theta - t) / h)
         if recording:
-            written = write_samples(record, written, t, h, tau, dense, modes, switches, c, exchanged)
-            exchanged = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
-        t = control.horizon if last and event < 0 else t + tau * h
-        if event == LIMIT:
-            if control.stop_at_limit:
+            written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
+            exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
+        t = kept.t
+        if kept.status != RUNNING:
+            if kept.status == Status.LIMIT.value and control.stop_at_limit:
                 t_limit = t
-            m = Maxima(theta_stop, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v)
-            return Outcome(Status.LIMIT.value, m, t_limit, t, attempts)
-        if seeking_proof and y_end.v_v <= 0.0 and t < control.horizon:
-            if turned_back(y, y_end):
-                barrier = barrier_energy(m, c)
-            if inside_maxima(y_end, m) and boulder_energy(y_end, c) < barrier:
-                return Outcome(Status.SETTLED.value, m, t_limit, t, attempts)
-        y = y_end
-        if event >= 0:
+            return Outcome(kept.status, m, t_limit, t, attempts)
+        if kept.event >= 0:
             y, modes, switches, factors, k1 = cross_event(
-                event, y, modes, switches, readings, theta_stop, control.locate_yield, c
+                kept.event, kept.y, modes, switches, readings, theta_stop, control.locate_yield, c
             )
         else:
-            k1 = k_end
-    return Outcome(horizon_status(y, m), m, t_limit, t, attempts)
+            y, k1 = kept.y, k_end
+    return failed(Status.STEP_BUDGET.value)

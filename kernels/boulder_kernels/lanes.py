@@ -11,84 +11,48 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import inlined, kernel
+from .after_step import RUNNING, SHORTEN, cross_event, keep_step, start_motion
 from .dense_output import dense_output
 from .design import Constants, DesignTable, constants_of, design_at, is_computable
 from .dormand_prince import step
 from .dynamics import Acceleration, State
-from .gaps import LIMIT, GapFactors, gap_factors, gaps_of
-from .impact import (
-    SHORTEN,
-    Control,
-    attempt_budget,
-    cross_event,
-    first_step,
-    horizon_status,
-    is_finite,
-    keep_up_to_event,
-    rate_of,
-    turned_back,
-)
-from .modes import Modes, Switches, switches_of
-from .outcomes import (
-    Compression,
-    Maxima,
-    OutcomeTable,
-    Status,
-    compression_at,
-    compression_of,
-    highest_compression,
-    no_maxima,
-)
+from .gaps import GapFactors, gaps_of
+from .impact import Control, attempt_budget, first_step
+from .modes import Modes, Switches
+from .outcomes import Maxima, OutcomeTable, Status, compression_at, compression_of, highest_compression, no_maxima
 from .readings import Readings
 from .restoring import signed_arm
-from .settling import (
-    NO_PROOF,
-    barrier_energy,
-    boulder_energy,
-    inside_maxima,
-    proof_is_possible,
-)
+from .settling import NO_PROOF, boulder_energy, proof_is_possible
 from .soil import soil_kinematics
 from .stability import ACCEPTED, MOST_STEPS, RETRY
-from .transitions import initial_modes
 from .trigonometry import sine_versine
 from .workspace import (
     ATTEMPTS_LEFT,
     ATTENTION,
     BARRIER,
     COMPRESSION,
+    CONSTANTS,
+    END,
+    END_STATE,
+    FACTORS,
     LANES,
     MAXIMA,
+    MODES,
     SIZE,
+    START,
+    STATE,
     STEP,
     STEP_FULL,
+    SWITCHES,
     TIME,
     field,
-    load_constants,
-    load_end,
-    load_end_state,
-    load_factors,
-    load_maxima,
-    load_modes,
-    load_start,
-    load_state,
-    load_switches,
+    load,
     put,
-    store_constants,
-    store_end,
-    store_end_state,
-    store_factors,
-    store_maxima,
-    store_modes,
-    store_start,
-    store_state,
-    store_switches,
+    store,
 )
 
 EMPTY = -1
 """Row of a lane that holds no design."""
-RUNNING = -1
-"""Status of a design that has not come to its end."""
 
 
 @kernel
@@ -96,26 +60,26 @@ def attempt_steps(ws: np.ndarray) -> None:
     """Advance every lane by its step, in one vectorised loop."""
     for lane in range(LANES):
         y_end, k_end = step(
-            load_state(ws, lane),
-            load_start(ws, lane),
-            field(ws, STEP, 0, lane),
-            load_switches(ws, lane),
-            load_constants(ws, lane),
+            load(ws, STATE, lane),
+            load(ws, START, lane),
+            field(ws, STEP, lane),
+            load(ws, SWITCHES, lane),
+            load(ws, CONSTANTS, lane),
         )
-        store_end_state(ws, lane, y_end)
-        store_end(ws, lane, k_end)
+        store(ws, END_STATE, lane, y_end)
+        store(ws, END, lane, k_end)
 
 
 @kernel
 def take_over_steps(ws: np.ndarray, horizon: float) -> None:
     """Take over the steps that meet no event, turn nowhere and do not reach the horizon [s]; mark the others."""
     for lane in range(LANES):
-        c = load_constants(ws, lane)
-        s = load_switches(ws, lane)
-        y, y_end = load_state(ws, lane), load_end_state(ws, lane)
-        k_end = load_end(ws, lane)
+        c = load(ws, CONSTANTS, lane)
+        s = load(ws, SWITCHES, lane)
+        y, y_end = load(ws, STATE, lane), load(ws, END_STATE, lane)
+        k_end = load(ws, END, lane)
         sin, versin = sine_versine(y_end.theta_b)
-        start = Compression(field(ws, COMPRESSION, 0, lane), field(ws, COMPRESSION, 1, lane))
+        start = load(ws, COMPRESSION, lane)
         end = compression_of(y_end, sin, versin, s, c)
         k = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
         gaps = gaps_of(
@@ -126,9 +90,9 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
             end.u,
             k_end.M,
             signed_arm(sin, versin, c),
-            load_factors(ws, lane),
+            load(ws, FACTORS, lane),
         )
-        t, h = field(ws, TIME, 0, lane), field(ws, STEP, 0, lane)
+        t, h = field(ws, TIME, lane), field(ws, STEP, lane)
         # A comparison with NaN is false, so a state that is not a number is marked, too.
         plain = (
             (gaps.contact >= 0.0)
@@ -143,23 +107,22 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
             & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
             & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
             & (h < horizon - t)
-            & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, 0, lane)))
+            & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, lane)))
         )
         u, _ = highest_compression(start, end, h)
         t_next = t + h
-        put(ws, ATTENTION, 0, lane, 0.0 if plain else 1.0)
-        put(ws, ATTEMPTS_LEFT, 0, lane, field(ws, ATTEMPTS_LEFT, 0, lane) - 1.0)
+        put(ws, ATTENTION, lane, 0.0 if plain else 1.0)
+        put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
         if plain:
-            store_state(ws, lane, y_end)
-            store_start(ws, lane, k_end)
-            put(ws, COMPRESSION, 0, lane, end.u)
-            put(ws, COMPRESSION, 1, lane, end.rate)
-            put(ws, TIME, 0, lane, t_next)
-            put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t_next))
-            put(ws, MAXIMA, 0, lane, max(field(ws, MAXIMA, 0, lane), abs(y_end.theta_b)))
-            put(ws, MAXIMA, 1, lane, max(field(ws, MAXIMA, 1, lane), y_end.x_b))
-            put(ws, MAXIMA, 2, lane, max(field(ws, MAXIMA, 2, lane), y_end.x_v))
-            put(ws, MAXIMA, 3, lane, max(field(ws, MAXIMA, 3, lane), s.k_contact * u))
+            store(ws, STATE, lane, y_end)
+            store(ws, START, lane, k_end)
+            store(ws, COMPRESSION, lane, end)
+            put(ws, TIME, lane, t_next)
+            put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t_next))
+            m = load(ws, MAXIMA, lane)
+            theta, x_b, x_v = max(m.theta, abs(y_end.theta_b)), max(m.x_b, y_end.x_b), max(m.x_v, y_end.x_v)
+            F_v = max(m.F_v, s.k_contact * u)
+            store(ws, MAXIMA, lane, Maxima(theta, m.t_theta, x_b, m.t_x_b, x_v, m.t_x_v, F_v, m.t_F_v))
 
 
 @kernel
@@ -200,17 +163,14 @@ def start_lane(
     if status != ACCEPTED:
         return status
     h_full = min(h_full, longest)
-    y = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
-    modes = initial_modes(readings, c)
-    switches = switches_of(modes, readings, c)
-    store_constants(ws, lane, c)
-    store_maxima(ws, lane, no_maxima())
-    put(ws, STEP_FULL, 0, lane, h_full)
-    put(ws, ATTEMPTS_LEFT, 0, lane, attempt_budget(h_full, control.horizon))
-    put(ws, BARRIER, 0, lane, NO_PROOF)
-    factors = gap_factors(modes, c, control.theta_limit, control.locate_yield)
+    y, modes, switches, factors, k1 = start_motion(readings, control.theta_limit, control.locate_yield, c)
+    store(ws, CONSTANTS, lane, c)
+    store(ws, MAXIMA, lane, no_maxima())
+    put(ws, STEP_FULL, lane, h_full)
+    put(ws, ATTEMPTS_LEFT, lane, attempt_budget(h_full, control.horizon))
+    put(ws, BARRIER, lane, NO_PROOF)
     set_modes(ws, lane, modes, switches, factors)
-    set_motion(ws, lane, 0.0, y, rate_of(y, switches, c), switches, c, control.horizon)
+    set_motion(ws, lane, 0.0, y, k1, switches, c, control.horizon)
     return RUNNING
 
 
@@ -226,21 +186,19 @@ def set_motion(
     horizon: float,
 ) -> None:
     """Put the start of the next step into a lane."""
-    store_state(ws, lane, y)
-    store_start(ws, lane, k1)
-    put(ws, TIME, 0, lane, t)
-    put(ws, STEP, 0, lane, min(field(ws, STEP_FULL, 0, lane), horizon - t))
-    start = compression_at(y, switches, c)
-    put(ws, COMPRESSION, 0, lane, start.u)
-    put(ws, COMPRESSION, 1, lane, start.rate)
+    store(ws, STATE, lane, y)
+    store(ws, START, lane, k1)
+    put(ws, TIME, lane, t)
+    put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t))
+    store(ws, COMPRESSION, lane, compression_at(y, switches, c))
 
 
 @inlined
 def set_modes(ws: np.ndarray, lane: int, modes: Modes, switches: Switches, factors: GapFactors) -> None:
     """Put the modes of the next step into a lane, and what follows from them."""
-    store_modes(ws, lane, modes)
-    store_switches(ws, lane, switches)
-    store_factors(ws, lane, factors)
+    store(ws, MODES, lane, modes)
+    store(ws, SWITCHES, lane, switches)
+    store(ws, FACTORS, lane, factors)
 
 
 @kernel
@@ -252,58 +210,44 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
     int
         -1, or the status with which the design has come to its end; time and maxima are left in the lane.
     """
-    t, h = field(ws, TIME, 0, lane), field(ws, STEP, 0, lane)
-    c = load_constants(ws, lane)
-    switches = load_switches(ws, lane)
-    factors = load_factors(ws, lane)
-    y_end = load_end_state(ws, lane)
-    if not is_finite(y_end):
-        return Status.UNSTABLE.value
-    if field(ws, ATTEMPTS_LEFT, 0, lane) < 0.0:
+    t, h = field(ws, TIME, lane), field(ws, STEP, lane)
+    c = load(ws, CONSTANTS, lane)
+    switches = load(ws, SWITCHES, lane)
+    factors = load(ws, FACTORS, lane)
+    if field(ws, ATTEMPTS_LEFT, lane) < 0.0:
         return Status.STEP_BUDGET.value
-    y_start, k_start, k_end = (
-        load_state(ws, lane),
-        load_start(ws, lane),
-        load_end(ws, lane),
-    )
-    dense = dense_output(y_start, k_start, y_end, k_end, h)
-    event, tau, y, m = keep_up_to_event(
+    y, k1 = load(ws, STATE, lane), load(ws, START, lane)
+    y_end, k_end = load(ws, END_STATE, lane), load(ws, END, lane)
+    kept = keep_step(
         t,
         h,
-        y_start,
-        k_start.M,
+        y,
+        k1,
         y_end,
-        k_end.M,
-        dense,
+        k_end,
+        dense_output(y, k1, y_end, k_end, h),
         factors,
         switches,
-        load_maxima(ws, lane),
+        load(ws, MAXIMA, lane),
+        field(ws, BARRIER, lane),
+        proof_is_possible(readings),
+        control.horizon,
         c,
     )
-    if event == SHORTEN:
-        put(ws, STEP, 0, lane, tau * h)
+    if kept.event == SHORTEN:
+        put(ws, STEP, lane, kept.tau * h)
         return RUNNING
-    last = h >= control.horizon - t
-    t = control.horizon if last and event < 0 else t + tau * h
-    put(ws, TIME, 0, lane, t)
-    if event == LIMIT:
-        m = Maxima(control.theta_limit, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v)
-    store_maxima(ws, lane, m)
-    if event == LIMIT:
-        return Status.LIMIT.value
-    if t >= control.horizon:
-        return horizon_status(y, m)
-    if proof_is_possible(readings) and y.v_v <= 0.0:
-        if turned_back(y_start, y):
-            put(ws, BARRIER, 0, lane, barrier_energy(m, c))
-        if inside_maxima(y, m) and boulder_energy(y, c) < field(ws, BARRIER, 0, lane):
-            return Status.SETTLED.value
-    k1 = k_end
-    if event >= 0:
+    put(ws, TIME, lane, kept.t)
+    put(ws, BARRIER, lane, kept.barrier)
+    store(ws, MAXIMA, lane, kept.m)
+    if kept.status != RUNNING:
+        return kept.status
+    y, k1 = kept.y, k_end
+    if kept.event >= 0:
         y, modes, switches, factors, k1 = cross_event(
-            event,
+            kept.event,
             y,
-            load_modes(ws, lane),
+            load(ws, MODES, lane),
             switches,
             readings,
             control.theta_limit,
@@ -311,7 +255,7 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
             c,
         )
         set_modes(ws, lane, modes, switches, factors)
-    set_motion(ws, lane, t, y, k1, switches, c, control.horizon)
+    set_motion(ws, lane, kept.t, y, k1, switches, c, control.horizon)
     return RUNNING
 
 
@@ -321,8 +265,8 @@ def write_lane(ws: np.ndarray, lane: int, status: int, out: OutcomeTable, row: i
     out.status[row] = status
     if status == Status.UNSTABLE.value or status == Status.STEP_BUDGET.value:
         return
-    m = load_maxima(ws, lane)
-    t = field(ws, TIME, 0, lane)
+    m = load(ws, MAXIMA, lane)
+    t = field(ws, TIME, lane)
     out.theta_max[row], out.x_b_max[row] = m.theta, m.x_b
     out.x_v_max[row], out.F_v_max[row] = m.x_v, m.F_v
     out.t_end[row] = t
@@ -355,8 +299,8 @@ def next_design(
             return row - 1, row
         out.status[row - 1] = status
     # An empty lane stands still: its steps have no length, and no one looks at them.
-    put(ws, STEP, 0, lane, 0.0)
-    put(ws, STEP_FULL, 0, lane, 0.0)
+    put(ws, STEP, lane, 0.0)
+    put(ws, STEP_FULL, lane, 0.0)
     return EMPTY, row
 
 
@@ -385,9 +329,9 @@ def simulate_lanes(table: DesignTable, readings: Readings, control: Control, out
         attempt_steps(ws)
         take_over_steps(ws, control.horizon)
         for lane in range(LANES):
-            if field(ws, ATTENTION, 0, lane) != 0.0 and rows[lane] != EMPTY:
+            if field(ws, ATTENTION, lane) != 0.0 and rows[lane] != EMPTY:
                 status = attend(ws, lane, readings, control)
-                h = field(ws, STEP_FULL, 0, lane)
+                h = field(ws, STEP_FULL, lane)
                 if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
                     status = start_lane(ws, lane, table, rows[lane], readings, control, RETRY * h)
                 if status != RUNNING:

@@ -219,3 +219,20 @@ def soil_energy(k: Kinematics, c: Constants) -> float:
         over = max(u - c.x_yield, 0.0)
         total += ratio * 0.5 * (u * u - over * over)
     return c.K_soil * total / c.elements
+
+
+@kernel
+def drag_power(k: Kinematics, c: Constants) -> float:
+    """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
+    if c.elements > 0:
+        h_e = c.d / c.elements
+        total = 0.0
+        for n in range(c.elements):
+            velocity = k.B - k.slope_v * ((n + 0.5) / c.elements)
+            total += drag_force(velocity, h_e, c) * velocity
+        return total
+    # Integral of |B - p r|^3 over r = 0 ... 1, a line that may change its sign.
+    top, base = abs(k.B), abs(k.B - k.slope_v)
+    if k.B * (k.B - k.slope_v) >= 0.0:
+        return c.R_soil * 0.25 * (top + base) * (top * top + base * base)
+    return c.R_soil * 0.25 * (top**4 + base**4) / (top + base)

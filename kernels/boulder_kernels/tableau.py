@@ -62,5 +62,3 @@ AA = tuple(
     for i in range(STAGES)
 )
 """Weights of the accelerations in the stage displacements, A A, shape (7, 7)."""
-E = tuple(float(_entry(6, i) - _B_FOURTH[i]) for i in range(STAGES))
-"""Fifth- minus fourth-order weights, shape (7,)."""

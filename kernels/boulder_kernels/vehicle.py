@@ -3,7 +3,7 @@
 Eq 45, x_v''' + (k_v/c_v) x_v'' + (k_v/m_v) x_v' = (k_v/m_v) x_c' with x_c the contact point on the boulder,
 is an exact derivative. Integrated once from the state at impact (x_v = x_c = x_v'' = 0, x_v' = v_0) it reads
 
-    m_v x_v'' = -k_v u,    u = x_v - x_c - (m_v/c_v) (v_0 - x_v')
+    m_v x_v'' = -F_v,   F_v = k_v u,   u = x_v - x_c - (m_v/c_v) (v_0 - x_v')        (Eqs 17, 18, 41, 46)
 
 where u is the compression of the spring and the last term the crush of the damper, which takes up the momentum
 the truck has lost. So the acceleration of the truck is not a state of its own, the crush is permanent by
@@ -36,25 +36,3 @@ def contact_displacement(x_b: float, sin: float, versin: float, c: Constants) ->
 def spring_compression(x_v: float, v_v: float, x_c: float, c: Constants) -> float:
     """Compression u of the vehicle's spring [m]; below zero the truck has come off (Eq 45, integrated)."""
     return x_v - x_c - c.tau_v * (c.v_0 - v_v)
-
-
-@inlined
-def contact_force(u: float, c: Constants) -> float:
-    """Force F_v of the truck on the boulder while they touch [N] (Eqs 41, 46, 47)."""
-    return c.k_v * u
-
-
-@inlined
-def vehicle_jerk(v_v: float, a_v: float, v_c: float, k_v: float, c_v: float, m_v: float) -> float:
-    """Third derivative of x_v [m/s^3] as Eq 45 has it; the motion itself uses its integral, see above.
-
-    Parameters
-    ----------
-    v_v, a_v
-        Velocity [m/s] and acceleration [m/s^2] of the truck.
-    v_c
-        Velocity of the contact point on the boulder [m/s].
-    k_v, c_v, m_v
-        Spring [N/m], damper [N s/m] and mass [kg] of the truck.
-    """
-    return -k_v / c_v * a_v - k_v / m_v * (v_v - v_c)
