@@ -16,7 +16,7 @@ from boulder_kernels import Constants, DesignTable, Readings
 from boulder_kernels.dense_output import Track, displacement_at, slope_at, track
 from boulder_kernels.design import constants_of, design_at
 from boulder_kernels.dynamics import Acceleration, State
-from boulder_kernels.restoring import printed_restoring_moment
+from boulder_kernels.restoring import holding_moment
 from boulder_kernels.soil import soil_kinematics, soil_reaction
 from boulder_kernels.tableau import STAGES, A
 from boulder_kernels.trigonometry import sine_versine
@@ -24,6 +24,30 @@ from boulder_kernels.vehicle import contact_displacement, contact_lever, spring_
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 _A = np.array(A)
+
+
+@_compiled
+def printed_restoring_moment(
+    M: float, theta_b: float, omega_b: float, sin: float, versin: float, c: Constants
+) -> float:
+    """Restoring moment M_R exactly as printed [N m] (Eqs 37-39), with its switches inside.
+
+    Parameters
+    ----------
+    M
+        Net moment of soil and truck [N m].
+    theta_b, omega_b
+        Rotation [rad] and angular velocity [rad/s].
+    sin, versin
+        sin(theta_b) and 1 - cos(theta_b).
+    c
+        Constants of a design whose restoring moment is read as printed.
+    """
+    if omega_b <= 0.0:
+        return 0.0
+    limit = holding_moment(sin, versin, c)
+    corner = math.copysign(1.0, c.theta_corner - theta_b)
+    return -corner * min(max(M, -limit), limit)
 
 
 @_compiled

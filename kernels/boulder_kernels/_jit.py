@@ -120,15 +120,15 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile as `kernel` does, and put the code into every caller: a loop with a call left in is not vectorised."""
+    """Compile as `kernel` does, and inline into every caller: a loop that still contains a call is not vectorised."""
     return _compiled(function, {"contract", "nsz"}, inline=True)
 
 
 def exact_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile as `kernel` does, without fused multiply-add: every operation rounds by itself.
 
-    For what is worked out once per design. Of a b + c d either product may be fused, and the compiler chooses anew
-    wherever it puts the code in; rounded one by one, the bits are the same everywhere.
+    For what is computed once per design. In a b + c d either product may be fused, and the compiler chooses anew wherever
+    it inlines the code; with every operation rounded by itself, the bits are the same everywhere.
     """
     return _compiled(function, {"nsz"})
 
@@ -136,8 +136,8 @@ def exact_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 def exact_inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile as `inlined` does, without fused multiply-add, as `exact_kernel`.
 
-    For what the lanes and the single impact both put into their own code, and must round alike: a product that is used
-    twice is fused or not by what stands around it.
+    For what is inlined into both the lanes and the single impact and must round alike: whether a product that is used
+    twice is fused depends on the code around it.
     """
     return _compiled(function, {"nsz"}, inline=True)
 

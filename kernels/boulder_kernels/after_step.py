@@ -22,15 +22,15 @@ from .settling import barrier_energy, boulder_energy, inside_maxima
 from .transitions import change_mode, initial_modes
 
 RUNNING = -1
-"""Status of a design that has not come to its end."""
+"""Status of a simulation that has not ended."""
 AT_ONCE = 1e-5
-"""Fraction of a step before which a kink counts as passed already."""
+"""Fraction of a step before which a kink counts as passed."""
 LANDED = 0.99
-"""Fraction of a step behind which a kink may lie without spoiling it."""
+"""Fraction of a step behind which a kink does no harm."""
 BEYOND = 1.002
-"""A step that is tried again ends this much behind the kink, which therefore lies in it and not in the next one."""
+"""A retried step ends this much behind the kink, so that the kink lies in it and not in the next one."""
 SHORTEN = -2
-"""In place of an event: the step is to be tried again, shorter."""
+"""In place of an event: retry the step with a shorter length."""
 
 
 class Kept(NamedTuple):
@@ -144,12 +144,12 @@ def keep_up_to_event(
     -------
     event, tau, y, m
         The event or -1, the fraction of the step that is kept, the state there, and the maxima up to there. Where the
-        event is SHORTEN, nothing is kept, and the step is to be tried again with the fraction tau of its length.
+        event is SHORTEN, nothing is kept, and the step is to be retried with the fraction tau of its length.
 
     Notes
     -----
     The modes are frozen in the right-hand side, but the ultimate resistance of the soil is not: a step that ran across
-    its kink is no better for the kink being located. So it is tried again, to end just behind the kink.
+    its kink gains nothing from locating it. So the step is retried, to end just behind the kink.
     """
     start, end = gaps_at(y, M, factors, c), gaps_at(y_end, M_end, factors, c)
     event, tau = first_event(start, end, dense, factors, switches, c, False)

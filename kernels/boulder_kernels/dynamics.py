@@ -61,7 +61,7 @@ def acceleration(
     sin, versin = sine_versine(theta_b)
     soil = soil_reaction(soil_kinematics(x_b, v_b, omega_b, sin, versin, c), c)
     u = spring_compression(x_v, v_v, contact_displacement(x_b, sin, versin, c), c)
-    F_v = s.k_contact * u
+    F_v = s.k_contact * u  # Eqs 18, 41, 46
     M = soil.M + F_v * contact_lever(sin, versin, c)
     return Acceleration(
         (soil.F + F_v) * c.inverse_m_eff,

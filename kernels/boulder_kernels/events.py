@@ -75,7 +75,7 @@ def locate(
     -------
     float
         tau in (0, 1]. A gap that starts at zero and opens only by rounding counts as crossed at once: the step still
-        moves on, and the mode that follows settles it.
+        advances, and the next mode resolves it.
     """
     low, gap_low = 0.0, gap_start
     if gap_low <= 0.0:

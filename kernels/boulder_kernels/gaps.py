@@ -19,7 +19,7 @@ from .trigonometry import sine_versine
 from .vehicle import contact_displacement, spring_compression
 
 CONTACT = 0
-"""Truck and boulder part, or touch again."""
+"""Truck and boulder separate, or touch again."""
 ROTATION = 1
 """The boulder leaves or finds its base, or (printed reading) turns back."""
 COUPLE = 2
@@ -39,8 +39,8 @@ EVENTS = 8
 NEVER = 1e300
 """Gap of an event that cannot happen in the present mode."""
 CONTACT_ROUNDING = 1e-15
-"""Compressions below this share of the distance the truck would cover in a second are rounding: truck and boulder that
-move on together would part and touch without end by it."""
+"""Compressions below this share of the distance the truck would cover in a second are rounding, which would make a truck
+and a boulder that move together separate and touch again and again."""
 
 
 class GapFactors(NamedTuple):

@@ -21,10 +21,10 @@ from .settling import NO_PROOF, proof_is_possible
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
 
 FULL_TURN = math.pi
-"""Rotation at which a simulation without a stop ends all the same [rad]: the boulder lies upside down."""
+"""Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
 ATTEMPTS_PER_STEP = 4
 ATTEMPTS_SPARE = 10_000
-"""A simulation gives up after so many attempts per nominal step, and these to spare for events."""
+"""A simulation gives up after ATTEMPTS_PER_STEP attempts per nominal step, plus this many for events."""
 
 
 class Control(NamedTuple):
@@ -43,15 +43,15 @@ class Control(NamedTuple):
     stop_at_limit: bool = True
     """Whether the simulation ends where the rotation reaches its limit."""
     locate_yield: bool = False
-    """Whether steps are also cut where the soil reaches its ultimate resistance. The force has a kink there. Steps that
-    run across it leave the method at third order; located, it is of fifth, and pays from about 0.0001 deg on."""
+    """Whether steps also end where the soil reaches its ultimate resistance. The force has a kink there: a step that runs
+    across it is of third order only. Locating it restores the fifth, and pays for errors below about 0.0001 deg."""
     halved: bool = False
-    """Whether the step of every design, shortened where it must be, is halved: the finer one of the two solutions that
-    an error is estimated from."""
+    """Whether the step of every design is halved, after any shortening: the finer of the two solutions that the error
+    is estimated from."""
 
 
 class Record(NamedTuple):
-    """Where a simulation leaves its time history; empty arrays for none."""
+    """Where a simulation writes its time history; empty arrays for none."""
 
     times: np.ndarray
     """Times asked for [s], ascending, shape (n,)."""
@@ -120,7 +120,7 @@ def failed(status: int) -> Outcome:
 
 @kernel
 def attempt_budget(h: float, horizon: float) -> float:
-    """Steps after which a simulation gives up: those to the horizon [s] by steps h [s], and spare for events."""
+    """Attempts after which a simulation with time step h [s] gives up before its horizon [s]."""
     return ATTEMPTS_PER_STEP * horizon / h + ATTEMPTS_SPARE
 
 
@@ -135,7 +135,7 @@ def first_step(control: Control, theta_stop: float, c: Constants) -> tuple[float
 
 @kernel
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
-    """Simulate one impact by fixed steps, each cut where a mode changes.
+    """Simulate one impact with a fixed time step, each step cut where a mode changes.
 
     Parameters
     ----------
@@ -157,8 +157,8 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     -----
     Within a step the modes are frozen and the right-hand side is smooth. Where a step passes an event, it is kept
     up to the event by its dense output, whose local error of order five adds once per event what every step
-    adds to the solution, so the order of the method is kept. A motion that became non-finite is simulated again by
-    shorter steps.
+    adds to the solution, so the order of the method is kept. A motion that became non-finite is retried with a
+    shorter step.
     """
     if design.H - design.d <= design.e_bumper:
         return failed(Status.NO_CONTACT.value)
@@ -185,7 +185,7 @@ def simulate_by_steps(
     theta_stop: float,
     record: Record,
 ) -> Outcome:
-    """Simulate one impact by steps of a given length [s]; see `simulate_design`."""
+    """Simulate one impact with a given time step [s]; see `simulate_design`."""
     budget = attempt_budget(h_full, control.horizon)
     y, modes, switches, factors, k1 = start_motion(readings, theta_stop, control.locate_yield, c)
     m = no_maxima()

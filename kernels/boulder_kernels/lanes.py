@@ -1,9 +1,9 @@
 """Many designs side by side, one in each lane of the vector registers.
 
 Every lane has its own clock. One attempt advances all of them by a step (`attempt_steps`), and a second loop looks at
-what came out (`take_over_steps`): most steps meet no event and set no peak, and are taken over at once. The few that
-need more are attended to one by one with the functions of the single impact, and a lane whose design has come to its
-end gets the next one. No lane waits for another.
+what came out (`take_over_steps`): most steps meet no event and set no peak, and are accepted at once. The few that need
+more are handled one by one with the functions of the single impact, and a lane whose simulation has ended gets the
+next design. No lane waits for another.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def attempt_steps(ws: np.ndarray) -> None:
 
 @kernel
 def take_over_steps(ws: np.ndarray, horizon: float) -> None:
-    """Take over the steps that meet no event, turn nowhere and do not reach the horizon [s]; mark the others."""
+    """Accept the steps that meet no event, turn nowhere and do not reach the horizon [s]; mark the others."""
     for lane in range(LANES):
         c = load(ws, CONSTANTS, lane)
         s = load(ws, SWITCHES, lane)
@@ -151,7 +151,7 @@ def start_lane(
     Returns
     -------
     int
-        -1, or the status of a design that needs no integration or allows none.
+        RUNNING, or the status of a design that needs no integration or allows none.
     """
     design = design_at(table, row)
     if design.H - design.d <= design.e_bumper:
@@ -203,12 +203,12 @@ def set_modes(ws: np.ndarray, lane: int, modes: Modes, switches: Switches, facto
 
 @kernel
 def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> int:
-    """Take over a step that meets an event, sets a peak or reaches the end.
+    """Handle a step that meets an event, sets a peak or reaches the end.
 
     Returns
     -------
     int
-        -1, or the status with which the design has come to its end; time and maxima are left in the lane.
+        RUNNING, or the status with which the simulation ended; time and maxima are left in the lane.
     """
     t, h = field(ws, TIME, lane), field(ws, STEP, lane)
     c = load(ws, CONSTANTS, lane)
@@ -289,7 +289,7 @@ def next_design(
     Returns
     -------
     row_in_lane, row
-        The row now in the lane, or EMPTY, and the first row not yet looked at.
+        The row now in the lane, or EMPTY, and the first row not yet started.
     """
     n = table.L.size
     while row < n:
@@ -298,7 +298,7 @@ def next_design(
         if status == RUNNING:
             return row - 1, row
         out.status[row - 1] = status
-    # An empty lane stands still: its steps have no length, and no one looks at them.
+    # An empty lane stands still: its steps have no length, and their results are ignored.
     put(ws, STEP, lane, 0.0)
     put(ws, STEP_FULL, lane, 0.0)
     return EMPTY, row
@@ -315,7 +315,7 @@ def simulate_lanes(table: DesignTable, readings: Readings, control: Control, out
     readings
         Which formulas are read as printed.
     control
-        Step, horizon, limit; its choice of soil and of stopping is not looked at.
+        Step, horizon, limit; its choice of soil and of stopping is ignored.
     out
         Where the outcomes go, in the order of the designs; its error columns are left alone.
     """

@@ -26,15 +26,15 @@ class Status(IntEnum):
     LIMIT = 1
     """The rotation reached its limit."""
     SETTLED = 2
-    """Nothing that is reported can still grow, proved."""
+    """It is proved that nothing that is reported can still grow."""
     HORIZON = 3
-    """The horizon was reached, and nothing at its maximum was growing."""
+    """The horizon was reached with no maximum still growing."""
     OUTWARD = 4
-    """The horizon was reached with rotation or truck at its maximum and still growing."""
+    """The horizon was reached with rotation or truck at its maximum so far and still moving outward."""
     UNSTABLE = 5
     """The state became non-finite."""
     STEP_BUDGET = 6
-    """More steps are needed than are allowed: the step asked for is too short, or the modes change without end."""
+    """More steps are needed than are allowed: the time step is too short, or the contact modes keep switching."""
     INVALID = 7
     """A constant of the design is not finite, or not positive."""
     STIFF_SOIL = 8
@@ -50,7 +50,7 @@ class Status(IntEnum):
 
 
 class Maxima(NamedTuple):
-    """Largest values so far, and when."""
+    """Largest values so far, and their times [s]."""
 
     theta: float
     """Largest |theta_b| [rad]."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from ._jit import inlined, kernel
+from ._jit import inlined
 from .design import Constants
 from .modes import Switches
 
@@ -34,31 +32,3 @@ def holding_moment(sin: float, versin: float, c: Constants) -> float:
     only at theta = 0.
     """
     return abs(signed_arm(sin, versin, c))
-
-
-@kernel
-def printed_restoring_moment(
-    M: float, theta_b: float, omega_b: float, sin: float, versin: float, c: Constants
-) -> float:
-    """Restoring moment M_R exactly as printed [N m] (Eqs 37-39), with its switches inside.
-
-    Parameters
-    ----------
-    M
-        Net moment of soil and truck [N m].
-    theta_b, omega_b
-        Rotation [rad] and angular velocity [rad/s].
-    sin, versin
-        sin(theta_b) and 1 - cos(theta_b).
-    c
-        Constants of a design whose restoring moment is read as printed.
-
-    Notes
-    -----
-    It serves as the yardstick of the modes: whatever the mode, `couple_moment` and ``net`` must give this value.
-    """
-    if omega_b <= 0.0:
-        return 0.0
-    limit = holding_moment(sin, versin, c)
-    corner = math.copysign(1.0, c.theta_corner - theta_b)
-    return -corner * min(max(M, -limit), limit)

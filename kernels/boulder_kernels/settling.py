@@ -8,8 +8,8 @@ the truck. So from then on
 
 never grows. To turn further than it has, the boulder would have to pass theta = +-theta_max, and to move further
 x_b = x_max. If E is below the least potential energy on these lines, it cannot. The elastic energy of the soil is
-convex, so a tangent plane bounds it from below wherever it is taken, and a few steps of a root finder place the
-tangent well; the bound is a proof wherever they end.
+convex, so any tangent plane bounds it from below. A few steps of a root finder place the tangent well; the bound is a
+proof wherever they end.
 """
 
 from __future__ import annotations

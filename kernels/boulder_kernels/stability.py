@@ -3,7 +3,7 @@
 Within a step the motion is smooth, and an explicit method is stable where its step times every rate of the
 linearised motion lies in the stability region of the method. The rates are bounded from above, once per design, for
 the states that the motion can reach: by the energy of the truck, and up to the rotation at which the simulation ends.
-A design that would need very many steps is refused before it starts, by the rate that asks for them.
+A design that would need too many steps is refused before it starts, and the status names the rate that asks for them.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ for none is 1.0), which the damping of the soil and the length of an impact more
 STABLE_DECAY = 3.0
 """Largest step times rate of decay (the method's limit on the negative real axis is 3.3)."""
 MOST_SHORTENING = 25.0
-"""No design takes more than so many times the steps that were asked for,"""
+"""No design takes more than this many times the steps asked for,"""
 STEPS_ALWAYS = 2_500
 """unless it needs no more than these to the horizon;"""
 MOST_STEPS = 500_000
 """and none takes more than these."""
 RETRY = 0.25
-"""Factor on the step of a design whose motion became non-finite all the same, before it is tried again."""
+"""Factor on the step of a design whose motion became non-finite all the same, for its retry."""
 ACCEPTED = -1
 """Refusal of a design that is not refused."""
 QUARTER_TURN = 0.5 * math.pi

@@ -85,7 +85,7 @@ TIME = _place("time")
 BARRIER = _place("barrier")
 """Energy below which the motion has settled [J], see `boulder_kernels.settling`."""
 ATTENTION = _place("attention")
-"""1.0 where a step needs more than to be taken over."""
+"""1.0 where a step cannot simply be accepted."""
 ATTEMPTS_LEFT = _place("attempts_left")
 _RECORDS = {_place(name): record for name, record in _LAYOUT.items()}
 

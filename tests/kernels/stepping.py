@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 import boulder_kernels as bk
+from boulder_kernels.after_step import cross_event, keep_up_to_event, rate_of
 from boulder_kernels.dense_output import dense_output
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import State
 from boulder_kernels.gaps import gap_factors
-from boulder_kernels.impact import cross_event, keep_up_to_event, rate_of
 from boulder_kernels.modes import Modes, switches_of
 from boulder_kernels.outcomes import no_maxima
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
+from benchmarks.literal import printed_restoring_moment
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import State, acceleration
 from boulder_kernels.modes import (
@@ -21,7 +22,6 @@ from boulder_kernels.modes import (
 from boulder_kernels.restoring import (
     couple_moment,
     holding_moment,
-    printed_restoring_moment,
     signed_arm,
 )
 from boulder_kernels.transitions import initial_modes, mode_at_rest

@@ -1,5 +1,10 @@
 """Energy: parts against the oracle, and the audit of whole impacts."""
 
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -161,3 +166,52 @@ def test_corrected_energy_after_release_only_falls() -> None:
             ]
         )
         assert np.all(np.diff(held) <= 1e-7 * design.m_v * design.v_0**2)
+
+
+WRONG_SOILS = """
+import json
+import boulder_kernels as bk
+from boulder_kernels import dynamics
+from boulder_kernels.soil import Kinematics, Reaction, soil_reaction
+from tests import oracle
+from tests.kernels.samples import design_of
+from tests.kernels.test_energy import audit, imbalance
+
+def scaled(springs, drag, going_back):
+    def reaction(k, c):
+        spring = soil_reaction(Kinematics(k.A, k.slope_x, 0.0, 0.0, k.q, k.lever_d), c)
+        whole = soil_reaction(k, c)
+        share = going_back if k.A * k.B < 0.0 else springs
+        return Reaction(*(share * s + drag * (w - s) for s, w in zip(spring, whole)))
+    return reaction
+
+laws = {"right": (1.0, 1.0, 1.0), "springs": (1.01, 1.0, 1.01), "drag": (1.0, 1.1, 1.0), "plastic": (1.0, 1.0, 0.5)}
+found = {}
+for name, law in laws.items():
+    dynamics.soil_reaction = scaled(*law)
+    found[name] = {case: imbalance(audit(design_of(getattr(oracle, case)), bk.corrected(), 2e-3, 0.4))
+                   for case in ("ABG", "RWG")}
+print(json.dumps(found))
+"""
+
+
+def test_a_wrong_soil_law_does_not_balance() -> None:
+    """No entry is what the others leave over: forces that are not those of the ledger's laws show in the balance.
+
+    Springs 1 % too stiff, drag 10 % too strong, and springs that give back half of what they took.
+    """
+    # The law is replaced in the interpreted kernels, in a process of their own.
+    run = subprocess.run(
+        [sys.executable, "-c", WRONG_SOILS],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = json.loads(run.stdout)
+    for case in ("ABG", "RWG"):
+        assert found["right"][case] < 1e-6
+        assert found["springs"][case] > 1e-3
+        assert found["drag"][case] > 1e-4
+        assert found["plastic"][case] > 5e-3

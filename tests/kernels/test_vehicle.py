@@ -8,13 +8,12 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State
+from boulder_kernels.dynamics import State, acceleration
+from boulder_kernels.modes import TURNING_FORWARD, Modes, switches_of
 from boulder_kernels.vehicle import (
     contact_displacement,
-    contact_force,
     contact_lever,
     spring_compression,
-    vehicle_jerk,
 )
 from tests import oracle
 from tests.oracle.constants import impact_lever
@@ -63,24 +62,19 @@ def test_contact_point_moves_by_the_integral_of_the_lever(readings: bk.Readings)
         assert moved == pytest.approx(np.sum(weights * lever) * 0.45, abs=1e-12)
 
 
-def test_jerk_is_that_of_the_oracle() -> None:
-    rng = np.random.default_rng(32)
-    for design in DESIGNS:
-        for a_v, v_v, v_c in 20.0 * rng.normal(size=(20, 3)):
-            known = jerk(design.m_v, design.k_v, design.c_v, a_v, v_v, v_c)
-            found = vehicle_jerk(v_v, a_v, v_c, design.k_v, design.c_v, design.m_v)
-            assert found == pytest.approx(known, rel=1e-12, abs=1e-9)
-
-
 def test_force_is_mass_times_deceleration() -> None:
-    """F_v = k_v u (Eqs 41, 46) and m_v x_v'' = -F_v (Eqs 17, 47) are one and the same."""
+    """F_v = k_v u (Eqs 18, 41, 46) pushes the boulder as hard as it slows the truck, m_v x_v'' = -F_v (Eqs 17, 47)."""
     rng = np.random.default_rng(33)
     for design in DESIGNS:
         c = constants_of(design, bk.corrected(), 0)
         for _ in range(20):
             y = random_state(rng)
             known = crush_force(design.m_v, float(literal_state(y, c)[6]))
-            assert contact_force(compression(y, c), c) == pytest.approx(known, rel=1e-12)
+            s = switches_of(Modes(TURNING_FORWARD, True, 1.0, 1.0, 0, 0), bk.corrected(), c)
+            apart = s._replace(k_contact=0.0)
+            found, without = acceleration(*y, s, c), acceleration(*y, apart, c)
+            assert -design.m_v * found.a_v == pytest.approx(known, rel=1e-12)
+            assert c.m_eff * (found.a_b - without.a_b) == pytest.approx(known, rel=1e-8, abs=1e-3)
 
 
 class Nearby(NamedTuple):
@@ -107,7 +101,7 @@ def test_eq_45_is_the_derivative_of_the_integrated_form(readings: bk.Readings) -
     """m_v x_v'' = -k_v u with u = x_v - x_c - (m_v/c_v)(v_0 - x_v'), differentiated in time, is Eq 45.
 
     Whatever the boulder does, with the truck following the integrated form a difference quotient of x_v'' equals
-    `vehicle_jerk`; and at the first touch the spring is unloaded.
+    the oracle's `jerk`; and at the first touch the spring is unloaded.
     """
     rng = np.random.default_rng(34)
     h = 1e-6
@@ -120,6 +114,6 @@ def test_eq_45_is_the_derivative_of_the_integrated_form(readings: bk.Readings) -
             nearby = Nearby(y, 30.0 * rng.normal(), 40.0 * rng.normal(), a_v, c)
             quotient = (nearby.truck_acceleration(h) - nearby.truck_acceleration(-h)) / (2 * h)
             v_c = y.v_b + y.omega_b * contact_lever(np.sin(y.theta_b), 1.0 - np.cos(y.theta_b), c)
-            found = vehicle_jerk(y.v_v, a_v, v_c, design.k_v, design.c_v, design.m_v)
+            known = jerk(design.m_v, design.k_v, design.c_v, a_v, y.v_v, v_c)
             size = c.k_m * (abs(y.v_v) + abs(v_c) + c.tau_v * abs(a_v))
-            assert quotient == pytest.approx(found, abs=1e-7 * size)
+            assert quotient == pytest.approx(known, abs=1e-7 * size)
