@@ -127,8 +127,8 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
 def exact_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile as `kernel` does, without fused multiply-add: every operation rounds by itself.
 
-    For what is computed once per design. In a b + c d either product may be fused, and the compiler chooses anew wherever
-    it inlines the code; with every operation rounded by itself, the bits are the same everywhere.
+    For what is computed once per design. In a b + c d either product may be fused, and the compiler chooses anew
+    wherever it inlines the code; with every operation rounded by itself, the bits are the same everywhere.
     """
     return _compiled(function, {"nsz"})
 

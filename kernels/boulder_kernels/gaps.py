@@ -39,8 +39,8 @@ EVENTS = 8
 NEVER = 1e300
 """Gap of an event that cannot happen in the present mode."""
 CONTACT_ROUNDING = 1e-15
-"""Compressions below this share of the distance the truck would cover in a second are rounding, which would make a truck
-and a boulder that move together separate and touch again and again."""
+"""Compressions below this share of the distance the truck would cover in a second are rounding, which would make a
+truck and a boulder that move together separate and touch again and again."""
 
 
 class GapFactors(NamedTuple):

@@ -43,8 +43,8 @@ class Control(NamedTuple):
     stop_at_limit: bool = True
     """Whether the simulation ends where the rotation reaches its limit."""
     locate_yield: bool = False
-    """Whether steps also end where the soil reaches its ultimate resistance. The force has a kink there: a step that runs
-    across it is of third order only. Locating it restores the fifth, and pays for errors below about 0.0001 deg."""
+    """Whether steps also end where the soil reaches its ultimate resistance. The force has a kink there: a step that
+    runs across it is of third order only. Locating it restores the fifth, and pays for errors below about 1e-4 deg."""
     halved: bool = False
     """Whether the step of every design is halved, after any shortening: the finer of the two solutions that the error
     is estimated from."""

@@ -53,13 +53,12 @@ MUTATIONS = (
     Mutation(
         (37,), _RESTORING, "c.C_cos - c.C_cos * versin + c.C_sin * sin", "c.C_cos - c.C_cos * versin - c.C_sin * sin"
     ),
-    Mutation((38, 39), _RESTORING, "if omega_b <= 0.0:", "if omega_b < -1e9:"),
-    Mutation((39,), _RESTORING, "return -corner * min(", "return corner * min("),
+    Mutation((38,), _MODES, "net, couple, couple_sin = 1.0, 0.0, 0.0", "net, couple, couple_sin = 0.0, 0.0, 0.0"),
+    Mutation((39,), _MODES, "couple, couple_sin = -modes.corner", "couple, couple_sin = modes.corner"),
     Mutation((39,), _MODES, "net = 1.0 - modes.corner", "net = 1.0 + modes.corner"),
     Mutation((37, 39), _RESTORING, "switches.couple_sin * sin", "switches.couple_sin * sin * sin"),
     Mutation((40, 45), _VEHICLE, "x_v - x_c - c.tau_v * (c.v_0 - v_v)", "x_v - x_c - c.tau_v * c.v_0"),
-    Mutation((41, 46, 47), _VEHICLE, "return c.k_v * u", "return c.k_m * u"),
-    Mutation((45,), _VEHICLE, "-k_v / c_v * a_v - k_v / m_v", "-k_v / c_v * a_v + k_v / m_v"),
+    Mutation((41, 46, 47), _DYNAMICS, "F_v = s.k_contact * u", "F_v = s.k_truck * u"),
     Mutation((45, 48), _VEHICLE, "return c.h - c.h * versin + c.g_x * sin", "return c.h - c.h * versin - c.g_x * sin"),
     Mutation(
         (47,), _MODES, "if modes.touching or not readings.separation_released else 0.0", "if modes.touching else 0.0"
