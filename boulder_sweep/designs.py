@@ -152,7 +152,7 @@ def embedment_of_ratio(ratio: np.ndarray, height: np.ndarray) -> np.ndarray:
 
 
 def impact_height_of_face(
-    height: np.ndarray, embedment: np.ndarray, bumper: np.ndarray, hood: np.ndarray
+    height: np.ndarray | float, embedment: np.ndarray | float, bumper: np.ndarray | float, hood: np.ndarray | float
 ) -> np.ndarray:
     """Return the impact height over the soil line [m], Eq 9.
 

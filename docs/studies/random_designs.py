@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from boulder_kernels import Design, impact_height
+from boulder_kernels import Design
+from boulder_sweep.designs import impact_height_of_face
 
 RANGES = {
     "L": (0.6, 2.0),
@@ -48,6 +49,6 @@ def random_designs(count: int, seed: int = 0) -> list[Design]:
         hood, phi = draw.pop("hood"), math.radians(draw.pop("phi_deg"))
         if draw["H"] - d <= draw["e_bumper"]:
             continue
-        e = impact_height(draw["H"], d, draw["e_bumper"], hood)
+        e = float(impact_height_of_face(draw["H"], d, draw["e_bumper"], hood))
         found.append(Design(**draw, d=d, phi=phi, e=e))
     return found

@@ -6,7 +6,7 @@ subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, 
 """
 
 from ._jit import source_hash
-from .design import Constants, Design, DesignTable, constants_of, impact_height
+from .design import Constants, Design, DesignTable, constants_of
 from .impact import Control, Record, no_record, simulate_design
 from .outcomes import Maxima, Outcome, OutcomeTable, Status
 from .readings import Readings, as_printed, corrected
@@ -26,7 +26,6 @@ __all__ = [
     "as_printed",
     "constants_of",
     "corrected",
-    "impact_height",
     "no_record",
     "simulate_design",
     "simulate_table",

@@ -172,12 +172,6 @@ def element_mass(n: int, design: Design, elements: int) -> float:
 
 
 @exact_kernel
-def impact_height(H: float, d: float, e_bumper: float, e_hood: float) -> float:
-    """Height e of the blow over the soil line [m] (Eq 9), halfway up the face that truck and boulder share."""
-    return 0.5 * (min(H - d, e_hood) + e_bumper)
-
-
-@exact_kernel
 def boulder_mass(design: Design) -> float:
     """Mass m_b of the boulder [kg] (Eq 15)."""
     return design.rho_b * design.L * design.W * design.H

@@ -19,6 +19,7 @@ _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/s
 _VEHICLE, _RESTORING = "kernels/boulder_kernels/vehicle.py", "kernels/boulder_kernels/restoring.py"
 _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
+_DESIGNS = "boulder_sweep/designs.py"
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return 0.25 * math.pi + 0.5 * phi", "return 0.25 * math.pi - 0.5 * phi"),
@@ -28,7 +29,7 @@ MUTATIONS = (
     Mutation((5, 6), _DESIGN, "else design.e + half_element - z_0", "else design.e - z_0"),
     Mutation((5, 6), _DESIGN, "h = design.e + z_0 if", "h = design.e - z_0 if"),
     Mutation((7, 8), _SOIL, "q = c.l_n * sin - c.z_0 * cos", "q = c.l_n * sin + c.z_0 * cos"),
-    Mutation((9,), _DESIGN, "min(H - d, e_hood) + e_bumper", "min(H - d, e_hood) - e_bumper"),
+    Mutation((9,), _DESIGNS, "embedment, hood) + bumper", "embedment, hood) - bumper"),
     Mutation((10,), _DYNAMICS, "(soil.F + F_v) * c.inverse_m_eff", "(soil.F - F_v) * c.inverse_m_eff"),
     Mutation((11,), _DYNAMICS, "M = soil.M + F_v * contact_lever", "M = -soil.M + F_v * contact_lever"),
     Mutation((12,), _DESIGN, "m_eff = m_b + soil.mass", "m_eff = m_b"),

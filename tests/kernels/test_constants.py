@@ -162,13 +162,6 @@ def test_figures_of_the_crash_test() -> None:
     assert c.J_eff == pytest.approx(18487, abs=0.5)
 
 
-def test_impact_height() -> None:
-    """Eq 9: halfway up the face that truck and boulder share; the paper's own heights follow from it."""
-    assert bk.impact_height(3.44, 2.03, 0.5, 1.4) == pytest.approx(0.95)
-    assert bk.impact_height(2.2, 1.2, 0.508, 1.4) == pytest.approx(oracle.ABG.e)
-    assert bk.impact_height(2.2, 1.2, 0.5, 0.8) == pytest.approx(0.65)
-
-
 def test_a_row_of_a_table_is_its_design() -> None:
     table = table_of(DESIGNS)
     for row, design in enumerate(DESIGNS):

@@ -87,7 +87,7 @@ def changed(design: Design, **factors: float) -> Design:
     """Return the design with some values multiplied, hit where Eq 9 says."""
     other = design._replace(**{name: getattr(design, name) * factor for name, factor in factors.items()})
     if "d" in factors:
-        other = other._replace(e=bk.impact_height(other.H, other.d, BUMPER, 1.4))
+        other = other._replace(e=0.5 * (min(other.H - other.d, 1.4) + BUMPER))
     return other
 
 

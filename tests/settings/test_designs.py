@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from boulder_sweep.columns import INPUT_COLUMNS
-from boulder_sweep.designs import MAX_DICTIONARY, DesignPlan, Source
+from boulder_sweep.designs import MAX_DICTIONARY, DesignPlan, Source, impact_height_of_face
 
 KEYS = {
     "boulder_length_m": "boulder.length",
@@ -248,3 +248,10 @@ def test_sweeps_travel_to_other_processes(load_it, example):
 def test_a_plan_without_axes_has_one_row():
     given = {name: Source(np.array([1.0])) for name in INPUT_COLUMNS}
     assert DesignPlan([], given).n_designs == 1
+
+
+def test_impact_height() -> None:
+    """Eq 9: halfway up the face that truck and boulder share; the paper's own heights follow from it."""
+    assert impact_height_of_face(3.44, 2.03, 0.5, 1.4) == pytest.approx(0.95)
+    assert impact_height_of_face(2.2, 1.2, 0.508, 1.4) == pytest.approx(0.754)
+    assert impact_height_of_face(2.2, 1.2, 0.5, 0.8) == pytest.approx(0.65)
