@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
-from boulder_sweep.settings.schema import SolverBlock
+from boulder_sweep.settings.model import SolverSettings
 
 
 def check_complete(entries: Entries) -> None:
@@ -12,13 +12,12 @@ def check_complete(entries: Entries) -> None:
     listed = set() if entries.table is None else set(entries.table.columns)
     # What a table lacks that could not be read is unknown.
     unread_table = entries.root.get("table") is not None and entries.table is None
-    present = {field.path for field in fields.FIELDS if field.name in listed} | entries.given
-    for field in fields.FIELDS:
+    present = {field.path for field in fields.INPUTS if field.name in listed} | entries.given
+    for field in fields.INPUTS:
         if field.name in listed and field.path in entries.given:
             message = f"is given here and as column {field.name} of the table; remove one"
             entries.problems.add(entries.place_of(field), field.path, message)
-        required = field.name not in fields.OPTIONAL
-        if required and not unread_table and field.path not in present | entries.misspelled:
+        if not field.optional and not unread_table and field.path not in present | entries.misspelled:
             entries.problems.add(entries.place_of(field), field.path, "is required and missing")
     _check_embedment(entries, present, unread_table)
     if entries.root.get("table") is not None:
@@ -63,9 +62,9 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
 
 
 def _check_solver(entries: Entries) -> None:
-    solver = entries.blocks.get("solver")
     place = entries.key_place("solver", "step")
+    step, horizon = entries.settings.get("step_s"), entries.settings.get("horizon_s", SolverSettings().horizon_s)
     if {"solver.accuracy", "solver.step"} <= entries.given:
         entries.problems.add(place, "solver.step", "give accuracy or step, not both")
-    elif isinstance(solver, SolverBlock) and solver.step is not None and solver.step > solver.horizon:
-        entries.problems.add(place, "solver.step", f"is longer than the horizon of {solver.horizon:g} s")
+    elif step is not None and step > horizon:
+        entries.problems.add(place, "solver.step", f"is longer than the horizon of {horizon:g} s")

@@ -5,18 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.leaf import Leaf
+from boulder_sweep.settings.choices import read_setting
+from boulder_sweep.settings.leaf import Leaf, LeafError, read_leaf
 from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
-from boulder_sweep.settings.schema import BLOCKS, Section
-from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
+from boulder_sweep.settings.tree import Entry, Mapping, Scalar
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import DesignList
 
-TOP_KEYS = ("name", *BLOCKS, "table")
+TOP_KEYS = ("name", *fields.SECTIONS, "table")
 
 
 class Entries:
@@ -24,10 +22,10 @@ class Entries:
 
     Attributes
     ----------
-    blocks : dict of str to Section
-        The blocks without a mistake, defaults filled in.
     leaves : dict of str to Leaf
-        Quantities by column (or axis) name, as far as they have no mistake.
+        Inputs by column (or axis) name, as far as they have no mistake.
+    settings : dict of str to Any
+        What holds for all designs, by the name of the attribute, as far as given and without a mistake.
     given : set of str
         Dotted keys that stand in the file, right or wrong.
     misspelled : set of str
@@ -40,8 +38,8 @@ class Entries:
         self.root = root
         self.path = path
         self.problems = problems
-        self.blocks: dict[str, Section] = {}
         self.leaves: dict[str, Leaf] = {}
+        self.settings: dict[str, Any] = {}
         self.given: set[str] = set()
         self.misspelled: set[str] = set()
         self.table: DesignList | None = None
@@ -52,7 +50,7 @@ class Entries:
             if entry.key not in TOP_KEYS:
                 self._unknown(entry, "", TOP_KEYS)
         self._read_table()
-        for section in BLOCKS:
+        for section in fields.SECTIONS:
             self._read_block(section)
 
     def _read_table(self) -> None:
@@ -71,29 +69,29 @@ class Entries:
 
     def _read_block(self, section: str) -> None:
         entry = self.root.entries.get(section)
-        node: Node = Mapping(self.root.place) if entry is None else entry.value
-        if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
-            node = Mapping(node.place)  # a block of which every line is commented out
-        if isinstance(node, Mapping):
-            self.given |= {f"{section}.{inner.key}" for inner in node}
-        read: dict[str, Any] = {}
-        try:
-            self.blocks[section] = BLOCKS[section].model_validate(node, context=read)
-        except ValidationError as error:
-            for line in error.errors():
-                self._report(section, node, line)
-        for field in fields.fields_of(section):
-            if field.key in read:
-                self.leaves[field.name] = read[field.key]
-
-    def _report(self, section: str, node: Node, line: Any) -> None:
-        """Turn one error of pydantic into a problem at its place."""
-        if line["type"] == "extra_forbidden" and isinstance(node, Mapping):
-            self._unknown(node.entries[line["loc"][0]], section, tuple(BLOCKS[section].model_fields))
+        if entry is None:
             return
-        key = ".".join(str(part) for part in (section, *line["loc"][:1]))
-        context = line.get("ctx", {})
-        self.problems.add(context.get("place", node.place), key, context.get("message", line["msg"]))
+        node = entry.value
+        if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
+            return  # a block of which every line is commented out
+        known = {field.key: field for field in fields.fields_of(section)}
+        if not isinstance(node, Mapping) or node.unit is not None:
+            self.problems.add(node.place, section, f"must be a block of keys: {', '.join(known)}")
+            return
+        for inner in node:
+            field = known.get(inner.key)
+            if field is None:
+                self._unknown(inner, section, tuple(known))
+                continue
+            self.given.add(field.path)
+            try:
+                if field in fields.INPUTS:
+                    self.leaves[field.name] = read_leaf(inner.value, field)
+                else:
+                    self.settings[field.name] = read_setting(inner.value, field)
+            except LeafError as error:
+                for mistake in error.mistakes:
+                    self.problems.add(mistake.place, field.path, mistake.message)
 
     def _unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
         """Report a key nobody knows, with the nearest one that is known."""

@@ -9,7 +9,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from boulder_sweep.settings.bounds import ADMITTED
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.numbers import NumberError, Quantity, describe, read_count, read_quantity
 from boulder_sweep.settings.problems import Place, did_you_mean, shorten
@@ -103,7 +102,7 @@ def read_leaf(node: Node, field: Field) -> Leaf:
     return Leaf(np.array(values), isinstance(node, Sequence), node.place)
 
 
-def read_single(node: Node, name: str, unit: str) -> float:
+def read_single(node: Node, field: Field) -> float:
     """Return the one value of an entry that cannot be an axis, within its admitted range.
 
     Raises
@@ -114,23 +113,23 @@ def read_single(node: Node, name: str, unit: str) -> float:
     if not isinstance(node, Scalar):
         raise LeafError([Mistake(node.place, "takes one value here, not a list or a range")])
     try:
-        value = _to_float(read_quantity(node, unit).value)
+        value = _to_float(read_quantity(node, field.unit).value)
     except NumberError as error:
         raise LeafError([Mistake(node.place, str(error))]) from None
-    problem = outside(value, name, unit)
+    problem = outside(value, field)
     if problem:
         raise LeafError([Mistake(node.place, problem)])
     return value
 
 
-def outside(value: float, name: str, unit: str) -> str:
+def outside(value: float, field: Field) -> str:
     """Return why a value is not admitted, empty if it is."""
-    bound = ADMITTED[name]
-    if bound.low <= value <= bound.high:
+    bound = field.admitted
+    if bound is None or bound.low <= value <= bound.high:
         return ""
     return (
-        f"{describe(value, unit)} is outside the admitted range of "
-        f"{bound.low:g} to {describe(bound.high, unit)} ({bound.reason})"
+        f"{describe(value, field.unit)} is outside the admitted range of "
+        f"{bound.low:g} to {describe(bound.high, field.unit)} ({bound.reason})"
     )
 
 
@@ -168,7 +167,7 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
 def _checked(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
     """Return the values; every one of them must be admitted."""
     values = [_to_float(quantity.value) for quantity in quantities]
-    problems = ((node, outside(value, field.name, field.unit)) for node, value in zip(nodes, values, strict=True))
+    problems = ((node, outside(value, field)) for node, value in zip(nodes, values, strict=True))
     mistakes = [Mistake(node.place, problem) for node, problem in problems if problem]
     if mistakes:
         raise LeafError(mistakes)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import fields as fields_of
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
@@ -13,7 +14,6 @@ from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
 from boulder_sweep.settings.problems import ProblemList
-from boulder_sweep.settings.schema import CriterionBlock, ModelBlock, SolverBlock
 from boulder_sweep.settings.source import read_settings_text
 from boulder_sweep.settings.tree import Mapping, Scalar
 from boulder_sweep.settings.yaml_reader import parse
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 MAX_DESIGNS = 2**63 - 1
 """Most designs of a sweep: ``design_id`` is a 64-bit number."""
 
+Part = TypeVar("Part", Criterion, Model, SolverSettings)
 _NAME = re.compile(r"\w[\w .+-]{0,79}")
 
 
@@ -90,12 +91,12 @@ def _build(name: str, entries: Entries) -> Sweep:
     axes = _axes(entries)
     listed = set() if entries.table is None else set(entries.table.columns)
     constants: dict[str, float] = {}
-    for field in fields.FIELDS:
+    for field in fields.INPUTS:
         value = entries.single(field.name)
         if value is not None and field.name not in listed:
             constants[field.name] = value
     sweep = Sweep(name, entries.path, axes, constants, entries.table, *_choices(entries))
-    places = {field.name: entries.place_of(field) for field in fields.FIELDS}
+    places = {field.name: entries.place_of(field) for field in fields.INPUTS}
     object.__setattr__(sweep, "notes", tuple(notes_on(sweep, places)))
     return sweep
 
@@ -107,12 +108,12 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
     axes: list[Axis] = []
     count = 1
     for section in entries.root:
-        if section.key not in fields.SECTIONS or not isinstance(section.value, Mapping):
+        if not isinstance(section.value, Mapping):
             continue
         for entry in section.value:
             field = fields.BY_PATH[f"{section.key}.{entry.key}"]
-            leaf = entries.leaves[field.name]
-            if leaf.is_axis:
+            leaf = entries.leaves.get(field.name)  # settings have none
+            if leaf is not None and leaf.is_axis:
                 axes.append(Axis(field.name, leaf.values))
                 count *= len(leaf.values)
     if count > MAX_DESIGNS:
@@ -123,14 +124,13 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
 
 
 def _choices(entries: Entries) -> tuple[Criterion, Model, SolverSettings]:
-    """Return the settings that are not columns, defaults filled in."""
-    criterion, model, solver = (entries.blocks[name] for name in ("criterion", "model", "solver"))
-    assert isinstance(criterion, CriterionBlock)
-    assert isinstance(model, ModelBlock)
-    assert isinstance(solver, SolverBlock)
-    accuracy = solver.accuracy if solver.accuracy is not None or solver.step is not None else "balanced"
-    return (
-        Criterion(criterion.max_rotation, criterion.rating),
-        Model(model.readings, model.soil),
-        SolverSettings(accuracy, solver.step, solver.horizon),
-    )
+    """Return the settings that are not columns; what is not given has the default of its dataclass."""
+    given = entries.settings
+    if "step_s" in given:
+        given = {"accuracy": None, **given}
+    return _part(Criterion, given), _part(Model, given), _part(SolverSettings, given)
+
+
+def _part(kind: type[Part], given: dict[str, Any]) -> Part:
+    """Return one dataclass of settings, made of what is given for it."""
+    return kind(**{attribute.name: given[attribute.name] for attribute in fields_of(kind) if attribute.name in given})

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.settings.bounds import REALISTIC
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.problems import Place, Problem
@@ -41,9 +40,9 @@ def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
     for axis in sweep.axes:
         if len(np.unique(axis.values)) < len(axis.values):
             yield _note(places[axis.name], BY_NAME[axis.name].path, "holds a value more than once")
-    limit = sweep.criterion.max_rotation_deg
-    if limit > REALISTIC["max_rotation_deg"].high:
-        remark = REALISTIC["max_rotation_deg"].remark
+    limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
+    if usual is not None and limit > usual.high:
+        remark = usual.remark
         yield _note(Place(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {remark}")
     message = _mixed_families(sweep, values["friction_angle_deg"], values["subgrade_reaction_MN_m3"])
     if message:
@@ -56,17 +55,16 @@ def _note(place: Place, key: str, message: str) -> Problem:
 
 def _unrealistic(name: str, values: np.ndarray) -> str:
     """Return a remark if a value lies outside the range met in practice."""
-    realistic = REALISTIC.get(name)
-    if realistic is None:
+    usual, unit = BY_NAME[name].usual, BY_NAME[name].unit
+    if usual is None:
         return ""
-    unit = BY_NAME[name].unit
     low, high = float(values.min()), float(values.max())
-    slack = 1e-9 * realistic.high
-    if low >= realistic.low - slack and high <= realistic.high + slack:
+    slack = 1e-9 * usual.high
+    if low >= usual.low - slack and high <= usual.high + slack:
         return ""
     found = describe(low, unit) if low == high else f"{low:.6g} to {describe(high, unit)}"
-    usual = f"{realistic.low:g} to {describe(realistic.high, unit)}"
-    return f"{found} is outside the usual range of {usual} ({realistic.remark}); computed as given"
+    ends = f"{usual.low:g} to {describe(usual.high, unit)}"
+    return f"{found} is outside the usual range of {ends} ({usual.remark}); computed as given"
 
 
 def _mixed_families(sweep: Sweep, angle: np.ndarray, reaction: np.ndarray) -> str:

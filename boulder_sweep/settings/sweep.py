@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.designs import DesignBlock, DesignPlan, Source
+from boulder_sweep.settings.fields import INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import Problem
 
@@ -129,7 +129,7 @@ class Sweep:
         varying = {axis.name: axis.values for axis in self.axes}
         if self.table is not None:
             varying |= self.table.columns
-        for name in (*INPUT_COLUMNS[:4], "embedment_ratio", *INPUT_COLUMNS[4:]):
+        for name in (entry.name for entry in INPUTS):
             if name in varying:
                 inputs[name] = _listed(varying[name])
             elif name in self.constants:

@@ -10,8 +10,8 @@ from typing import TextIO
 import numpy as np
 
 from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
-from boulder_sweep.columns import INPUT_COLUMNS, OUTCOME_COLUMNS
-from boulder_sweep.settings.fields import BY_NAME, Field
+from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.settings.fields import INPUTS, Field
 from boulder_sweep.settings.leaf import outside
 from boulder_sweep.settings.numbers import NumberError, split_number
 from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, did_you_mean, shorten
@@ -23,7 +23,7 @@ MAX_TABLE_BYTES = 2_000_000_000
 MAX_TABLE_ROWS = 20_000_000
 CSV_CHUNK = 20_000
 """Rows of a CSV file that are converted and checked at once."""
-_KNOWN = (*INPUT_COLUMNS, "embedment_ratio")
+_KNOWN = {field.name: field for field in INPUTS}
 
 
 def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList | None:
@@ -68,7 +68,7 @@ def check_header(names: list[str], places: list[Place], problems: ProblemList) -
     """Return the quantity of every column, None for those that cannot be used; mistakes go to `problems`."""
     fields: list[Field | None] = []
     for index, (name, place) in enumerate(zip(names, places, strict=True)):
-        field = BY_NAME.get(name)
+        field = _KNOWN.get(name)
         message = ""
         if name in names[:index]:
             message = "is a second column of this name"
@@ -86,14 +86,13 @@ def check_header(names: list[str], places: list[Place], problems: ProblemList) -
 
 def check_values(values: np.ndarray, field: Field, limit: int = 20) -> list[tuple[int, str]]:
     """Return (row, what is wrong) for values that are not finite or not admitted, at most `limit` of them."""
-    from boulder_sweep.settings.bounds import ADMITTED
-
-    bound = ADMITTED[field.name]
+    bound = field.admitted
+    assert bound is not None
     wrong = np.flatnonzero(~((values >= bound.low) & (values <= bound.high)))[:limit]
     found = []
     for row in wrong:
         value = float(values[row])
-        message = "is not a finite number" if not np.isfinite(value) else outside(value, field.name, field.unit)
+        message = "is not a finite number" if not np.isfinite(value) else outside(value, field)
         found.append((int(row), message))
     return found
 

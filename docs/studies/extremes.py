@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from boulder_kernels import Status
-from boulder_sweep.columns import BY_NAME
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.verdict import STATUS_REASONS
-from boulder_sweep.settings.bounds import ADMITTED, MAX_ELEMENTS
-
-UNITS = {"max_rotation_deg": "deg", "horizon_s": "s", "step_s": "s", "accuracy_deg": "deg"}
+from boulder_sweep.settings.fields import FIELDS, MAX_ELEMENTS
 
 
 def admitted_table() -> Table:
     """Return every bound of the settings with its reason."""
-    table = Table(("input", "least", "most", "unit", "why there is an end"))
-    for name, bound in ADMITTED.items():
-        unit = BY_NAME[name].unit if name in BY_NAME else UNITS.get(name, "1")
-        table.add(f"`{name}`", f"{bound.low:g}", f"{bound.high:g}", unit, bound.reason)
+    table = Table(("entry", "least", "most", "unit", "why there is an end"))
+    for field in FIELDS:
+        if field.admitted is not None:
+            low, high, reason = field.admitted
+            table.add(f"`{field.path}`", f"{low:g}", f"{high:g}", field.unit, reason)
     table.add("soil elements", "1", f"{MAX_ELEMENTS:g}", "1", "the closed form is the limit of infinitely many")
     return table
 

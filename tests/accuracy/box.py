@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, Readings
-from boulder_sweep.settings.bounds import ADMITTED
+from boulder_sweep.settings.fields import INPUTS
 
+ADMITTED = {field.name: field.admitted for field in INPUTS}
 LIMIT = float(np.radians(20.0))
 PRESETS = {"corrected": Readings(*(True,) * 5), "as_printed": Readings(*(False,) * 5)}
 

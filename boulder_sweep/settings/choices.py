@@ -1,0 +1,109 @@
+"""The entries that are more than a number: rating, readings of the paper, soil representation, accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from boulder_sweep.settings.fields import BY_NAME, MAX_ELEMENTS, Field
+from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
+from boulder_sweep.settings.model import ACCURACIES, CLOSED_FORM, PRESETS, PRINTED, RATINGS, SWITCHES, ReadingChoice
+from boulder_sweep.settings.numbers import NumberError, read_count, split_number
+from boulder_sweep.settings.problems import did_you_mean, shorten
+from boulder_sweep.settings.tree import Mapping, Node, Scalar
+
+
+def read_setting(node: Node, field: Field) -> Any:
+    """Return the value of an entry that cannot be an axis.
+
+    Raises
+    ------
+    LeafError
+        With every mistake of this entry.
+    """
+    reader = _READERS.get(field.name)
+    return read_single(node, field) if reader is None else reader(node)
+
+
+def _wrong(node: Node, message: str) -> LeafError:
+    return LeafError([Mistake(node.place, message)])
+
+
+def _shown(node: Node) -> str:
+    return f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
+
+
+def _one_of(node: Node, choices: tuple[str, ...], what: str) -> str:
+    """Return one of some words; capitals do not matter."""
+    word = node.text.strip() if isinstance(node, Scalar) else ""
+    for choice in choices:
+        if word.lower() == choice.lower():
+            return choice
+    raise _wrong(node, f"{_shown(node)} is not {what}: {', '.join(choices)}{did_you_mean(word, choices)}")
+
+
+def _read_rating(node: Node) -> str:
+    return _one_of(node, RATINGS, "a penetration rating")
+
+
+def _read_readings(node: Node) -> ReadingChoice:
+    """Read a preset, or single switches on top of one (``corrected`` where none is named)."""
+    if not isinstance(node, Mapping):
+        return ReadingChoice.of_preset(_one_of(node, PRESETS, "a reading of the paper"))
+    mistakes: list[Mistake] = []
+    preset, switches = "corrected", {}
+    for entry in node:
+        try:
+            if entry.key == "preset":
+                preset = _one_of(entry.value, PRESETS, "a reading of the paper")
+            elif entry.key in SWITCHES:
+                value = _one_of(entry.value, (PRINTED, SWITCHES[entry.key], "corrected"), f"a value of {entry.key}")
+                switches[entry.key] = SWITCHES[entry.key] if value == "corrected" else value
+            else:
+                known = ("preset", *SWITCHES)
+                hint = did_you_mean(entry.key, known)
+                message = f"'{shorten(entry.key)}' is not a reading ({', '.join(known)}){hint}"
+                mistakes.append(Mistake(entry.place, message))
+        except LeafError as error:
+            mistakes.extend(error.mistakes)
+    if mistakes:
+        raise LeafError(mistakes)
+    return ReadingChoice(**{**ReadingChoice.of_preset(preset).as_dict(), **switches})
+
+
+def _read_soil(node: Node) -> int:
+    """Read ``closed_form`` (0) or ``{elements: N}`` (N)."""
+    if isinstance(node, Mapping) and list(node.entries) == ["elements"]:
+        count = node.entries["elements"].value
+        try:
+            return read_count(count, "the number of soil elements", MAX_ELEMENTS)
+        except NumberError as error:
+            raise _wrong(count, str(error)) from None
+    if isinstance(node, Scalar) and node.text.strip() == CLOSED_FORM:
+        return 0
+    raise _wrong(node, f"{_shown(node)} is not a representation of the soil: closed_form, or {{elements: 5000}}")
+
+
+def _read_accuracy(node: Node) -> str | float:
+    """Read a name, or the error of the rotation that is admitted."""
+    field = BY_NAME["accuracy"]
+    if isinstance(node, Scalar):
+        word = node.text.strip()
+        if word in ACCURACIES:
+            return word
+        try:
+            split_number(node.text, field.unit)
+        except NumberError:
+            choices = ", ".join(ACCURACIES)
+            hint = did_you_mean(word, ACCURACIES)
+            raise _wrong(node, f"{_shown(node)} is not {choices}, nor an angle such as 0.01 deg{hint}") from None
+    return read_single(node, field)
+
+
+_READERS: dict[str, Callable[[Node], Any]] = {
+    "rating": _read_rating,
+    "readings": _read_readings,
+    "soil_elements": _read_soil,
+    "accuracy": _read_accuracy,
+}
+"""Readers by name; an entry without one is a single number within its admitted range."""
