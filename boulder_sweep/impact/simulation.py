@@ -99,6 +99,7 @@ def simulate(
     longer holds: what is shown there is how it goes wrong.
     """
     sweep = _as_sweep(design)
+    sweep.require_values()
     sweep = _changed(sweep, readings, soil_elements, step_s, horizon_s)
     block = sweep.block(design_id, design_id + 1)
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}

@@ -185,7 +185,8 @@ def estimate(
 
 
 def _check_rows(sweep: Sweep) -> None:
-    """Refuse more rows than can be numbered."""
+    """Refuse uncertain inputs, and more rows than can be numbered."""
+    sweep.require_values()
     if sweep.n_designs > MOST_ROWS:
         raise DoesNotFitError(f"{sweep.n_designs:,} designs are more than a design_id of 64 bits can number")
 

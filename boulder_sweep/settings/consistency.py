@@ -46,6 +46,7 @@ def check_pairs(entries: Entries) -> None:
         entries.problems.add(entries.key_place("vehicle", key), f"vehicle.{key}", message)
     _check_impact_height(entries, bumper)
     _check_solver(entries)
+    _check_uncertain(entries)
 
 
 def _check_impact_height(entries: Entries, bumper: float | None) -> None:
@@ -68,3 +69,16 @@ def _check_solver(entries: Entries) -> None:
         entries.problems.add(place, "solver.step", "give accuracy or step, not both")
     elif step is not None and step > horizon:
         entries.problems.add(place, "solver.step", f"is longer than the horizon of {horizon:g} s")
+
+
+def _check_uncertain(entries: Entries) -> None:
+    """Report a correlation without two distributions, and a partial factor beside a distribution."""
+    uncertain = {name for name, leaf in entries.leaves.items() if leaf.distribution is not None}
+    pair = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
+    if "correlation" in entries.settings and not pair <= uncertain and pair <= set(entries.leaves):
+        message = "needs a distribution of soil.friction_angle and one of soil.subgrade_reaction"
+        entries.problems.add(entries.key_place("soil", "correlation"), "soil.correlation", message)
+    if "partial_factor" in entries.settings and "friction_angle_deg" in uncertain:
+        place = entries.key_place("partial_factor", "friction_angle")
+        message = "give a partial factor or a distribution of soil.friction_angle, not both"
+        entries.problems.add(place, "partial_factor.friction_angle", message)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import read_setting
-from boulder_sweep.settings.leaf import Leaf, LeafError, read_leaf
+from boulder_sweep.settings.distribution_reader import read_input
+from boulder_sweep.settings.leaf import Leaf, LeafError
 from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Scalar
 
@@ -86,7 +87,7 @@ class Entries:
             self.given.add(field.path)
             try:
                 if field in fields.INPUTS:
-                    self.leaves[field.name] = read_leaf(inner.value, field)
+                    self.leaves[field.name] = read_input(inner.value, field)
                 else:
                     self.settings[field.name] = read_setting(inner.value, field)
             except LeafError as error:

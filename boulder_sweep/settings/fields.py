@@ -42,7 +42,7 @@ class Field:
         Where it stands in the file: ``section: {key: ...}``.
     name : str
         Its column in the table; for other inputs the name of the axis, for settings the attribute of `Criterion`,
-        `Model` or `SolverSettings` that holds it.
+        `Model`, `SolverSettings` or `Sweep` that holds it.
     unit : str
         Unit of a bare number, and of the column; empty for words.
     meaning : str
@@ -227,6 +227,22 @@ INPUTS: tuple[Field, ...] = (
 
 SETTINGS: tuple[Field, ...] = (
     Field(
+        "soil",
+        "correlation",
+        "correlation",
+        "1",
+        "correlation of friction angle and subgrade reaction, where both have a distribution",
+        Bound(-0.99, 0.99, "the correlation of two different soil properties"),
+    ),
+    Field(
+        "partial_factor",
+        "friction_angle",
+        "partial_factor",
+        "1",
+        "partial factor on the tangent of the friction angle, as of Eurocode 7",
+        Bound(1.0, 5.0, "1.25 is usual"),
+    ),
+    Field(
         "criterion",
         "max_rotation",
         "max_rotation_deg",
@@ -271,6 +287,7 @@ SECTIONS: dict[str, str] = {
     "site": "how the boulder stands in the ground",
     "soil": "the soil around the boulder",
     "vehicle": "the vehicle: mass, speed and the Maxwell element of its front",
+    "partial_factor": "partial factors by which inputs are made worse",
     "criterion": "what a design must hold",
     "model": "which reading of the paper, which representation of the soil",
     "solver": "how accurately and how long a design is simulated",

@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from boulder_sweep.settings.distributions import Distribution
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.numbers import NumberError, Quantity, describe, read_count, read_quantity
 from boulder_sweep.settings.problems import Place, did_you_mean, shorten
@@ -18,20 +19,6 @@ MAX_AXIS = 1_000_000
 """Most values on one axis."""
 
 _RANGE_KEYS = ("from", "to", "count", "step")
-_DISTRIBUTIONS = frozenset(
-    {
-        "normal",
-        "lognormal",
-        "uniform",
-        "triangular",
-        "truncated_normal",
-        "beta",
-        "distribution",
-        "mean",
-        "sd",
-        "cov",
-    }
-)
 _TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
 
 
@@ -47,11 +34,14 @@ class Leaf:
         Whether it was written as a list or range (an axis of the grid) or as one value.
     place : Place
         Where it stands.
+    distribution : Distribution or None
+        Spread about the values, which are its means; None where the values are certain.
     """
 
     values: np.ndarray
     is_axis: bool
     place: Place
+    distribution: Distribution | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,10 +188,6 @@ def _read_range(node: Mapping, field: Field) -> list[float]:
 def _check_range_keys(node: Mapping) -> None:
     mistakes = []
     for entry in node:
-        if entry.key in _DISTRIBUTIONS:
-            raise LeafError(
-                [Mistake(entry.place, "a distribution is not accepted here; give a value, a list or a range")]
-            )
         if entry.key not in _RANGE_KEYS:
             hint = did_you_mean(entry.key, _RANGE_KEYS)
             message = f"'{shorten(entry.key)}' is not a key of a range (from, to, count or step){hint}"

@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import fields as fields_of
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
@@ -88,6 +91,9 @@ def _build(name: str, entries: Entries) -> Sweep:
     from boulder_sweep.settings.notes import notes_on
     from boulder_sweep.settings.sweep import Sweep
 
+    factor = entries.settings.get("partial_factor", 1.0)
+    if factor != 1.0:
+        _apply_partial_factor(entries, factor)
     axes = _axes(entries)
     listed = set() if entries.table is None else set(entries.table.columns)
     constants: dict[str, float] = {}
@@ -95,10 +101,35 @@ def _build(name: str, entries: Entries) -> Sweep:
         value = entries.single(field.name)
         if value is not None and field.name not in listed:
             constants[field.name] = value
-    sweep = Sweep(name, entries.path, axes, constants, entries.table, *_choices(entries))
+    spreads = {name: leaf.distribution for name, leaf in entries.leaves.items() if leaf.distribution is not None}
+    sweep = Sweep(
+        name,
+        entries.path,
+        axes,
+        constants,
+        entries.table,
+        *_choices(entries),
+        distributions=spreads,
+        correlation=entries.settings.get("correlation", 0.0),
+        partial_factor=factor,
+    )
     places = {field.name: entries.place_of(field) for field in fields.INPUTS}
     object.__setattr__(sweep, "notes", tuple(notes_on(sweep, places)))
     return sweep
+
+
+def _apply_partial_factor(entries: Entries, factor: float) -> None:
+    """Replace every friction angle by its design value, atan(tan(angle) / factor)."""
+    field = fields.BY_NAME["friction_angle_deg"]
+
+    def design(angle: np.ndarray) -> np.ndarray:
+        return np.degrees(np.arctan(np.tan(np.radians(angle)) / factor))
+
+    leaf = entries.leaves.get(field.name)
+    if leaf is not None:
+        entries.leaves[field.name] = replace(leaf, values=design(leaf.values))
+    if entries.table is not None and field.name in entries.table.columns:
+        entries.table.columns[field.name] = design(entries.table.columns[field.name])
 
 
 def _axes(entries: Entries) -> tuple[Axis, ...]:

@@ -44,6 +44,11 @@ def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
     if usual is not None and limit > usual.high:
         remark = usual.remark
         yield _note(Place(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {remark}")
+    if sweep.partial_factor != 1.0:
+        angles = values["friction_angle_deg"]
+        ends = f"{angles.min():.4g}" if angles.min() == angles.max() else f"{angles.min():.4g} to {angles.max():.4g}"
+        message = f"tan(friction angle) is divided by {sweep.partial_factor:g}: simulated and listed as {ends} deg"
+        yield _note(Place(str(sweep.path)), "partial_factor.friction_angle", message)
     message = _mixed_families(sweep, values["friction_angle_deg"], values["subgrade_reaction_MN_m3"])
     if message:
         yield _note(places["subgrade_reaction_MN_m3"], "soil.subgrade_reaction", message)

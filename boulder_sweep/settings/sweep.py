@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.designs import DesignBlock, DesignPlan, Source
-from boulder_sweep.settings.fields import INPUTS
+from boulder_sweep.settings.distributions import Distribution
+from boulder_sweep.settings.fields import BY_NAME, INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
-from boulder_sweep.settings.problems import Problem
+from boulder_sweep.settings.problems import Problem, SettingsError
 
 MAX_LISTED = 1000
 """Longest axis that `Sweep.resolved` lists value by value."""
@@ -80,6 +81,13 @@ class Sweep:
         Reading of the paper and representation of the soil.
     solver : SolverSettings
         Accuracy or step, and the time simulated.
+    distributions : dict of str to Distribution
+        Uncertain inputs by column name; their means are the values in `constants` and `axes`.
+    correlation : float
+        Correlation of friction angle and subgrade reaction, where both are uncertain.
+    partial_factor : float
+        Partial factor on tan(friction angle). The friction angles in `constants`, `axes` and `table` are design
+        values: the factor has been applied to them.
     notes : tuple of Problem
         Remarks that are no errors.
     """
@@ -92,6 +100,9 @@ class Sweep:
     criterion: Criterion = field(default_factory=Criterion)
     model: Model = field(default_factory=Model)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    distributions: dict[str, Distribution] = field(default_factory=dict)
+    correlation: float = 0.0
+    partial_factor: float = 1.0
     notes: tuple[Problem, ...] = ()
     plan: DesignPlan = field(init=False, repr=False)
 
@@ -119,6 +130,19 @@ class Sweep:
         """
         return self.plan.block(start, stop)
 
+    def require_values(self) -> None:
+        """Refuse uncertain inputs, for everything that computes one outcome per design.
+
+        Raises
+        ------
+        SettingsError
+            An input has a distribution.
+        """
+        message = "has a distribution, which only 'sweep uncertainty' takes; give a value, a list or a range"
+        if self.distributions:
+            places = ((name, spread.place) for name, spread in self.distributions.items())
+            raise SettingsError(Problem(p.file, p.line, p.column, BY_NAME[name].path, message) for name, p in places)
+
     def resolved(self) -> dict[str, Any]:
         """Return everything that decides the results as plain data: defaults filled in, units in the names.
 
@@ -136,11 +160,18 @@ class Sweep:
                 inputs[name] = self.constants[name]
         inputs.setdefault("impact_height_m", IMPACT_HEIGHT_RULE)
         accuracy = self.solver.accuracy
+        doubt: dict[str, Any] = {}
+        if self.distributions:
+            spreads = {name: spread.to_dict() for name, spread in self.distributions.items()}
+            doubt = {"distributions": spreads, "correlation": self.correlation}
+        if self.partial_factor != 1.0:
+            doubt["partial_factor"] = {"friction_angle": self.partial_factor}
         return {
             "name": self.name,
             "n_designs": self.n_designs,
             "order": "table" if self.table is not None else [axis.name for axis in self.axes],
             "inputs": inputs,
+            **doubt,
             "criterion": {
                 "max_rotation_deg": self.criterion.max_rotation_deg,
                 "rating": self.criterion.rating,

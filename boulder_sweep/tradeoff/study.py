@@ -190,6 +190,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
         No design of the sample can be computed.
     """
     begun = time.monotonic()
+    sweep.require_values()
     table, bed_offset = sampled_columns(sweep, designs)
     if not table.L.size:
         raise NothingToMeasureError(

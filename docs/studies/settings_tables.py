@@ -8,6 +8,7 @@ from boulder_sweep.columns import OUTCOMES
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
 from boulder_sweep.settings.model import CLOSED_FORM, RATINGS, Criterion, SolverSettings
+from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.units import EXPECTED
 
 DEFAULTS = {
@@ -42,11 +43,11 @@ def entries_table() -> Table:
 def choices_table() -> Table:
     """Return the entries that hold for all designs of a file."""
     table = Table(("entry", "may be", "where not given", "meaning"))
-    defaults = {**asdict(Criterion()), **asdict(SolverSettings())}
+    defaults = {**asdict(Criterion()), **asdict(SolverSettings()), "correlation": 0.0, "partial_factor": 1.0}
     for field in SETTINGS:
         form = FORMS.get(field.name) or f"{EXPECTED[field.unit].words} ({EXPECTED[field.unit].examples})"
         default = WORDS.get(field.name, defaults.get(field.name))
-        shown = f"`{default}`" if isinstance(default, str) else "" if default is None else f"{default:g} {field.unit}"
+        shown = f"`{default}`" if isinstance(default, str) else _with_unit(default, field)
         table.add(f"`{field.path}`", form, shown, field.meaning)
     return table
 
@@ -65,4 +66,8 @@ def _default(field: Field) -> str:
         return DEFAULTS[field.name]
     if not field.optional:
         return "required"
-    return f"{field.default:g}{'' if field.unit == '1' else ' ' + field.unit}"
+    return _with_unit(field.default, field)
+
+
+def _with_unit(value: float | None, field: Field) -> str:
+    return "" if value is None else describe(value, field.unit)

@@ -79,7 +79,7 @@ def test_every_page_is_in_the_index() -> None:
 
 
 def test_settings_shown_are_valid(tmp_path: Path) -> None:
-    grid, listed = re.findall(r"```yaml\n(.*?)```", page("settings.md"), re.DOTALL)
+    grid, soil, listed = re.findall(r"```yaml\n(.*?)```", page("settings.md"), re.DOTALL)
     (tmp_path / "grid.yaml").write_text(grid, encoding="utf-8")
     sweep = load(tmp_path / "grid.yaml")
     assert (sweep.name, sweep.notes) == ("my-site", ())
@@ -88,6 +88,10 @@ def test_settings_shown_are_valid(tmp_path: Path) -> None:
         "boulder_length_m,boulder_width_m,boulder_height_m,boulder_density_kg_m3,embedment_depth_m\n1.65,1.68,3.4,2600,2\n",
         encoding="utf-8",
     )
+    (tmp_path / "uncertain.yaml").write_text(re.sub(r"soil:.*\n", soil, grid), encoding="utf-8")
+    uncertain = load(tmp_path / "uncertain.yaml")
+    assert set(uncertain.distributions) == {"friction_angle_deg", "subgrade_reaction_MN_m3"}
+    assert uncertain.n_designs == sweep.n_designs // 2 * 3
     vehicle = grid[grid.index("vehicle:") :].replace("[30, 40] mph", "30 mph")
     (tmp_path / "list.yaml").write_text(listed + vehicle, encoding="utf-8")
     assert load(tmp_path / "list.yaml").n_designs == 1

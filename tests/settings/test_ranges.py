@@ -97,8 +97,6 @@ def test_every_value_of_a_count_range_is_the_float_nearest_to_the_exact_one(a, b
         ("[[3], 4]", "a list stands where one number is needed"),
         ("{from: [3], to: 4, count: 2}", "a list stands where one number is needed"),
         ("[{from: 3, to: 4, count: 2}]", "a block stands where one number is needed"),
-        ("{normal: {mean: 3, sd: 0.1}}", "a distribution is not accepted here"),
-        ("{mean: 3, sd: 0.1}", "a distribution is not accepted here"),
     ],
 )
 def test_what_makes_no_sense_is_refused(the_problem, text, words):
