@@ -1,7 +1,7 @@
 """The errors meant for a user, and the exit codes of the command line.
 
-Everything that a user can cause or mend is a `BoulderSweepError`: its text says what is wrong and what would be right,
-and its exit code is what the command ends with. Any other exception is a defect of this package.
+Everything that a user can cause or fix is a `BoulderSweepError`: its text says what is wrong and what is allowed,
+and its exit code is that of the command. Any other exception is a bug in this package.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class PictureError(BoulderSweepError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was stopped by a signal; the rows it finished are safe and it can be resumed.
+    """A run was stopped by a signal; the finished rows are safe and the run can be resumed.
 
     Not a `BoulderSweepError`, because code that handles errors must not swallow an interruption.
 
@@ -65,7 +65,7 @@ class Interrupted(KeyboardInterrupt):
     signum
         The signal.
     rows_done, rows
-        Rows that are safe on the disk, and rows of the whole table.
+        Rows that are safe on disk, and rows of the whole table.
     resume_command
         Command that resumes the run.
     """
@@ -77,7 +77,7 @@ class Interrupted(KeyboardInterrupt):
         name = signal.Signals(signum).name
         text = f"interrupted by {name}"
         if resume_command:
-            text += f"; {rows_done:,} of {rows:,} rows are safe. Go on with: {resume_command}"
+            text += f"; {rows_done:,} of {rows:,} rows are safe. Resume with: {resume_command}"
         super().__init__(text)
 
     @property

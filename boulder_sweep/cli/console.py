@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME
+from boulder_sweep.text import duration_text, size_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,28 +31,9 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def duration(seconds: float) -> str:
-    """Return a time for people: ``0.8 s``, ``2 min 05 s``, ``3 h 10 min``."""
-    if seconds < 60:
-        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    if minutes < 60:
-        return f"{minutes} min {rest:02d} s"
-    return f"{minutes // 60:,} h {minutes % 60:02d} min"
-
-
-def size(count: float) -> str:
-    """Return a number of bytes for people."""
-    for unit in ("bytes", "kB", "MB", "GB"):
-        if count < 1000:
-            return f"{count:.0f} bytes" if unit == "bytes" else f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:,.1f} TB"
-
-
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows how far a run is: a bar on a terminal, a line now and then elsewhere."""
+    """Give a function that shows progress: a bar on a terminal, a line now and then elsewhere."""
     if quiet:
         yield None
     elif sys.stderr.isatty():
@@ -71,7 +53,7 @@ class _PlainLines:
         if time.monotonic() - self.last < PLAIN_EVERY_S:
             return
         self.last = time.monotonic()
-        left = "" if now.seconds_left is None else f", {duration(now.seconds_left)} left"
+        left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
         say(
             f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} designs, "
             f"{now.rows_per_second:,.0f} per second{left}"
@@ -87,11 +69,11 @@ def _bar() -> Iterator[Callable[[Progress], None]]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[numbers]}"))
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-        # Before the first block is done there is nothing to count; the bar pulses.
-        task = bars.add_task("getting ready", total=None, numbers="(the first run compiles the kernels)")
+        # Before the first block is done there is no progress to show; the bar pulses.
+        task = bars.add_task("preparing", total=None, numbers="(the first run compiles the kernels)")
 
         def show(now: Progress) -> None:
-            left = "" if now.seconds_left is None else f", {duration(now.seconds_left)} left"
+            left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
             numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
             bars.update(task, description="simulating", total=now.rows, completed=now.rows_done, numbers=numbers)
 
@@ -112,10 +94,10 @@ def grid_lines(sweep: Sweep) -> list[str]:
 
 
 def summary_lines(name: str, summary: Summary) -> list[str]:
-    """Return what a finished run found, where it is and how to open it."""
+    """Return the result of a finished run, where it is and how to open it."""
     lines = [
-        f"{name}: {counted(summary.rows, 'design')}, {summary.rows_computed:,} of them simulated now in "
-        f"{duration(summary.seconds)} ({summary.rows_per_second:,.0f} per second, "
+        f"{name}: {counted(summary.rows, 'design')}, {summary.rows_computed:,} simulated now in "
+        f"{duration_text(summary.seconds)} ({summary.rows_per_second:,.0f} per second, "
         f"{counted(summary.jobs, 'worker')}, {summary.backend})",
         "",
     ]
@@ -123,14 +105,14 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
     lines += [
         "",
         *accuracy_lines(summary.accuracy),
-        f"table  {summary.out} ({counted(summary.parts, 'file')}, {size(summary.bytes)})",
+        f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
         f"open   pandas.read_parquet({str(summary.out)!r}), or boulder_sweep.read({str(summary.out)!r})",
     ]
     return lines
 
 
 def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
-    """Return how accurately a sweep was computed; nothing where its table does not say."""
+    """Return the accuracy of a sweep; nothing if its table does not record it."""
     if not accuracy:
         return []
     steps = f"step {1e3 * accuracy['step_s']:g} ms"
@@ -147,15 +129,15 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
 
 
 def dry_run_lines(sweep: Sweep, out: Path, effort: Estimate) -> list[str]:
-    """Return what a run would do and what it would take."""
+    """Return what a run would do, and the time and space it needs."""
     return [
         *grid_lines(sweep),
         "",
         *value_lines(sweep.resolved()),
         "",
         f"would simulate {effort.rows_to_compute:,} of {counted(effort.rows, 'design')} into {out}",
-        f"about {duration(effort.seconds)} with {counted(effort.jobs, 'worker')}, "
-        f"{size(effort.disk_bytes)} on disk, {size(effort.memory_bytes)} of memory",
+        f"about {duration_text(effort.seconds)} with {counted(effort.jobs, 'worker')}, "
+        f"{size_text(effort.disk_bytes)} on disk, {size_text(effort.memory_bytes)} of memory",
         *(f"does not fit: {objection}" for objection in effort.objections()),
     ]
 
@@ -173,11 +155,11 @@ def verdict_lines(reasons: Mapping[str, int], rows: int) -> list[str]:
 
 
 def status_lines(status: RunStatus) -> list[str]:
-    """Return how far a run got, what is missing or damaged, and how to go on."""
+    """Return how far a run got, what is missing or damaged, and how to resume it."""
     state = "finished" if status.complete else ("running" if status.running else "not finished")
     lines = [
         f"{status.out}: {state}, {status.rows_done:,} of {status.rows:,} designs "
-        f"({status.rows_done / max(status.rows, 1):.1%}), {size(status.bytes)}",
+        f"({status.rows_done / max(status.rows, 1):.1%}), {size_text(status.bytes)}",
         *verdict_lines(status.verdicts, status.rows_done),
     ]
     lines += [f"damaged  {name}: {what}" for name, what in status.damaged.items()]
@@ -185,14 +167,14 @@ def status_lines(status: RunStatus) -> list[str]:
     if len(status.missing) > 10:
         lines.append(f"missing  and {len(status.missing) - 10} more ranges")
     if status.verified and not status.damaged:
-        lines.append("every part was read and is whole")
+        lines.append("every part was read and is intact")
     if status.resume_command and not status.running:
-        lines.append(f"go on    {status.resume_command}")
+        lines.append(f"resume   {status.resume_command}")
     return lines
 
 
 def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:
-    """Return names and values below each other; the names carry the units."""
+    """Return one line per name and value; the names include the units."""
     lines = []
     width = max((len(name) for name in values), default=0) + 2
     for name, value in values.items():

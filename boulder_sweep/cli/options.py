@@ -21,8 +21,8 @@ Begin with:
 Exit codes:
   0 done (also when designs fail)         1 internal error
   2 wrong use or invalid file             3 some designs could not be computed
-  4 the output exists already, or is      130, 143 interrupted; the run can go on
-    of another version
+  4 the output exists already, or is      130, 143 interrupted; the run can
+    of another version                      be resumed
 """
 
 RUN_EXAMPLES = """\b
@@ -119,16 +119,16 @@ def run_options(function: Command) -> Command:
             click.option("--jobs", type=click.IntRange(min=1), help="Workers [default: all cores]."),
             click.option(
                 "--backend",
-                type=click.Choice(["threading", "loky", "dask"]),
+                type=click.Choice(["threading", "dask"]),
                 default="threading",
                 show_default=True,
-                help="Threads, processes, or a Dask cluster.",
+                help="Threads, or a Dask cluster.",
             ),
             click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, with --backend dask."),
-            click.option("--resume", is_flag=True, help="Go on with an interrupted run."),
-            click.option("--overwrite", is_flag=True, help="Replace the table an earlier run wrote."),
+            click.option("--resume", is_flag=True, help="Resume an interrupted run."),
+            click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run."),
             click.option("--force", is_flag=True, help="Run even if disk or memory seem too small."),
-            click.option("--dry-run", is_flag=True, help="Show designs, settings and effort; write nothing."),
+            click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing."),
             click.option("--accuracy", metavar="NAME", help="fast, balanced, fine, or '0.01 deg'."),
         )
     ):

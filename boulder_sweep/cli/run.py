@@ -39,7 +39,7 @@ def run(
     from boulder_sweep.cli import console
 
     if options["resume"] and options["overwrite"]:
-        raise click.UsageError("--resume and --overwrite exclude each other: go on, or begin again")
+        raise click.UsageError("--resume and --overwrite exclude each other")
     if options["scheduler"] and options["backend"] != "dask":
         raise click.UsageError("--scheduler needs --backend dask")
     sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
@@ -75,7 +75,7 @@ def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) ->
     from boulder_sweep.cli import console
     from boulder_sweep.runner.sweeper import estimate
 
-    effort = estimate(sweep, out, jobs=options["jobs"], backend=options["backend"], resume=options["resume"])
+    effort = estimate(sweep, out, jobs=options["jobs"], resume=options["resume"])
     if as_json:
         record = {"settings": sweep.resolved(), "out": str(out), "estimate": effort.to_dict()}
         click.echo(json.dumps(record | {"objections": effort.objections()}))
@@ -87,7 +87,7 @@ def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) ->
 def _resume_command(
     grid: str, out: Path, overrides: Sequence[str], accuracy: str | None, options: dict[str, Any]
 ) -> str:
-    """Return the command line that goes on with this run."""
+    """Return the command that resumes this run."""
     words = ["sweep", "run", grid, "-o", str(out)]
     for name in ("jobs", "backend", "scheduler"):
         if options[name] is not None and options[name] != "threading":

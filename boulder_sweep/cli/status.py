@@ -10,12 +10,12 @@ from boulder_sweep.cli.options import STATUS_EXAMPLES, json_option
 from boulder_sweep.errors import EXIT_INTERNAL
 
 
-@click.command(short_help="Show how far a run got and how to go on.", epilog=STATUS_EXAMPLES)
+@click.command(short_help="Show how far a run got and how to resume it.", epilog=STATUS_EXAMPLES)
 @click.argument("out", type=click.Path())
 @click.option("--verify", is_flag=True, help="Read every part and compare its checksum.")
 @json_option
 def status(out: str, verify: bool, as_json: bool) -> int:
-    """Show how far the run into OUT got, what is missing, and the command to go on."""
+    """Show how far the run into OUT got, what is missing, and the command that resumes it."""
     from boulder_sweep.cli import console
     from boulder_sweep.store import status as look
 

@@ -1,4 +1,4 @@
-"""How many rows may be under way at once, so that memory stays flat when writing is slower than computing."""
+"""Limits the rows in progress, so that memory stays flat when writing is slower than computing."""
 
 from __future__ import annotations
 
@@ -6,34 +6,34 @@ import threading
 
 
 class Admission:
-    """Counts rows between being handed out and being safe on the disk.
+    """Counts rows between being handed out and being safe on disk.
 
     Parameters
     ----------
     limit
-        Rows that may be under way; must allow for a whole part, which is written only when complete.
+        Most rows in progress; must exceed a full part, which is written only when complete.
     """
 
     def __init__(self, limit: int):
         self.limit = limit
-        self._under_way = 0
+        self._in_progress = 0
         self._changed = threading.Condition()
 
     def admit(self, rows: int) -> bool:
-        """Hand out rows if there is room; never waits."""
+        """Hand out rows if the limit allows; never waits."""
         with self._changed:
-            if self._under_way and self._under_way + rows > self.limit:
+            if self._in_progress and self._in_progress + rows > self.limit:
                 return False
-            self._under_way += rows
+            self._in_progress += rows
             return True
 
     def release(self, rows: int) -> None:
-        """Rows are safe."""
+        """Count rows as safe."""
         with self._changed:
-            self._under_way -= rows
+            self._in_progress -= rows
             self._changed.notify_all()
 
     def wait(self, seconds: float) -> None:
-        """Wait until rows are released, but not longer than this."""
+        """Wait until rows are released, at most this long."""
         with self._changed:
             self._changed.wait(seconds)

@@ -1,4 +1,4 @@
-"""The commands that repeat a run or go on with it, for people to copy."""
+"""The commands that repeat or resume a run, for people to copy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def repeat_command(sweep: Sweep) -> str:
 
 
 def resume_command(sweep: Sweep, out: Path, jobs: int | None, backend: str, scheduler: str | None) -> str:
-    """Return the command that goes on with a run of the given arguments."""
+    """Return the command that resumes a run with the given arguments."""
     if sweep.path is None:
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"
     words = ["sweep", "run", str(sweep.path), "-o", str(out)]

@@ -1,4 +1,4 @@
-"""What a run will take: rows by exact arithmetic; time, disk and memory from a timed sample."""
+"""What a run needs: rows by exact arithmetic; time, disk and memory from a timed sample."""
 
 from __future__ import annotations
 
@@ -14,38 +14,36 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.runner.collector import COMMIT_EVERY_S
 from boulder_sweep.store.writer import ROWS_PER_PART
+from boulder_sweep.text import size_text
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
 
 LARGEST_BLOCK = 32_768
-"""Rows; more would gain nothing and keep memory busy."""
+"""Rows; larger blocks gain nothing and use more memory."""
 BLOCK_S = 0.1
-"""Work of one block [s]: long against handing it out, short against the patience of who presses Ctrl-C."""
-MOST_ROWS = 2**63 - 1
-"""Rows that a design_id of 64 bits can number."""
+"""Work of one block [s]: long compared with handing it out, short enough for Ctrl-C to act at once."""
 _SAMPLE_S = 0.1
 _FIRST_SIZES = (1, 8, 64, 64, 64, 64)
-"""Rows, here and there in the table, that say about how long one takes."""
+"""Rows at places all over the table, for a first guess of the time per row."""
 _PIECES, _LARGEST_PIECE = 24, 1024
-"""Pieces of equal size all over the table that are computed then; many rows of each, for a short one takes more time
-and more bytes a row than a table has on the whole."""
+"""Pieces of equal size all over the table, computed after that; of many rows each, because short pieces take more time
+and more bytes per row than the whole table."""
 _SHARE = 0.05
-"""Of a small table, a sample is no more than about this share: its rows are computed again by the run."""
-_BYTES_UNDER_WAY = 400
-"""Memory of a row between being handed out and being written, inputs, outcomes and encoding together."""
-_WORKER_PROCESS_BYTES = 250_000_000
+"""Largest share of a small table that is sampled: the run computes these rows again."""
+_BYTES_IN_PROGRESS = 400
+"""Memory per row between being handed out and being written: inputs, outcomes and encoding."""
 _GOLDEN = 0.618033988749895
 
 
 class Sample(NamedTuple):
-    """What a few rows took."""
+    """Cost of a few sampled rows."""
 
     seconds_per_row: float
-    """Of one worker."""
+    """On one worker."""
     bytes_per_row: float
     bytes_per_part: float
-    """What a part takes beside its rows."""
+    """Size of a part without rows."""
 
 
 _GUESS = Sample(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
@@ -54,20 +52,20 @@ _GUESS = Sample(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a run will take.
+    """What a run needs.
 
     Parameters
     ----------
     rows
         Rows of the whole table.
     rows_to_compute
-        Those that are not there yet.
+        Rows still missing.
     seconds
         Time to compute them.
     disk_bytes, disk_free_bytes
-        Size of what will be written, and room on that disk; room is None where no output was named.
+        Size of what will be written, and free space on that disk; None where no output was named.
     memory_bytes, memory_free_bytes
-        Most memory in use, and memory available; None where the system does not tell.
+        Peak memory, and memory available; None where the system does not report it.
     rows_per_second
         Of all workers together.
     rows_per_block
@@ -88,7 +86,7 @@ class Estimate:
     jobs: int
 
     def objections(self) -> list[str]:
-        """Say what does not fit, with the numbers; empty where all does."""
+        """List what does not fit, with numbers; empty if everything fits."""
         found = []
         if self.disk_free_bytes is not None and self.disk_bytes > self.disk_free_bytes:
             found.append(
@@ -113,7 +111,7 @@ def take_sample(
     rows: int,
     metadata: Mapping[bytes, bytes],
 ) -> Sample:
-    """Compute a few rows spread over the table and take the time; the kernels must be warm.
+    """Compute a few rows spread over the table and measure the time; the kernels must be warm.
 
     Parameters
     ----------
@@ -133,13 +131,13 @@ def take_sample(
     beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
 
     def computed(place: float, size: int) -> tuple[float, pa.Table | None]:
-        """Compute some rows at a place between 0 and 1 of the table; what they took, and what would be written."""
+        """Compute some rows at a place between 0 and 1 of the table; return the time and what would be written."""
         start = int(place * (rows - size))
         begun = time.perf_counter()
         try:
             block = make_block(start, start + size)
             judged = evaluation(block)
-        except Exception:  # the run itself will meet it, try again and name the rows
+        except Exception:  # the run itself will retry and name the rows
             return 0.0, None
         return time.perf_counter() - begun, part_table(block, judged, metadata)
 
@@ -149,7 +147,7 @@ def take_sample(
         size = min(wanted, rows)
         seconds, _ = computed(number * _GOLDEN % 1.0, size)
         tried += seconds
-        # Where single rows take long, few are enough; else the largest say it best, for a block takes time itself.
+        # If single rows take long, few are enough; otherwise the largest piece is the best guess, as blocks cost time.
         per_row[size] = max(seconds / size, per_row.get(size, 0.0))
         if tried > _SAMPLE_S:
             break
@@ -179,31 +177,26 @@ def estimated(
     jobs: int,
     out: Path | None,
     rows_per_part: int = ROWS_PER_PART,
-    worker_processes: bool = False,
 ) -> Estimate:
-    """Work out what a run will take from a sample.
+    """Estimate what a run needs from a sample.
 
     Parameters
     ----------
     sample
-        What a few rows took.
+        Cost of a few sampled rows.
     rows, rows_to_compute
-        Of the whole table; not there yet.
+        Rows of the whole table; rows still missing.
     jobs
         Workers.
     out
-        Output folder, for the room on its disk.
+        Output folder, for the free space on its disk.
     rows_per_part
         Rows of a part.
-    worker_processes
-        Whether workers are processes of their own.
     """
     per_block = rows_per_block(sample.seconds_per_row, rows_to_compute, jobs)
     seconds = rows_to_compute * sample.seconds_per_row / jobs
     parts = max(-(-rows_to_compute // rows_per_part), int(seconds / COMMIT_EVERY_S))
-    memory = _BYTES_UNDER_WAY * rows_under_way(per_block, jobs, rows_per_part) + peak_memory()
-    if worker_processes:
-        memory += jobs * _WORKER_PROCESS_BYTES
+    memory = _BYTES_IN_PROGRESS * rows_in_progress(per_block, jobs, rows_per_part) + peak_memory()
     return Estimate(
         rows=rows,
         rows_to_compute=rows_to_compute,
@@ -219,14 +212,14 @@ def estimated(
 
 
 def rows_per_block(seconds_per_row: float, rows: int, jobs: int) -> int:
-    """Return how many rows to hand out at once: some work each, and enough blocks for every worker."""
+    """Return the rows per block: enough work each, and enough blocks for every worker."""
     by_time = int(BLOCK_S / max(seconds_per_row, 1e-9))
     by_share = -(-rows // (4 * jobs))
     return max(1, min(by_time, by_share, LARGEST_BLOCK))
 
 
-def rows_under_way(block: int, jobs: int, rows_per_part: int) -> int:
-    """Return how many rows may be under way: two parts being filled, and blocks to keep workers busy."""
+def rows_in_progress(block: int, jobs: int, rows_per_part: int) -> int:
+    """Return the limit of rows in progress: two parts being filled, and blocks to keep workers busy."""
     return 2 * rows_per_part + 4 * jobs * block
 
 
@@ -237,17 +230,8 @@ def blocks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, 
             yield first, min(first + size, stop)
 
 
-def size_text(size: float) -> str:
-    """Write a number of bytes for people."""
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if size < 1000:
-            return f"{size:.0f} bytes" if unit == "bytes" else f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:,.0f} PB"
-
-
 def _disk_free(out: Path) -> int:
-    """Room on the disk where a folder is, or would be made."""
+    """Free space on the disk where a folder is, or would be created."""
     place = out
     while not place.exists() and place != place.parent:
         place = place.parent
@@ -255,10 +239,10 @@ def _disk_free(out: Path) -> int:
 
 
 def peak_memory() -> int:
-    """Return the memory that this process has used at most so far [bytes].
+    """Return the peak memory of this process so far [bytes].
 
-    Where Linux tells it of this program alone, that is taken: what `getrusage` gives is never less than the process had
-    that started this one, a notebook with large tables for instance.
+    Linux reports it in ``/proc``; the value of `getrusage` includes the process that started this one, such as a
+    notebook with large tables.
     """
     try:
         status = Path("/proc/self/status").read_text()
@@ -269,7 +253,7 @@ def peak_memory() -> int:
 
 
 def _memory_free() -> int | None:
-    """Memory this process may still take, its own included: the system's, or less if its group is limited."""
+    """Memory available to this process, its own included: the system's, or less if its control group is limited."""
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
         free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -27,15 +26,11 @@ class Signals:
         The first signal that came.
     prompt : bool
         See above.
-    last_act : callable
-        Called at the second signal, before the process dies of it. It must be quick and take no locks: whatever is
-        being ended may hold those that ending it again would need.
     """
 
     def __init__(self) -> None:
         self.caught: int | None = None
         self.prompt = True
-        self.last_act: Callable[[], None] = _nothing
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
@@ -56,15 +51,9 @@ class Signals:
     def _handle(self, signum: int, frame: FrameType | None) -> None:
         """Note the first signal; die of the second."""
         if self.caught is not None:
-            # Worker processes see for themselves that their parent has gone.
-            self.last_act()
             signal.signal(signum, signal.SIG_DFL)
             os.kill(os.getpid(), signum)
             return
         self.caught = signum
         if self.prompt:
             raise Interrupted(signum)
-
-
-def _nothing() -> None:
-    """Do nothing."""

@@ -13,7 +13,7 @@ from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.backends import Backend
 from boulder_sweep.runner.collector import Collector
 from boulder_sweep.runner.commands import repeat_command
-from boulder_sweep.runner.estimate import Estimate, blocks, estimated, rows_under_way, take_sample
+from boulder_sweep.runner.estimate import Estimate, blocks, estimated, rows_in_progress, take_sample
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.summary import Progress, progress_of
 from boulder_sweep.runner.workers import Ended, Workers
@@ -54,7 +54,6 @@ class Run:
         to_compute = self._sweep.n_designs - self._rows_before
         try:
             self._backend = Backend(backend, jobs, scheduler)
-            self._signals.last_act = self._backend.remove_exchange
             if to_compute:
                 self._evaluation.warm_up()
                 rows = self._sweep.n_designs
@@ -65,7 +64,6 @@ class Run:
                     jobs=self._backend.jobs,
                     out=self._folder.path,
                     rows_per_part=self._folder.manifest.rows_per_part,
-                    worker_processes=backend == "loky",
                 )
                 objections = self._estimate.objections()
                 if objections and not force:
@@ -85,11 +83,11 @@ class Run:
         try:
             if self._backend is not None and self._estimate is not None:
                 size = self._estimate.rows_per_block
-                admission.limit = rows_under_way(size, self._backend.jobs, manifest.rows_per_part)
+                admission.limit = rows_in_progress(size, self._backend.jobs, manifest.rows_per_part)
                 ranges = blocks(manifest.missing(), size)
                 workers = Workers(self._backend, self._evaluation, make_block, ranges, admission)
                 workers.start()
-            self._look_after(workers, collector, progress)
+            self._coordinate(workers, collector, progress)
         except BaseException:
             if workers is not None:
                 workers.stop()
@@ -98,8 +96,6 @@ class Run:
             if workers is not None:
                 workers.join(_PATIENCE_S / 3)
             raise
-        finally:
-            self.notes += workers.notes if workers is not None else []
 
     def end(self, how: str) -> int:
         """Let folder and workers go.
@@ -119,7 +115,7 @@ class Run:
             self._backend.close()
         return self._folder.manifest.rows_done
 
-    def _look_after(self, workers: Workers | None, collector: Collector, progress: Report | None) -> None:
+    def _coordinate(self, workers: Workers | None, collector: Collector, progress: Report | None) -> None:
         """Pass results on until everything is written."""
         begun = reported = time.monotonic()
         ended = workers is None

@@ -1,6 +1,6 @@
 """A whole sweep: every design of a grid simulated, judged and stored.
 
-The calling thread only looks after the run: it passes results on, reports progress and watches for signals.
+The calling thread only coordinates: it passes results on, reports progress and watches for signals.
 The `Workers` thread hands out blocks, the `Collector` thread writes parts in order while others are computed.
 What the table holds depends on the settings alone, not on workers, blocks, speed or interruptions.
 """
@@ -18,11 +18,11 @@ from boulder_sweep.runner.backends import available_cores
 from boulder_sweep.runner.collector import COMMIT_EVERY_S
 from boulder_sweep.runner.commands import repeat_command
 from boulder_sweep.runner.commands import resume_command as default_resume_command
-from boulder_sweep.runner.estimate import MOST_ROWS, Estimate, estimated, take_sample
+from boulder_sweep.runner.estimate import Estimate, estimated, take_sample
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.running import Report, Run
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
-from boulder_sweep.store.errors import DoesNotFitError, NotASweepError
+from boulder_sweep.store.errors import NotASweepError
 from boulder_sweep.store.manifest import Manifest, load
 from boulder_sweep.store.opening import open_output
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
@@ -64,28 +64,28 @@ def run(
     jobs
         Workers; as many as this process may use cores by default.
     backend
-        ``threading``, ``loky`` (processes) or ``dask``.
+        ``threading`` or ``dask``.
     scheduler
         Address of a Dask scheduler; with ``dask`` only.
     resume
-        Go on with what `out` holds, if it is the same sweep; damaged parts are computed again. Begins anew
-        where there is nothing.
+        Continue what `out` holds, if it is the same sweep; damaged parts are computed again. Starts from the
+        beginning if `out` does not exist.
     overwrite
         Replace what a sweep wrote into `out` before.
     force
-        Run even if the result does not seem to fit on the disk or in memory.
+        Run even if the result is not expected to fit on the disk or in memory.
     progress
         Called up to ten times a second, from the calling thread.
     command
-        The command this run was started with, for the record.
+        The command that started this run, kept in the manifest.
     resume_command
-        The command that goes on with it; made up from the arguments by default.
+        The command that resumes it; built from the arguments by default.
     rows_per_part
-        Rows of a file of a new table.
+        Rows per file of a new table.
     commit_every_s
-        How often a file that is still growing is written [s].
+        How often finished rows are written before their file is full [s].
     simulate
-        What simulates a table of designs: for tests that inject faults.
+        Function that simulates a table of designs; tests inject faults with it.
 
     Returns
     -------
@@ -96,15 +96,15 @@ def run(
     ------
     StoreError
         `out` cannot be used, see `boulder_sweep.store.errors`; nothing has been computed then. `WriteError`
-        also when the disk fills up during the run: what is written is whole, and the run can go on.
+        also when the disk fills up during the run: what is written is whole, and the run can be resumed.
     BackendError
-        The workers cannot be had.
+        The workers are not available.
     Interrupted
-        SIGINT or SIGTERM came (main thread only); the run can go on.
+        SIGINT or SIGTERM arrived (main thread only); the run can be resumed.
     """
     begun = time.monotonic()
     out = Path(out)
-    _check_rows(sweep)
+    sweep.require_values()
     again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
     jobs = jobs or available_cores()
     whole: Run | None = None
@@ -142,25 +142,24 @@ def estimate(
     out: str | Path | None = None,
     *,
     jobs: int | None = None,
-    backend: str = "threading",
     resume: bool = False,
     simulate: Simulate = by_kernels,
 ) -> Estimate:
-    """Find out what a run will take, from a timed sample of a tenth of a second; nothing is written.
+    """Estimate what a run will take from a timed sample of a tenth of a second; nothing is written.
 
     Parameters
     ----------
-    sweep, out, jobs, backend, simulate
+    sweep, out, jobs, simulate
         As of `run`.
     resume
-        Count only the rows that `out` lacks.
+        Count only the rows missing in `out`.
 
     Returns
     -------
     Estimate
-        Rows, time, disk and memory; `Estimate.objections` says what does not fit.
+        Rows, time, disk and memory; `Estimate.objections` lists what does not fit.
     """
-    _check_rows(sweep)
+    sweep.require_values()
     accuracy = accuracy_of(sweep)
     evaluation = evaluation_of(sweep, accuracy, simulate)
     folder = None if out is None else Path(out)
@@ -180,15 +179,7 @@ def estimate(
         jobs=jobs or available_cores(),
         out=folder,
         rows_per_part=rows_per_part,
-        worker_processes=backend == "loky",
     )
-
-
-def _check_rows(sweep: Sweep) -> None:
-    """Refuse uncertain inputs, and more rows than can be numbered."""
-    sweep.require_values()
-    if sweep.n_designs > MOST_ROWS:
-        raise DoesNotFitError(f"{sweep.n_designs:,} designs are more than a design_id of 64 bits can number")
 
 
 def _identity(sweep: Sweep, evaluation: Evaluation, accuracy: Accuracy) -> dict[str, object]:

@@ -1,8 +1,7 @@
-"""Blocks handed out to workers, their results collected, failures mended.
+"""Blocks handed out to workers, their results collected, failures retried.
 
 A block that raises is tried again, then halved until the rows that raise are alone; those become rows of
-verdict ``error``. When a worker process dies, the blocks under way are computed again one at a time, each
-with a worker of its own, so that one that kills its worker is found and halved alike. Nothing else is lost.
+verdict ``error``.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,31 +18,16 @@ import numpy as np
 from boulder_sweep.judge.judged import Judged, not_computed
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.backends import Backend
-from boulder_sweep.runner.processes import (
-    Evaluate,
-    Failure,
-    MakeBlock,
-    NoRoom,
-    Outcome,
-    Parcel,
-    Work,
-    compute,
-    compute_here,
-    one_line,
-    opened,
-)
-from boulder_sweep.store.errors import WriteError
+from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
 
+MakeBlock = Callable[[int, int], "DesignBlock"]
+Evaluate = Callable[["DesignBlock"], Judged]
 _TRIES = 2
-_RAISES_BUDGET = 5_000
+_FAILURES_BUDGET = 5_000
 """Failed tries after which blocks are no longer halved: then something is wrong with all of them."""
-_DEATHS_BUDGET = 50
-"""Dead workers after which blocks are no longer halved, since each costs a second."""
-_DEATHS_AT_FIRST = 10
-"""Dead workers after which the run ends if none has ever computed a block."""
 
 
 class Piece(NamedTuple):
@@ -60,6 +44,16 @@ class Ended(NamedTuple):
     """What went wrong, if anything did."""
 
 
+class Failure(NamedTuple):
+    """A block raised."""
+
+    text: str
+
+
+Outcome = Judged | Failure | None
+"""What becomes of a block; None where the run was stopped before."""
+
+
 @dataclass(frozen=True)
 class _Task:
     """Rows [start, stop) to compute, and how often that has failed."""
@@ -69,13 +63,13 @@ class _Task:
     failed: int = 0
 
     def halves(self) -> list[_Task]:
-        """Return two tasks of half the rows, which may fail once less."""
+        """Return two tasks of half the rows, with one try each."""
         middle = (self.start + self.stop) // 2
         return [_Task(self.start, middle, _TRIES - 1), _Task(middle, self.stop, _TRIES - 1)]
 
 
 class Workers(threading.Thread):
-    """Computes ranges of rows with a backend and puts a `Piece` for each into a queue, at last `Ended`.
+    """Computes ranges of rows with a backend and puts a `Piece` for each into a queue, then `Ended`.
 
     Parameters
     ----------
@@ -86,9 +80,9 @@ class Workers(threading.Thread):
     make_block
         Gives the block of some rows.
     ranges
-        Ranges of rows [start, stop), consumed one by one as workers get free.
+        Ranges of rows [start, stop), consumed one by one as workers become free.
     admission
-        Bounds the rows under way.
+        Bounds the rows in progress.
     """
 
     def __init__(
@@ -101,53 +95,35 @@ class Workers(threading.Thread):
     ):
         super().__init__(name="workers", daemon=True)
         self.results: queue.SimpleQueue[Piece | Ended] = queue.SimpleQueue()
-        self.notes: list[str] = []
         self._backend = backend
-        self._work = Work(evaluate, make_block, backend.exchange)
+        self._evaluate = evaluate
+        self._make_block = make_block
         self._ranges = ranges
         self._next: tuple[int, int] | None = None
         self._admission = admission
         self._again: deque[_Task] = deque()
-        self._under_way: dict[int, _Task] = {}
         self._stopped = threading.Event()
-        self._raises = self._deaths = 0
-        self._succeeded = False
+        self._failures = 0
 
     def stop(self) -> None:
-        """Hand out no more blocks; those under way are dropped."""
+        """Hand out no more blocks; those in progress are dropped."""
         self._stopped.set()
-        self._backend.abandon()
+        self._backend.silence()
 
     def run(self) -> None:
-        """Compute everything; to be called by `start`."""
+        """Compute everything; called by `start`."""
         problem: BaseException | None = None
         try:
-            while not self._stopped.is_set() and not self._done():
-                self._run_pool()
-        except BaseException as raised:
-            if not self._stopped.is_set():
-                problem = raised
-        self.results.put(Ended(problem))
-
-    def _run_pool(self) -> None:
-        """Compute with one pool until all is done or the pool breaks."""
-        try:
-            with self._backend.pool(self._work) as parallel:
-                while not self._stopped.is_set() and not self._done():
+            with self._backend.pool() as parallel:
+                while not self._stopped.is_set() and (self._again or self._peek() is not None):
                     for task, outcome in parallel(self._calls()):
                         self._receive(task, outcome)
                     if not self._again:
                         self._admission.wait(0.05)
-        except WriteError:
-            raise
-        except Exception as problem:
-            if self._stopped.is_set() or not self._under_way:
-                raise
-            self._mend(problem)
-
-    def _done(self) -> bool:
-        """Whether nothing is left to hand out or to wait for."""
-        return not self._again and not self._under_way and self._peek() is None
+        except BaseException as raised:
+            if not self._stopped.is_set():
+                problem = raised
+        self.results.put(Ended(problem))
 
     def _peek(self) -> tuple[int, int] | None:
         """Look at the next range."""
@@ -165,94 +141,58 @@ class Workers(threading.Thread):
                 if upcoming is None or not self._admission.admit(upcoming[1] - upcoming[0]):
                     return
                 task, self._next = _Task(*upcoming), None
-            self._under_way[task.start] = task
             yield self._call(task)
 
     def _call(self, task: _Task) -> Any:
         """Return a call that computes a task."""
         import joblib
 
-        if self._backend.in_processes:
-            return joblib.delayed(_in_a_process)(task)
         if self._backend.name != "dask":
-            return joblib.delayed(_in_a_thread)(self._stopped, self._work, task)
+            return joblib.delayed(_in_a_thread)(self._stopped, self._evaluate, self._make_block, task)
         try:
-            block = self._work.make_block(task.start, task.stop)
+            block = self._make_block(task.start, task.stop)
         except Exception as problem:
             return joblib.delayed(_passed_on)(task, Failure(one_line(problem)))
-        return joblib.delayed(_elsewhere)(self._work.evaluate, block, task)
+        return joblib.delayed(_elsewhere)(self._evaluate, block, task)
 
     def _receive(self, task: _Task, outcome: Outcome) -> None:
-        """Pass a result on, or see to a failure."""
-        if self._under_way.pop(task.start, None) is None or outcome is None:
+        """Pass a result on, or retry after a failure."""
+        if outcome is None:
             return
-        if isinstance(outcome, NoRoom):
-            raise WriteError(f"a worker cannot hand over its result: {outcome.text}")
-        if isinstance(outcome, Parcel):
-            outcome = opened(outcome)
         if isinstance(outcome, Judged):
-            self._succeeded = True
             self.results.put(Piece(task.start, outcome))
             return
-        self._raises += 1
+        self._failures += 1
         if task.failed + 1 < _TRIES:
             self._again.append(replace(task, failed=task.failed + 1))
-        elif task.stop - task.start > 1 and self._raises < _RAISES_BUDGET:
+        elif task.stop - task.start > 1 and self._failures < _FAILURES_BUDGET:
             self._again.extend(task.halves())
         else:
-            self._give_up(task, f"the computation of this design failed: {outcome.text}")
-
-    def _mend(self, problem: Exception) -> None:
-        """Compute what was under way when a worker died, every block with a worker of its own."""
-        self.notes.append(f"a worker ended unexpectedly ({one_line(problem)}); its rows were computed again")
-        self._deaths += 1
-        suspects = sorted(self._under_way.values(), key=lambda task: task.start, reverse=True)
-        self._under_way.clear()
-        while suspects and not self._stopped.is_set():
-            task = suspects.pop()
-            try:
-                # Two workers, because one would be this very process.
-                with self._backend.pool(self._work, jobs=2) as parallel:
-                    self._under_way[task.start] = task
-                    for done, outcome in parallel([self._call(task)]):
-                        self._receive(done, outcome)
-            except WriteError:
-                raise
-            except Exception as again:
-                if self._stopped.is_set():
-                    raise
-                self._deaths += 1
-                self._under_way.pop(task.start, None)
-                if self._deaths >= _DEATHS_AT_FIRST and not self._succeeded:
-                    raise RuntimeError("no worker survives its first block") from again
-                if task.stop - task.start > 1 and self._deaths < _DEATHS_BUDGET:
-                    suspects.extend(reversed(task.halves()))
-                else:
-                    self._give_up(task, f"the worker that computed this design ended: {one_line(again)}")
-
-    def _give_up(self, task: _Task, reason: str) -> None:
-        """Let the rows of a task be errors."""
-        codes = np.zeros(task.stop - task.start, dtype=np.int32)
-        self.results.put(Piece(task.start, not_computed((reason,), codes)))
+            reason = f"the computation of this design failed: {outcome.text}"
+            codes = np.zeros(task.stop - task.start, dtype=np.int32)
+            self.results.put(Piece(task.start, not_computed((reason,), codes)))
 
 
-def _in_a_thread(stopped: threading.Event, work: Work, task: _Task) -> tuple[_Task, Outcome]:
+def _in_a_thread(
+    stopped: threading.Event, evaluate: Evaluate, make_block: MakeBlock, task: _Task
+) -> tuple[_Task, Outcome]:
     """Compute a task in a thread of this process."""
-    if stopped.is_set():
-        return task, None
-    return task, compute(work.evaluate, work.make_block, task.start, task.stop)
-
-
-def _in_a_process(task: _Task) -> tuple[_Task, Outcome]:
-    """Compute a task in a process that knows its work."""
-    return task, compute_here(task.start, task.stop)
+    return task, None if stopped.is_set() else _outcome(evaluate, lambda: make_block(task.start, task.stop))
 
 
 def _elsewhere(evaluate: Evaluate, block: DesignBlock, task: _Task) -> tuple[_Task, Outcome]:
     """Compute a task on another machine, which gets the block itself."""
-    return task, compute(evaluate, lambda start, stop: block, task.start, task.stop)
+    return task, _outcome(evaluate, lambda: block)
 
 
 def _passed_on(task: _Task, outcome: Outcome) -> tuple[_Task, Outcome]:
     """Pass what is known already through the pool."""
     return task, outcome
+
+
+def _outcome(evaluate: Evaluate, block: Callable[[], DesignBlock]) -> Judged | Failure:
+    """Compute a block; an exception is returned, not raised."""
+    try:
+        return evaluate(block())
+    except Exception as problem:
+        return Failure(one_line(problem))

@@ -1,15 +1,15 @@
-"""Results on disk: a folder of Parquet parts that is one table at any time, during and after a run.
+"""Results on disk: a folder of Parquet parts that reads as one table at any time, during and after a run.
 
-A folder holds
+A folder contains
 
 ``rows-<first>-<stop>.parquet``
     Rows [first, stop) of the table; names sort as the rows do, and a file never changes.
 ``_manifest.parquet``
-    What run it is, which parts are finished, with rows and checksums; to readers a table without rows.
+    Which run it is and which parts are finished, with rows and checksums; to readers a table without rows.
 ``_lock``
-    Empty; there while a run writes.
+    Empty; exists while a run writes.
 ``_*.writing``
-    A file that is not finished; there for an instant only, or after a run was killed.
+    A file that is not finished; exists for a moment only, or after a run was killed.
 """
 
 from boulder_sweep.store.errors import StoreError

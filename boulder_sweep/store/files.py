@@ -2,8 +2,8 @@
 
 A file is written without a name where the file system can do that (``O_TMPFILE``: Linux on ext4, XFS,
 Btrfs, tmpfs), else under a name that begins with ``_``; it is flushed to the disk, gets its name in one step,
-and then the folder is flushed. So whoever reads the folder meets finished files only, also after ``kill -9``
-at any instant, and a killed run leaves nothing half-written behind.
+and then the folder is flushed. So readers see finished files only, even after ``kill -9`` at any instant,
+and a killed run leaves no partly written file under a final name.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 WRITING_SUFFIX = ".writing"
-"""Ending of a file that has not got its final name yet; such names begin with ``_``: readers skip them."""
+"""Suffix of a file that does not have its final name yet; such names begin with ``_``, and readers skip them."""
 _PIECE = 8 << 20
-_NO_REMEDY = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+_FATAL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 @contextmanager
@@ -37,12 +37,12 @@ def flush_folder(folder: Path) -> None:
 
 
 def put_file(folder: Path, name: str, content: memoryview | bytes) -> None:
-    """Put a file into a folder in one step, replacing what has its name, and make it durable.
+    """Put a file into a folder in one step, replacing any file of that name, and make it durable.
 
     Parameters
     ----------
     folder
-        Where.
+        The folder.
     name
         Its name.
     content
@@ -51,24 +51,24 @@ def put_file(folder: Path, name: str, content: memoryview | bytes) -> None:
     Raises
     ------
     OSError
-        Nothing has changed then: a file of that name is still the old one, and nothing is left behind.
+        Nothing has changed then: an old file of that name is untouched, and no temporary file is left.
     """
-    passing = f"_{name}{WRITING_SUFFIX}"
+    temporary = f"_{name}{WRITING_SUFFIX}"
     with opened_folder(folder) as at:
-        if not _put_unnamed(at, name, content, passing):
-            _put_named(at, name, content, passing)
+        if not _put_unnamed(at, name, content, temporary):
+            _put_named(at, name, content, temporary)
         os.fsync(at)
 
 
-def _put_unnamed(at: int, name: str, content: memoryview | bytes, passing: str) -> bool:
-    """Write a file that has no name until it is whole; False where the file system cannot do that."""
+def _put_unnamed(at: int, name: str, content: memoryview | bytes, temporary: str) -> bool:
+    """Write a file that has no name until it is complete; False where the file system cannot do that."""
     flag = getattr(os, "O_TMPFILE", None)
     if flag is None:
         return False
     try:
         descriptor = os.open(".", flag | os.O_WRONLY, 0o666, dir_fd=at)
     except OSError:
-        # Not every file system can; a real reason (no right, no space) meets _put_named as well.
+        # Not every file system can; a real problem (no permission, no space) occurs in _put_named as well.
         return False
     try:
         _write_all(descriptor, content)
@@ -77,15 +77,15 @@ def _put_unnamed(at: int, name: str, content: memoryview | bytes, passing: str) 
         try:
             os.link(source, name, dst_dir_fd=at, follow_symlinks=True)
         except FileExistsError:
-            _remove(at, passing)
-            os.link(source, passing, dst_dir_fd=at, follow_symlinks=True)
+            _remove(at, temporary)
+            os.link(source, temporary, dst_dir_fd=at, follow_symlinks=True)
             try:
-                os.rename(passing, name, src_dir_fd=at, dst_dir_fd=at)
+                os.rename(temporary, name, src_dir_fd=at, dst_dir_fd=at)
             except BaseException:
-                _remove(at, passing)
+                _remove(at, temporary)
                 raise
     except OSError as problem:
-        if problem.errno in _NO_REMEDY:
+        if problem.errno in _FATAL:
             raise
         return False  # no /proc, or links from there not allowed
     finally:
@@ -93,17 +93,17 @@ def _put_unnamed(at: int, name: str, content: memoryview | bytes, passing: str) 
     return True
 
 
-def _put_named(at: int, name: str, content: memoryview | bytes, passing: str) -> None:
-    """Write a file under a passing name, then give it its own."""
-    descriptor = os.open(passing, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666, dir_fd=at)
+def _put_named(at: int, name: str, content: memoryview | bytes, temporary: str) -> None:
+    """Write a file under a temporary name, then rename it."""
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666, dir_fd=at)
     try:
         try:
             _write_all(descriptor, content)
         finally:
             os.close(descriptor)
-        os.rename(passing, name, src_dir_fd=at, dst_dir_fd=at)
+        os.rename(temporary, name, src_dir_fd=at, dst_dir_fd=at)
     except BaseException:
-        _remove(at, passing)
+        _remove(at, temporary)
         raise
 
 

@@ -1,7 +1,7 @@
-"""The finished rows of an output folder, part by part, whatever a run is doing to the folder meanwhile.
+"""The finished rows of an output folder, part by part, even while a run is writing into it.
 
 Files never change, but a run that has all its rows replaces small parts by larger ones with the same rows, see
-`writer`. A file that was there a moment ago may then be gone: its rows are looked for again, where they are now.
+`writer`. A file that existed a moment ago may then be gone: its rows are looked up again in the new manifest.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _THREADS = min(8, os.cpu_count() or 1)
 
 
 class FinishedRows:
-    """The rows of a result that are finished now; those that come later do not count.
+    """The rows of a result that are finished now; later ones are ignored.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class FinishedRows:
     NotASweepError
         There is no result in the folder.
     DamagedError, OtherVersionError
-        Its manifest cannot be trusted, or not be understood.
+        Its manifest cannot be trusted, or not be read by this version.
     """
 
     def __init__(self, folder: Path):
@@ -69,7 +69,7 @@ class FinishedRows:
         Raises
         ------
         DamagedError
-            A part is gone, truncated or changed.
+            A part is missing, truncated or changed.
         """
         _, damaged = load_checked(self._folder, read_parts=False)
         if damaged:
@@ -94,7 +94,7 @@ class FinishedRows:
         Raises
         ------
         DamagedError
-            Its part is gone, truncated or changed.
+            Its part is missing, truncated or changed.
         """
         if not any(first <= number < stop for first, stop in self._ranges):
             return None
@@ -113,7 +113,7 @@ class FinishedRows:
         return found
 
     def _opened(self, row: int) -> tuple[str, Part, BinaryIO]:
-        """Open the file that holds a row now. An open file stays readable, even if it is removed."""
+        """Open the file that holds a row. An open file stays readable, even if it is removed."""
         places = self._places
         while True:
             for name, part in places.of(row):
@@ -128,7 +128,7 @@ class FinishedRows:
                 raise StoreError(f"{self._folder} was replaced by the result of another sweep while it was read")
             if places.manifest == before.manifest:
                 name = next((name for name, _ in places.of(row)), f"the part with row {row}")
-                raise DamagedError(_damage_text(self._folder, {name: "gone"}))
+                raise DamagedError(_damage_text(self._folder, {name: "missing"}))
             self._places = places
 
     def _read(self, file: BinaryIO, name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
@@ -144,7 +144,7 @@ class FinishedRows:
                 if wrong:
                     raise DamagedError(_damage_text(self._folder, {name: wrong}))
                 source = pa.BufferReader(content)
-            # Parts are read side by side already; and a table by way of a data set would take twice as long.
+            # Parts are read in parallel already, and reading through a dataset would take twice as long.
             with pq.ParquetFile(source, page_checksum_verification=True) as opened:
                 table = opened.read(columns, use_threads=False)
         except (OSError, pa.ArrowException) as problem:
@@ -153,7 +153,7 @@ class FinishedRows:
 
 
 class _Places:
-    """In which files a manifest has which rows."""
+    """Which rows are in which file, by a manifest."""
 
     def __init__(self, manifest: Manifest):
         self.manifest = manifest
@@ -161,7 +161,7 @@ class _Places:
         self._firsts = [manifest.parts[name].first for name in self._names]
 
     def of(self, row: int) -> Iterator[tuple[str, Part]]:
-        """Yield the files in which a row may be, in the order in which to look."""
+        """Yield the files in which a row may be, in the order to try them."""
         place = bisect_right(self._firsts, row) - 1
         if place >= 0:
             name = self._names[place]
@@ -169,16 +169,16 @@ class _Places:
                 yield name, self.manifest.parts[name]
         merge = self.manifest.merge
         if merge is not None and merge.part.first <= row < merge.part.stop:
-            # The last again, since it may get its own name just after that was looked for.
+            # The final name again: the file may be renamed between the first two attempts.
             for name in (merge.name, hidden_name(merge.name), merge.name):
                 yield name, merge.part
 
 
 def _damage_text(folder: Path, damaged: dict[str, str]) -> str:
-    """Say what is damaged and what to do."""
+    """Describe what is damaged and what to do."""
     first, what = next(iter(damaged.items()))
     more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
     return (
-        f"{folder} is damaged ({first}: {what}{more}). `sweep status {folder} --verify` tells which parts are, "
-        f"and running again with --resume computes them anew"
+        f"{folder} is damaged ({first}: {what}{more}). `sweep status {folder} --verify` lists the damaged parts, "
+        f"and running again with --resume recomputes them"
     )

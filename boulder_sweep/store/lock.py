@@ -1,8 +1,8 @@
-"""One writer to a folder: a lock that the system lets go of when its holder dies.
+"""One writer per folder: a lock that the system releases when its holder dies.
 
 The lock is `flock` on the empty file ``_lock``. A killed run therefore never leaves a folder locked, and the
-file it leaves behind is recognised as stale because the lock on it can be had. On network folders the lock
-may not reach other machines; there the holder's sign of life counts, the time of ``_lock``, which it renews.
+file it leaves behind is recognised as stale because the lock can be acquired. On network folders the lock may
+not be seen by other machines; there the heartbeat of the holder counts: it keeps renewing the time of ``_lock``.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from pathlib import Path
 from boulder_sweep.store.errors import FolderInUseError, WriteError
 
 LOCK_NAME = "_lock"
-SIGN_OF_LIFE_S = 10.0
+HEARTBEAT_S = 10.0
 """How often the holder renews the time of the lock file [s]."""
-_DEAD_AFTER_S = 6 * SIGN_OF_LIFE_S
+_DEAD_AFTER_S = 6 * HEARTBEAT_S
 _ATTEMPTS = 4
 _NOT_SUPPORTED = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 
@@ -35,20 +35,20 @@ class FolderLock:
     last_host
         Machine of the last run into this folder that did not end properly, if any.
     holder
-        Words for the run that seems to hold the lock.
+        Description of the run that seems to hold the lock.
 
     Raises
     ------
     FolderInUseError
         Another run holds it.
     WriteError
-        The lock file cannot be made, as in a read-only folder.
+        The lock file cannot be created, as in a read-only folder.
     """
 
     def __init__(self, folder: Path, last_host: str | None, holder: str):
         self._path = folder / LOCK_NAME
         self.stale = self._path.exists()
-        """Whether a run that died had left its lock file."""
+        """Whether a run that died left its lock file."""
         age = self._age()
         while True:
             try:
@@ -60,7 +60,7 @@ class FolderLock:
             except BlockingIOError:
                 os.close(descriptor)
                 raise FolderInUseError(f"{folder} is being written by {holder}") from None
-            # The holder before may have removed the file between opening and locking: then begin again.
+            # The previous holder may have removed the file between opening and locking: then try again.
             if _is(self._path, descriptor):
                 break
             os.close(descriptor)
@@ -68,7 +68,7 @@ class FolderLock:
         if (elsewhere or not shared) and self.stale and age < _DEAD_AFTER_S:
             os.close(descriptor)
             raise FolderInUseError(
-                f"{folder} seems to be written by {holder}: it gave a sign of life {age:.0f} s ago. "
+                f"{folder} seems to be written by {holder}: its last heartbeat was {age:.0f} s ago. "
                 f"If that run is dead, try again in {_DEAD_AFTER_S:.0f} s"
             )
         self._descriptor: int | None = descriptor
@@ -76,14 +76,14 @@ class FolderLock:
         os.utime(descriptor)
 
     def renew(self) -> None:
-        """Give a sign of life; cheap, to be called often."""
-        if self._descriptor is not None and time.monotonic() - self._renewed > SIGN_OF_LIFE_S:
+        """Send a heartbeat if one is due; cheap, call it often."""
+        if self._descriptor is not None and time.monotonic() - self._renewed > HEARTBEAT_S:
             self._renewed = time.monotonic()
             with suppress(OSError):
                 os.utime(self._descriptor)
 
     def release(self) -> None:
-        """Let go; may be called twice."""
+        """Release the lock; may be called twice."""
         if self._descriptor is None:
             return
         with suppress(OSError):
@@ -93,7 +93,7 @@ class FolderLock:
         self._descriptor = None
 
     def _age(self) -> float:
-        """Seconds since the last sign of life."""
+        """Seconds since the last heartbeat."""
         try:
             return max(time.time() - self._path.stat().st_mtime, 0.0)
         except OSError:
@@ -101,7 +101,7 @@ class FolderLock:
 
 
 def is_locked(folder: Path) -> bool:
-    """Whether a run on this machine, or one that shares its locks, writes into a folder now."""
+    """Whether a run on this machine, or on one that shares its locks, is writing into a folder."""
     try:
         descriptor = os.open(folder / LOCK_NAME, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
@@ -119,14 +119,14 @@ def is_locked(folder: Path) -> bool:
 
 
 def _lock(descriptor: int) -> bool:
-    """Lock an open file; False where the file system knows no locks."""
+    """Lock an open file; False where the file system has no locks."""
     for attempt in range(_ATTEMPTS):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             if attempt == _ATTEMPTS - 1:
                 raise
-            time.sleep(0.05)  # it may only be someone who asks `is_locked`
+            time.sleep(0.05)  # it may only be a call of `is_locked`
         except OSError as problem:
             if problem.errno in _NOT_SUPPORTED:
                 return False

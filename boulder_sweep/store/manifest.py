@@ -1,7 +1,7 @@
-"""The manifest of an output folder: what run it is, which parts are finished, and who wrote them when.
+"""The manifest of an output folder: which run it belongs to, which parts are finished, and who wrote them when.
 
 It is the file ``_manifest.parquet``: the columns of the table, no rows, and the records as JSON in its
-metadata. A reader that takes every file of the folder as a part (DuckDB, Polars) then finds nothing in it,
+metadata. A reader that takes every file of the folder for a part (DuckDB, Polars) then finds no rows in it,
 where any other kind of file would make it fail.
 """
 
@@ -36,7 +36,7 @@ class Part:
     Parameters
     ----------
     first, rows
-        Number of its first row in the whole table, and how many it has.
+        Number of its first row in the whole table, and its number of rows.
     bytes, sha256
         Size and checksum of its file.
     verdicts
@@ -60,7 +60,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Merge:
-    """Several parts about to be replaced by one that holds the same rows."""
+    """Several parts about to be replaced by one with the same rows."""
 
     name: str
     part: Part
@@ -69,7 +69,7 @@ class Merge:
 
 @dataclass
 class Session:
-    """One run into the folder: the first, or one that went on."""
+    """One run into the folder: the first, or one that resumed."""
 
     started: str
     host: str
@@ -80,23 +80,23 @@ class Session:
     command: str
     ended: str | None = None
     how: str | None = None
-    """How it ended: ``finished``, or what stopped it; None while it runs, and for ever if it was killed."""
+    """How it ended: ``finished``, or what stopped it; None while it runs, and also if it was killed."""
 
 
 @dataclass
 class Manifest:
-    """All that is known about an output folder beside its rows.
+    """Everything known about an output folder apart from its rows.
 
     Parameters
     ----------
     identity
-        What must be equal for rows to belong to one table, see `provenance`.
+        What all rows of one table have in common, see `provenance`.
     rows
         Rows of the whole table.
     rows_per_part
         Rows of every part but the last.
     resume_command
-        Command that goes on with the run.
+        Command that resumes the run.
     parts
         Finished parts by file name.
     sessions
@@ -128,7 +128,7 @@ class Manifest:
         return dict(sorted(total.items()))
 
     def missing(self) -> Iterator[tuple[int, int]]:
-        """Return the ranges [start, stop) of rows that are not there now, in order, none across two parts."""
+        """Return the missing ranges [start, stop) of rows, in order, none across two parts."""
         there = sorted((part.first, part.stop) for part in self.parts.values())
         return self._gaps([*there, (self.rows, self.rows)])
 
@@ -143,7 +143,7 @@ class Manifest:
             start = stop
 
     def mergeable(self) -> list[list[str]]:
-        """Return the names of the parts, in order, that together are one whole part of the table."""
+        """Return groups of names of parts, in order, that together make one full part of the table."""
         groups: dict[int, list[str]] = {}
         for name in sorted(self.parts):
             groups.setdefault(self.parts[name].first // self.rows_per_part, []).append(name)
@@ -161,12 +161,12 @@ class Manifest:
 
 
 def hidden_name(name: str) -> str:
-    """Return the name of a merged part while the parts it replaces are still there."""
+    """Return the temporary name of a merged part while the parts it replaces still exist."""
     return f"_{name}{WRITING_SUFFIX}"
 
 
 def is_ours(name: str) -> bool:
-    """Whether a sweep gives its files such a name, passing names included."""
+    """Whether a sweep gives its files such a name, temporary names included."""
     if name.endswith(WRITING_SUFFIX):
         return name.startswith("_") and is_ours(name[1 : -len(WRITING_SUFFIX)])
     return bool(_PART_NAME.fullmatch(name)) or name in (MANIFEST_NAME, LOCK_NAME)
@@ -183,7 +183,7 @@ def save(manifest: Manifest, folder: Path) -> None:
     Raises
     ------
     OSError
-        The one before is still there then.
+        The previous one is unchanged then.
     """
     import pyarrow as pa  # heavy, and only runs need it
     import pyarrow.parquet as pq
@@ -209,7 +209,7 @@ def load(folder: Path) -> Manifest:
     DamagedError
         It cannot be trusted.
     OtherVersionError
-        It is whole, but not what this version writes.
+        It is intact, but not what this version writes.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -225,8 +225,8 @@ def load(folder: Path) -> Manifest:
     checksum, text = value[:64], value[64:]
     if hashlib.sha256(text).hexdigest().encode() != checksum:
         raise DamagedError(
-            f"{path} is damaged: its checksum does not fit. The parts beside it can still be read as a "
-            f"table, but no run can go on with them"
+            f"{path} is damaged: its checksum does not match. The parts beside it can still be read as a "
+            f"table, but no run can resume from them"
         )
     content: Any = None
     try:
@@ -238,11 +238,11 @@ def load(folder: Path) -> Manifest:
 
 
 def _no_result(folder: Path) -> str:
-    """Say why a place holds no result."""
+    """Describe why a path holds no result."""
     if not folder.exists():
         return f"there is no {folder}; the result of a sweep is a folder, such as m30-sizing.sweep"
     if folder.is_dir():
-        return f"{folder} holds no result of a sweep (no {MANIFEST_NAME})"
+        return f"{folder} is not the result of a sweep (no {MANIFEST_NAME})"
     around = folder.resolve().parent
     inside = f": name the folder it lies in, {around}" if (around / MANIFEST_NAME).exists() else ""
     return f"{folder} is a file; the result of a sweep is a folder{inside}"

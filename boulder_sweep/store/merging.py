@@ -1,4 +1,4 @@
-"""Small parts become one part, in steps of which each can be the last before a power cut."""
+"""Merging small parts into one, in steps that are safe against a power cut at any point."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from boulder_sweep.store.verify import merged_file
 
 
 def finish_merge(manifest: Manifest, folder: Path) -> None:
-    """Let the merged part, whole under its hidden name, take the place of the small ones.
+    """Let the merged part, complete under its temporary name, replace the small ones.
 
     Parameters
     ----------
     manifest
-        With the merge announced; the merge is done in it afterwards, which the caller must save.
+        Announces the merge; updated in place, and the caller must save it.
     folder
         The output folder.
     """
     merge = manifest.merge
     if merge is None:
         return
-    # The small ones go first: a reader in between misses rows for an instant, but never sees any twice.
+    # The small ones are removed first: a reader in between misses rows for a moment, but never sees any twice.
     for name in merge.replaced:
         (folder / name).unlink(missing_ok=True)
     hidden = folder / hidden_name(merge.name)
@@ -36,7 +36,7 @@ def finish_merge(manifest: Manifest, folder: Path) -> None:
 
 
 def recover_merge(manifest: Manifest, folder: Path) -> None:
-    """Finish a merge in the middle of which a run was killed, or forget it if it had only been announced.
+    """Finish a merge during which a run was killed, or drop it if it had only been announced.
 
     Parameters and effect are those of `finish_merge`.
     """

@@ -1,4 +1,4 @@
-"""Taking an output folder for a run: new, resumed or overwritten, or refused with the reason."""
+"""Opening an output folder for a run: new, resumed or overwritten, or refused with the reason."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ def open_output(
     resume: bool = False,
     overwrite: bool = False,
 ) -> OutputFolder:
-    """Take a folder for a run.
+    """Open a folder for a run.
 
     Parameters
     ----------
     out
-        The folder; it may exist if it is empty, or as `resume` and `overwrite` say.
+        The folder; it may exist if it is empty, or with `resume` or `overwrite`.
     manifest
-        What the run is, without parts.
+        Describes the run, without parts.
     session
-        Who runs it.
+        Describes this session.
     resume
-        Keep the finished parts of the same run if there are any. Damaged ones become missing.
+        Keep the finished parts of the same run, if any. Damaged ones count as missing.
     overwrite
-        Remove what a sweep wrote there before.
+        Remove what an earlier sweep wrote there.
 
     Raises
     ------
@@ -68,9 +68,9 @@ def open_output(
 
 
 def _make(out: Path) -> bool:
-    """Make the folder if it is not there; True if it was made."""
+    """Create the folder if it does not exist; True if it was created."""
     if not out.parent.is_dir():
-        raise errors.StoreError(f"there is no folder {out.parent} to make {out.name} in")
+        raise errors.StoreError(f"the folder {out.parent} does not exist: {out.name} cannot be created in it")
     try:
         out.mkdir()
     except FileExistsError:
@@ -78,12 +78,12 @@ def _make(out: Path) -> bool:
             raise errors.StoreError(f"{out} is a file; the output of a sweep is a folder") from None
         return False
     except OSError as problem:
-        raise errors.WriteError(f"cannot make the folder {out}: {problem.strerror}") from problem
+        raise errors.WriteError(f"cannot create the folder {out}: {problem.strerror}") from problem
     return True
 
 
 def _locked(out: Path) -> FolderLock:
-    """Lock the folder, with words for who else may hold it."""
+    """Lock the folder; an error names who else may hold it."""
     holder, host = "another run", None
     with suppress(errors.StoreError):
         sessions = load(out).sessions
@@ -96,7 +96,7 @@ def _locked(out: Path) -> FolderLock:
 def _taken(
     out: Path, lock: FolderLock, manifest: Manifest, resume: bool, overwrite: bool, created: bool
 ) -> OutputFolder:
-    """Bring a locked folder into the state from which the run goes on."""
+    """Bring a locked folder into the state from which the run continues."""
     names = sorted(entry.name for entry in out.iterdir())
     foreign = [name for name in names if not is_ours(name) or (out / name).is_dir()]
     there = None
@@ -104,7 +104,7 @@ def _taken(
         there = load(out)
     parts = [name for name in names if is_part_name(name)]
     if there is None and not overwrite and parts:
-        raise errors.DamagedError(f"{out} holds parts but no {MANIFEST_NAME}; --overwrite starts again")
+        raise errors.DamagedError(f"{out} contains parts but no {MANIFEST_NAME}; use --overwrite to start again")
     if there is None or overwrite:
         unknown = parts if there is None else [name for name in parts if name not in there.parts]
         foreign += [name for name in unknown if not _is_written_by_us(out / name)]
@@ -119,7 +119,7 @@ def _taken(
 
 
 def _resumed(out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, names: list[str]) -> OutputFolder:
-    """Go on with the run that is there, if it is the same."""
+    """Resume the run in the folder, if it is the same."""
     different = differences(there.identity, manifest.identity)
     if there.rows != manifest.rows:
         different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
@@ -145,7 +145,7 @@ def _remove(out: Path, names: list[str]) -> None:
 
 
 def _is_readable(out: Path) -> bool:
-    """Whether the manifest is whole and such as this version writes."""
+    """Whether the manifest is intact and in this version's format."""
     try:
         load(out)
     except (errors.DamagedError, errors.OtherVersionError):
@@ -154,7 +154,7 @@ def _is_readable(out: Path) -> bool:
 
 
 def _is_written_by_us(path: Path) -> bool:
-    """Whether a file that is named like a part says itself that a sweep wrote it."""
+    """Whether the metadata of a file that is named like a part shows that a sweep wrote it."""
     import pyarrow as pa  # heavy, and only needed where a manifest is missing
     import pyarrow.parquet as pq
 

@@ -2,7 +2,7 @@
 
 The *identity* is what must be equal for rows to belong to one table: settings, control of the integration,
 versions and the hashes of the code that decides a row. It goes into every part and into the manifest, and a
-run goes on only with the same. When, where and with how many workers rows were computed changes nothing in
+run is resumed only with the same. When, where and with how many workers rows were computed does not affect
 them; that is kept in the manifest only, so that equal runs give equal parts.
 """
 
@@ -23,11 +23,11 @@ from typing import Any
 from boulder_sweep.store.manifest import Session
 
 PREFIX = "boulder_sweep."
-"""Beginning of the names of this package's entries in the metadata of a file."""
+"""Prefix of this package's entries in the metadata of a file."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 _DECIDING_SOURCES = ("designs.py", "judge/*.py")
-"""Modules beside the kernels whose code decides what stands in a row."""
+"""Modules, in addition to the kernels, whose code determines the rows."""
 
 
 def canonical(content: Any) -> str:
@@ -46,7 +46,7 @@ def identity(
     control: Mapping[str, Any],
     accuracy: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Collect what rows of one table have in common.
+    """Collect what all rows of one table have in common.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def identity(
     control
         How the motion is integrated: step, horizon, limit, soil elements.
     accuracy
-        What accuracy was asked for, the step chosen for it, and the estimated error that a pilot found.
+        The accuracy requested, the step chosen for it, and the error estimated by a pilot.
 
     Returns
     -------
@@ -75,11 +75,11 @@ def identity(
         "kernels_sha256": kernels_sha256(),
         "rules_sha256": rules_sha256(),
     }
-    return json.loads(canonical(found))  # as it will come back from a file
+    return json.loads(canonical(found))  # as it will be read back from a file
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
-    """Say in which entries two identities differ, one line each; hashes only where nothing else tells."""
+    """List the entries in which two identities differ, one line each; hashes only where nothing else explains them."""
     before, after = _flat(there), _flat(here)
     changed = [key for key in {**before, **after} if before.get(key, _ABSENT) != after.get(key, _ABSENT)]
     telling = [key for key in changed if not key.endswith("_sha256")]
@@ -89,7 +89,7 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
 
 
 def file_metadata(identity_: Mapping[str, Any], repeat: str) -> dict[bytes, bytes]:
-    """Metadata of a part: its identity, and beside it the command, commit and processor.
+    """Metadata of a part: its identity, and also command, commit and processor.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def file_metadata(identity_: Mapping[str, Any], repeat: str) -> dict[bytes, byte
 
 
 def new_session(command: str, jobs: int, backend: str) -> Session:
-    """Describe the run that begins now."""
+    """Describe the run that starts now."""
     return Session(
         started=now(),
         host=socket.gethostname(),
@@ -139,10 +139,9 @@ def versions() -> dict[str, str]:
 @cache
 def kernels_sha256() -> str:
     """Hash of the sources of the compiled kernels."""
-    import boulder_kernels
+    from boulder_kernels import source_hash  # imports Numba
 
-    folder = Path(boulder_kernels.__file__).parent
-    return _sources_sha256(sorted(folder.glob("*.py")))
+    return source_hash()
 
 
 @cache

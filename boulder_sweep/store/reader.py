@@ -20,27 +20,27 @@ def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool 
     Parameters
     ----------
     out
-        Folder that `boulder_sweep.run` or ``sweep run`` wrote, also while it is being written.
+        Folder that `boulder_sweep.run` or ``sweep run`` wrote, or is still writing.
     columns
         Names of the columns wanted; all by default.
     verify
-        Compare every part with its checksum before: a second for some ten million rows.
+        Compare every part with its checksum first: about a second per ten million rows.
 
     Returns
     -------
     pandas.DataFrame
-        Rows in the order of the designs. ``.attrs`` holds ``units`` and ``meanings`` by column name,
-        ``rows`` (of the whole table) and ``complete`` (whether all of them are there).
+        Rows in the order of the designs. ``.attrs`` contains ``units`` and ``meanings`` by column name,
+        ``rows`` (of the whole table) and ``complete`` (whether all of them are finished).
 
     Raises
     ------
     NotASweepError
         There is no result in the folder.
     DamagedError
-        A part is gone, truncated or changed.
+        A part is missing, truncated or changed.
     """
     table, rows = _read(Path(out), columns, verify)
-    # Not split into blocks: consolidating columns of one type would copy the whole table once more.
+    # Split into blocks: consolidating columns of one type would copy the whole table once more.
     frame = table.to_pandas(split_blocks=True, self_destruct=True)
     frame.attrs = {
         "units": {name: BY_NAME[name].unit for name in frame.columns},
@@ -62,16 +62,16 @@ def read_row(folder: Path, design_id: int) -> pa.Table:
     Raises
     ------
     IndexError
-        The table has no such row, or not yet.
+        The table has no such row, or it is not computed yet.
     DamagedError
-        The part is gone, truncated or changed.
+        The part is missing, truncated or changed.
     """
     finished = FinishedRows(folder)
     if not 0 <= design_id < finished.rows:
-        raise IndexError(f"{folder} holds {finished.rows:,} designs, numbered from 0; there is no {design_id}")
+        raise IndexError(f"{folder} has {finished.rows:,} designs, numbered from 0; there is no {design_id}")
     row = finished.row(design_id)
     if row is None:
-        raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` says how to go on")
+        raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` shows how to resume")
     return row
 
 

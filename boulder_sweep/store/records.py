@@ -1,6 +1,6 @@
-"""Records as a file has them, against the records this version knows: the form of a result may change one day.
+"""Checks that records read from a file have the format of this version.
 
-What does not fit is never guessed at: rows of another version must not be mixed with those of this one.
+Records of another version are refused, never guessed at: their rows must not be mixed with those of this version.
 """
 
 from __future__ import annotations
@@ -10,21 +10,21 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 
 def entries_of(record: type, what: str, content: Any) -> dict[str, Any]:
-    """Return the entries of a record if they are just those it has today, with values of the right kind.
+    """Return the entries of a record if they are exactly the expected ones, with values of the right type.
 
     Parameters
     ----------
     record
         A dataclass.
     what
-        What the record is of, in words.
+        What the record describes, for the message.
     content
-        What a JSON file has in its place; records within it are not looked into.
+        The parsed JSON; nested records are not checked.
 
     Raises
     ------
     ValueError
-        An entry is unknown, missing or of another kind; the text says which.
+        An entry is unknown, missing or of another type; the text says which.
     """
     if not isinstance(content, dict):
         raise ValueError(f"{what} has no named entries")
@@ -43,14 +43,14 @@ def entries_of(record: type, what: str, content: Any) -> dict[str, Any]:
 
 
 def version_of(content: Any) -> str | None:
-    """Find the version of boulder-sweep that wrote the records of a manifest; None where they do not say it."""
+    """Return the version of boulder-sweep that wrote the records of a manifest; None if it is not recorded."""
     for key in ("identity", "versions", "boulder-sweep"):
         content = content.get(key) if isinstance(content, dict) else None
     return content if isinstance(content, str) else None
 
 
 def _fits(value: Any, type_: Any) -> bool:
-    """Whether a value from a JSON file is of the kind that an annotation asks for, contents of lists aside."""
+    """Whether a value from a JSON file has the annotated type; contents of lists are not checked."""
     if type_ is type(None):
         return value is None
     kinds = get_args(type_) if get_origin(type_) not in (dict, list) else ()

@@ -1,9 +1,8 @@
 """The table on disk: types, units, encodings, and the way from columns of numbers to the bytes of a part.
 
-Inputs repeat a few values over and over, so they are stored by a dictionary and travel as codes from the grid
-to the file, never row by row. Computed numbers hardly ever repeat: their bytes are stored split by
-significance, which compresses best. Every page carries a checksum. Nothing here depends on the time or on the
-load of the machine, so the same rows give the same bytes.
+Inputs repeat a few values over and over, so they are dictionary-encoded and stay codes from the grid to the
+file. Computed numbers hardly ever repeat: their bytes are stored split by significance, which compresses best.
+Every page has a checksum. Nothing here depends on time or machine load, so the same rows give the same bytes.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 COMPRESSION, COMPRESSION_LEVEL = "zstd", 3
 PANDAS_ATTRIBUTES = b"PANDAS_ATTRS"
-"""Metadata that pandas puts into ``DataFrame.attrs`` of what it reads."""
+"""Metadata that pandas copies into ``DataFrame.attrs``."""
 _WORDS = {"verdict": VERDICTS, "rating": RATINGS}
 _TYPES = {
     "int64": pa.int64(),
@@ -45,7 +44,7 @@ def table_schema(metadata: Mapping[bytes, bytes] | None = None) -> pa.Schema:
 
 
 def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, bytes]) -> pa.Table:
-    """Put the inputs and outcomes of the same rows together.
+    """Combine the inputs and outcomes of the same rows.
 
     Parameters
     ----------
@@ -88,7 +87,7 @@ def encode(table: pa.Table) -> memoryview:
 
 
 def judged_rows(table: pa.Table) -> Judged:
-    """Return the outcomes held by a table that was read back, as they were before it was written."""
+    """Return the outcomes of a table that was read back, as they were before it was written."""
     columns: dict[str, Any] = {}
     for name in OUTCOME_COLUMNS:
         column = table[name]
@@ -117,7 +116,7 @@ def _complete(metadata: Mapping[bytes, bytes] | None) -> dict[bytes, bytes]:
 
 
 def _input_array(column: Column) -> pa.Array:
-    """One input column; its codes become the indices of a dictionary array without being looked up."""
+    """One input column; its codes become the indices of a dictionary array without a lookup."""
     missing = np.isnan(column.values)
     if column.codes is None:
         return _array(column.values, missing)
@@ -143,8 +142,8 @@ def _word_array(codes: np.ndarray, words: tuple[str, ...]) -> pa.DictionaryArray
 def _array(values: np.ndarray, missing: np.ndarray | None = None) -> pa.Array:
     """Array of numbers, null where they are missing; it shares their memory.
 
-    Not by `pyarrow.array`, which imports pandas to see whether it was given a piece of it: a good part of the time that
-    a run of a hundred thousand designs takes.
+    Avoids `pyarrow.array`, which imports pandas to check for its types: a good part of the time of a run of a hundred
+    thousand designs.
     """
     valid = None
     if missing is not None and missing.any():

@@ -1,4 +1,4 @@
-"""How far a run got, what is missing or damaged, and how to go on."""
+"""How far a run got, what is missing or damaged, and how to resume it."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class RunStatus:
     parts
         Finished, undamaged files.
     running
-        Whether a run writes into it now.
+        Whether a run is writing into it now.
     verified
         Whether every part was read and its checksum compared.
     damaged
         What is wrong with damaged parts, by file name.
     missing
-        Ranges [start, stop) of rows that are not there; the first hundred, neighbours joined.
+        Missing ranges [start, stop) of rows; the first hundred, neighbours joined.
     verdicts
-        How many rows have each verdict and reason, keyed ``verdict/reason``.
+        Number of rows of each verdict and reason, keyed ``verdict/reason``.
     bytes
         Size of the finished parts.
     sessions
@@ -40,7 +40,7 @@ class RunStatus:
     identity
         Settings, versions and hashes that all rows share.
     resume_command
-        The command to go on with; None when everything is there.
+        The command that resumes the run; None if it is complete.
     """
 
     out: str
@@ -59,7 +59,7 @@ class RunStatus:
 
     @property
     def complete(self) -> bool:
-        """Whether every row is there."""
+        """Whether all rows are finished."""
         return self.rows_done == self.rows
 
     def to_dict(self) -> dict[str, Any]:
@@ -71,7 +71,7 @@ _MISSING_SHOWN = 100
 
 
 def status(out: str | Path, *, verify: bool = False) -> RunStatus:
-    """Look at an output folder; nothing is changed, and a run may be writing into it.
+    """Inspect an output folder; nothing is changed, and a run may be writing into it.
 
     Parameters
     ----------

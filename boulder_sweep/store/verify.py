@@ -1,4 +1,4 @@
-"""Whether a part on the disk is what the manifest says it is."""
+"""Whether the parts on disk match the manifest."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pathlib import Path
 from boulder_sweep.store.manifest import Manifest, Merge, Part, hidden_name, load
 
 _ATTEMPTS = 20
-"""More than the merges that a run can begin while a part is looked at."""
+"""More than the merges that a run can start while parts are checked."""
 _CHANGED = "changed: its checksum differs"
 
 
 def load_checked(folder: Path, *, read_parts: bool) -> tuple[Manifest, dict[str, str]]:
-    """Read the manifest of a folder, and compare the parts with it.
+    """Read the manifest of a folder and compare the parts with it.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ def load_checked(folder: Path, *, read_parts: bool) -> tuple[Manifest, dict[str,
     Returns
     -------
     manifest : Manifest
-        With the undamaged parts only, by the names their files have now.
+        With the undamaged parts only, by their current file names.
     damaged : dict
-        What is wrong with the others, in words; by file name.
+        What is wrong with the others, by file name.
     """
     whole: dict[str, Part] = {}
     for _ in range(_ATTEMPTS):
@@ -42,7 +42,7 @@ def load_checked(folder: Path, *, read_parts: bool) -> tuple[Manifest, dict[str,
         whole |= {name: part for name, part in unknown.items() if name not in damaged}
         if manifest.merge is not None and damaged.keys() & set(manifest.merge.replaced):
             damaged = _without_merged(folder, manifest, damaged)
-        # Parts may have been merged since the manifest was read: then look again, at what is new and what seemed wrong.
+        # Parts may have been merged since the manifest was read: then check new and suspect parts again.
         if not damaged or load(folder) == known:
             break
     manifest.parts = {name: part for name, part in manifest.parts.items() if name not in damaged}
@@ -50,7 +50,7 @@ def load_checked(folder: Path, *, read_parts: bool) -> tuple[Manifest, dict[str,
 
 
 def _without_merged(folder: Path, manifest: Manifest, damaged: dict[str, str]) -> dict[str, str]:
-    """Put the merged part into the manifest where a run was killed in the middle of merging."""
+    """Put the merged part into the manifest if a run was killed during the merge."""
     merge = manifest.merge
     name = None if merge is None else merged_file(folder, merge)
     if merge is None or name is None:
@@ -62,38 +62,38 @@ def _without_merged(folder: Path, manifest: Manifest, damaged: dict[str, str]) -
 
 
 def merged_file(folder: Path, merge: Merge) -> str | None:
-    """Return the name that a merged part has on the disk, its own or the hidden one; None where it is not whole."""
-    # Its own name twice, since it may get that just after it was looked for.
+    """Return the name of a merged part on disk, final or temporary; None if it is not intact."""
+    # The final name twice: the file may be renamed between the first two checks.
     names = (merge.name, hidden_name(merge.name), merge.name)
     return next((name for name in names if not wrong_content(folder / name, merge.part)), None)
 
 
 def damaged_parts(folder: Path, parts: Mapping[str, Part], *, read_parts: bool) -> dict[str, str]:
-    """Compare parts, by their file names, with what the manifest says of them.
+    """Compare parts, by file name, with their records in the manifest.
 
     Returns
     -------
     dict
-        What is wrong with those that are not as they should be, in words; by file name.
+        What is wrong with the damaged ones, by file name.
     """
     check = wrong_content if read_parts else wrong_size
-    # Checksums are computed without the interpreter's lock, so threads read and compute at once.
+    # Checksums are computed without the interpreter's lock, so threads work in parallel.
     with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
         found = pool.map(lambda name: check(folder / name, parts[name]), parts)
         return {name: wrong for name, wrong in zip(parts, found, strict=True) if wrong}
 
 
 def wrong_size(path: Path, part: Part) -> str:
-    """Say how the size of a file differs from what it should be; empty if it does not."""
+    """Describe how the size of a file differs from its record; empty if it does not."""
     try:
         size = path.stat().st_size
     except OSError:
-        return "gone"
+        return "missing"
     return _other_size(size, part)
 
 
 def _other_size(size: int, part: Part) -> str:
-    """Say how a size differs from what it should be; empty if it does not."""
+    """Describe how a size differs from its record; empty if it does not."""
     if size == part.bytes:
         return ""
     kind = "truncated" if size < part.bytes else "longer than written"
@@ -101,7 +101,7 @@ def _other_size(size: int, part: Part) -> str:
 
 
 def wrong_content(path: Path, part: Part) -> str:
-    """Say how a file differs from what it should be, by its checksum; empty if it does not."""
+    """Describe how a file differs from its record, by checksum; empty if it does not."""
     wrong = wrong_size(path, part)
     if wrong:
         return wrong
@@ -114,7 +114,7 @@ def wrong_content(path: Path, part: Part) -> str:
 
 
 def wrong_bytes(content: bytes, part: Part) -> str:
-    """Say how the content of a file differs from what it should be, by its checksum; empty if it does not."""
+    """Describe how the content of a file differs from its record, by checksum; empty if it does not."""
     wrong = _other_size(len(content), part)
     if wrong:
         return wrong

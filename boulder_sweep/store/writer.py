@@ -1,10 +1,11 @@
-"""The output folder of a run: taken, written part by part, let go.
+"""The output folder of a run: opened, written part by part, closed.
 
 A part is put in place whole (see `files`) and then recorded in the manifest with its rows and checksum; its
-file never changes, so whoever reads it is never disturbed. A slow run writes small parts, so that it can be
-watched and loses little. When all rows are there, small parts are merged into those a fast run would have
+file never changes, so readers are never disturbed. A slow run writes small parts, so that its progress can be
+read and an interruption loses little. When all rows are there, small parts are merged into those a fast run would have
 written: the merge is announced in the manifest, the merged file is written under a ``_`` name, the small ones
-go, and it gets its name. So no row is ever seen twice, and a run killed in the middle can finish the merge.
+are removed, and it gets its final name. So no row is ever seen twice, and a run killed in the middle can finish
+the merge.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class OutputFolder:
         self.path = path
         self.manifest = manifest
         self.damaged: dict[str, str] = {}
-        """Parts that were found damaged when the folder was opened, with what was wrong; they are missing."""
+        """Parts found damaged when the folder was opened, and what was wrong; their rows count as missing."""
         self._lock = lock
         self._created = created
         self._busy = threading.RLock()
@@ -52,12 +53,12 @@ class OutputFolder:
         rows
             How many rows it has.
         verdicts
-            How many of them have each verdict and reason.
+            Number of rows of each verdict and reason.
 
         Raises
         ------
         WriteError
-            The disk is full or the folder cannot be written; what was there before still is.
+            The disk is full or the folder cannot be written; earlier parts are unchanged.
         """
         name = self.manifest.part_name(first, first + rows)
         with self._writing() as is_open:
@@ -84,7 +85,7 @@ class OutputFolder:
         Raises
         ------
         WriteError
-            As `commit`.
+            As for `commit`.
         """
         parts = [self.manifest.parts[name] for name in names]
         verdicts: dict[str, int] = {}
@@ -108,18 +109,18 @@ class OutputFolder:
             save(self.manifest, self.path)
 
     def sign_of_life(self) -> None:
-        """Show that the run is alive; cheap, to be called often."""
+        """Show that the run is alive; cheap, call it often."""
         self._lock.renew()
 
     def close(self, how: str, patience_s: float = 0.2) -> None:
-        """Record how the run ended and let the folder go; later calls do nothing.
+        """Record how the run ended and release the folder; later calls do nothing.
 
         Parameters
         ----------
         how
             ``finished``, or what stopped it.
         patience_s
-            How long to wait for a part that another thread is writing just now [s]; if that takes longer, the
+            How long to wait for a part that another thread is writing [s]; if that takes longer, the
             other thread closes the folder when it is done.
         """
         self._ended = self._ended or how
@@ -137,7 +138,7 @@ class OutputFolder:
             self._busy.release()
 
     def discard(self) -> None:
-        """Let the folder go as if it had never been taken, if nothing has been written into it."""
+        """Release the folder and remove all traces, if nothing has been written into it."""
         if self.manifest.parts or len(self.manifest.sessions) > 1:
             self.close("refused")
             return
@@ -158,7 +159,7 @@ class OutputFolder:
             except OSError as problem:
                 done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
                 raise errors.WriteError(
-                    f"cannot write into {self.path}: {problem.strerror}. {done}; make room and go on with: "
+                    f"cannot write into {self.path}: {problem.strerror}. {done}; free some space and resume with: "
                     f"{self.manifest.resume_command}"
                 ) from problem
             finally:

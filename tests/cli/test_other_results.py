@@ -69,7 +69,7 @@ def test_a_row_whose_settings_are_of_another_version(sweep, result, part):
         ("nowhere/at/all", "there is no nowhere/at/all"),
         ("grid.yaml", "grid.yaml is a file; the result of a sweep is a folder\n"),
         ("grid.yaml/x", "there is no grid.yaml/x"),
-        (".", "holds no result of a sweep"),
+        (".", "is not the result of a sweep"),
     ],
 )
 def test_what_is_no_result(sweep, grid, command, place, words):

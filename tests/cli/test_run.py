@@ -8,6 +8,7 @@ import pytest
 
 from boulder_sweep.cli import console
 from boulder_sweep.runner.summary import progress_of
+from boulder_sweep.text import duration_text
 
 
 def _counts(out):
@@ -151,7 +152,7 @@ def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
         "--jobs",
         "2",
         "--backend",
-        "loky",
+        "dask",
         "--accuracy",
         "0.01 deg",
         "--set",
@@ -160,7 +161,7 @@ def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
     code, _, _ = sweep("run", grid, *words)
     assert code == 130
     assert shlex.split(seen["resume_command"]) == [
-        "sweep", "run", "grid.yaml", "-o", "my out", "--jobs", "2", "--backend", "loky",
+        "sweep", "run", "grid.yaml", "-o", "my out", "--jobs", "2", "--backend", "dask",
         "--accuracy", "0.01 deg", "--set", "vehicle.speed=20 mph", "--resume",
     ]  # fmt: skip
 
@@ -226,4 +227,4 @@ def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkey
     ],
 )
 def test_durations(seconds, text):
-    assert console.duration(seconds) == text
+    assert duration_text(seconds) == text

@@ -91,7 +91,7 @@ def test_status_of_a_finished_run(sweep, possible_grid):
     code, out, err = sweep("status", "small-grid.sweep", "--verify")
     assert (code, err) == (0, "")
     assert "finished, 18 of 18 designs (100.0%)" in out
-    assert "every part was read and is whole" in out
+    assert "every part was read and is intact" in out
     code, out, _ = sweep("status", "small-grid.sweep", "--json")
     assert code == 0
     assert json.loads(out)["complete"] is True
@@ -108,7 +108,7 @@ def test_status_finds_damage(sweep, possible_grid):
     code, out, _ = sweep("status", "small-grid.sweep", "--verify")
     assert code == 1
     assert f"damaged  {part.name}" in out
-    assert "go on    sweep run grid.yaml -o small-grid.sweep --resume" in out
+    assert "resume   sweep run grid.yaml -o small-grid.sweep --resume" in out
 
 
 @pytest.mark.parametrize("name", ["no.sweep", "."])

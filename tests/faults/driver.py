@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 
 from boulder_sweep.errors import Interrupted
@@ -34,7 +33,6 @@ def main() -> int:
     parser.add_argument("--overwrite", action="store_true")
     parser.add_argument("--force", action="store_true")
     options = parser.parse_args()
-    os.environ[faulty.MAIN_PROCESS] = str(os.getpid())
 
     def report(progress: Progress) -> None:
         print(progress.rows_done, flush=True)

@@ -1,9 +1,8 @@
-"""Stand-ins for the kernels that are slow, raise, or kill their worker; found by name from worker processes."""
+"""Replacements of the kernels that are slow or raise; found by name from worker processes."""
 
 from __future__ import annotations
 
 import os
-import signal
 import time
 
 import numpy as np
@@ -11,11 +10,8 @@ import numpy as np
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings
 from tests.runner.grids import plausible
 
-MAIN_PROCESS = "TEST_MAIN_PROCESS"
 POISON = "TEST_POISON"
-"""Environment variables: the process that must not be killed, and the subgrade reactions that do harm [MN/m^3]."""
-ONCE = "TEST_ONCE"
-"""A file that marks that the harm was done, where it is to be done once."""
+"""Environment variable: the subgrade reactions that raise [MN/m^3]."""
 
 
 def slowly(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
@@ -28,25 +24,6 @@ def poisoned(table: DesignTable) -> bool:
     """Whether a design of the table does harm."""
     harmful = [float(value) for value in os.environ[POISON].split()]
     return bool(np.isin(np.round(table.beta, 6), harmful).any())
-
-
-def kills_its_worker(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Die of a design, as of a crash in compiled code."""
-    if poisoned(table) and os.getpid() != int(os.environ[MAIN_PROCESS]):
-        os.kill(os.getpid(), signal.SIGKILL)
-    return plausible(table, readings, control)
-
-
-def kills_its_worker_once(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Die once, as of a lack of memory."""
-    if os.getpid() != int(os.environ[MAIN_PROCESS]):
-        try:
-            os.close(os.open(os.environ[ONCE], os.O_CREAT | os.O_EXCL))
-        except FileExistsError:
-            pass
-        else:
-            os.kill(os.getpid(), signal.SIGKILL)
-    return plausible(table, readings, control)
 
 
 def raises(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 import time
 import uuid
 from pathlib import Path
@@ -39,12 +38,9 @@ class Driver:
                 return
         raise AssertionError(f"the run ended before: {self.process.communicate()}")
 
-    def signal(self, number: int, *, group: bool = False) -> None:
-        """Send a signal to the process, or as a terminal does to all in its session."""
-        if group:
-            os.killpg(self.process.pid, number)
-        else:
-            self.process.send_signal(number)
+    def signal(self, number: int) -> None:
+        """Send a signal to the process."""
+        self.process.send_signal(number)
 
     def end(self, timeout: float = 60.0) -> tuple[int, dict[str, Any], str]:
         """Wait for the end; exit code, what was told at last, and what went to stderr."""
@@ -54,16 +50,11 @@ class Driver:
         return self.process.returncode, last, complaints
 
     def left_behind(self, patience: float = 3.0) -> list[str]:
-        """Processes with the mark that are still alive after a while, and folders in memory that are still there."""
+        """Processes with the mark that are still alive after a while."""
         end = time.monotonic() + patience
-        while (left := _marked(self.mark) + self._folders()) and time.monotonic() < end:
+        while (left := _marked(self.mark)) and time.monotonic() < end:
             time.sleep(0.05)
         return left
-
-    def _folders(self) -> list[str]:
-        """Folders in memory that the process made."""
-        places = [Path("/dev/shm"), Path(tempfile.gettempdir())]
-        return [str(path) for place in places for path in place.glob(f"boulder-sweep-{self.process.pid}-*")]
 
 
 def run_driver(out: Path, *options: str, **environment: str) -> tuple[int, dict[str, Any], str]:

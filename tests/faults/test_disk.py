@@ -56,7 +56,7 @@ def test_a_table_that_cannot_fit_is_refused_before_any_work(filling, monkeypatch
 def test_a_disk_that_fills_up_stops_the_run_and_loses_nothing(filling, tmp_path):
     disk, make_room = filling
     out = disk / "out"
-    with pytest.raises(WriteError, match=r"No space left on device.*rows are safe; make room and go on with"):
+    with pytest.raises(WriteError, match=r"No space left on device.*rows are safe; free some space and resume with"):
         run(grid_of(ROWS), out, force=True, rows_per_part=5000, simulate=plausible)
     found = status(out, verify=True)
     assert found.damaged == {}
@@ -118,7 +118,7 @@ def test_a_read_only_disk_is_refused_before_any_work(small_disk, tmp_path):
         disk.path.chmod(0o555)
         place = disk.path
     for name in ("out", "other"):
-        with pytest.raises(StoreError, match=r"cannot (write into|make the folder)"):
+        with pytest.raises(StoreError, match=r"cannot (write into|create the folder)"):
             run(grid(), place / name, simulate=_never)
 
 

@@ -26,9 +26,7 @@ SOON = 5.0
     ("number", "code", "backend"),
     [
         (signal.SIGINT, 130, "threading"),
-        (signal.SIGINT, 130, "loky"),
         (signal.SIGTERM, 143, "threading"),
-        (signal.SIGTERM, 143, "loky"),
         (signal.SIGTERM, 143, "dask"),
     ],
 )
@@ -37,7 +35,7 @@ def test_a_run_stops_soon_keeps_what_is_done_and_says_how_to_go_on(tmp_path, bac
     driver = Driver(out, *SLOW, "--backend", backend)
     driver.wait_for_rows(10_000)  # so many that the first ones must be among them
     begun = time.monotonic()
-    driver.signal(number, group=backend == "loky")  # as Ctrl-C does, workers included
+    driver.signal(number)
     returned, told, complaints = driver.end()
     assert time.monotonic() - begun < SOON
     assert returned == code
@@ -66,7 +64,7 @@ def test_an_interrupted_run_goes_on_to_the_same_table(tmp_path):
     assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
 
 
-@pytest.mark.parametrize("backend", ["threading", "loky"])
+@pytest.mark.parametrize("backend", ["threading", "dask"])
 def test_the_second_signal_ends_it_at_once(tmp_path, backend):
     driver = Driver(tmp_path / "out", *SLOW, "--backend", backend)
     driver.wait_for_rows()
@@ -89,7 +87,7 @@ def test_a_signal_before_the_computing_begins_leaves_no_trace(tmp_path):
     assert "SIGTERM" in told["problem"]
 
 
-@pytest.mark.parametrize("backend", ["loky", "dask"])
+@pytest.mark.parametrize("backend", ["threading", "dask"])
 def test_no_worker_outlives_a_killed_run(tmp_path, backend):
     driver = Driver(tmp_path / "out", *SLOW, "--backend", backend)
     driver.wait_for_rows()

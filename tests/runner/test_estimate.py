@@ -23,14 +23,14 @@ from boulder_sweep.runner.estimate import (
     blocks,
     estimated,
     peak_memory,
+    rows_in_progress,
     rows_per_block,
-    rows_under_way,
-    size_text,
     take_sample,
 )
 from boulder_sweep.runner.sweeper import estimate, run
 from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.schema import encode, part_table
+from boulder_sweep.text import size_text
 from tests.runner.grids import grid, grid_of, plausible
 
 HUGE = {
@@ -66,13 +66,13 @@ def test_blocks_are_short_and_there_is_one_for_every_worker(seconds, rows, jobs)
     assert size == 1 or rows / size >= jobs
 
 
-def test_a_whole_part_can_always_be_under_way():
+def test_a_whole_part_can_always_be_in_progress():
     for jobs in (1, 2, 64):
         for block in (1, 100, LARGEST_BLOCK):
-            assert rows_under_way(block, jobs, 131_072) >= 2 * 131_072
+            assert rows_in_progress(block, jobs, 131_072) >= 2 * 131_072
 
 
-def test_admission_bounds_the_rows_under_way_but_lets_one_block_through():
+def test_admission_bounds_the_rows_in_progress_but_lets_one_block_through():
     admission = Admission(100)
     assert admission.admit(60)
     assert not admission.admit(60)

@@ -106,11 +106,10 @@ def test_every_part_says_what_it_was_computed_from(finished):
     [
         {"jobs": 1},
         {"jobs": 5},
-        {"jobs": 2, "backend": "loky"},
         {"jobs": 2, "backend": "dask"},
         {"jobs": 2, "commit_every_s": 0.0},
     ],
-    ids=["one", "five", "loky", "dask", "grown"],
+    ids=["one", "five", "dask", "grown"],
 )
 def test_workers_change_no_byte(finished, tmp_path, how):
     run(grid(), tmp_path / "out", rows_per_part=100, **how)

@@ -1,4 +1,4 @@
-"""Blocks handed out, results collected, failures mended."""
+"""Blocks handed out, results collected, failures retried."""
 
 from __future__ import annotations
 
@@ -168,8 +168,8 @@ def test_stopped_workers_hand_out_no_more():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("ray", 2), "threading, loky, dask"),
-        (("loky", 2, "tcp://127.0.0.1:1"), "needs the backend dask"),
+        (("ray", 2), "threading, dask"),
+        (("threading", 2, "tcp://127.0.0.1:1"), "needs the backend dask"),
     ],
 )
 def test_backends_that_cannot_be_had(arguments, words):

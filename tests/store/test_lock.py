@@ -93,14 +93,18 @@ def no_shared_locks(monkeypatch):
 
 def test_a_fresh_sign_of_life_on_another_machine_counts(tmp_path, no_shared_locks):
     FolderLock(tmp_path, None, "nobody")
-    with pytest.raises(FolderInUseError, match=r"sign of life \d+ s ago"):
+    with pytest.raises(FolderInUseError, match=r"last heartbeat was \d+ s ago"):
         FolderLock(tmp_path, "othermachine", "process 7 on othermachine")
 
 
 def test_an_old_sign_of_life_does_not(tmp_path, no_shared_locks):
     FolderLock(tmp_path, None, "nobody")
     os.utime(tmp_path / LOCK_NAME, (time.time() - 1000, time.time() - 1000))
-    FolderLock(tmp_path, "othermachine", "process 7 on othermachine").release()
+    lock = FolderLock(tmp_path, "othermachine", "process 7 on othermachine")
+    assert lock.stale
+    assert time.time() - (tmp_path / LOCK_NAME).stat().st_mtime < 100
+    lock.release()
+    assert names(tmp_path) == []
 
 
 def test_the_holder_gives_signs_of_life(tmp_path, monkeypatch):

@@ -55,7 +55,7 @@ def test_counts(tmp_path):
 
 
 def test_a_folder_without_one_is_no_result(tmp_path):
-    with pytest.raises(NotASweepError, match="holds no result of a sweep"):
+    with pytest.raises(NotASweepError, match="is not the result of a sweep"):
         load(tmp_path)
 
 

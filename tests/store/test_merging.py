@@ -188,8 +188,8 @@ def test_a_result_that_is_replaced_while_it_is_read_is_not_mixed_with_the_other(
 def test_a_part_that_is_gone_is_told_though_nothing_changes(out):
     finished = FinishedRows(out)
     (out / "rows-000000000030-000000000060.parquet").unlink()
-    with pytest.raises(DamagedError, match=r"rows-000000000030-000000000060.parquet: gone"):
+    with pytest.raises(DamagedError, match=r"rows-000000000030-000000000060.parquet: missing"):
         list(finished.tables())
-    with pytest.raises(DamagedError, match=r"rows-000000000030-000000000060.parquet: gone"):
+    with pytest.raises(DamagedError, match=r"rows-000000000030-000000000060.parquet: missing"):
         finished.row(40)
     assert finished.row(10)["design_id"].to_pylist() == [10]

@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 
-import boulder_kernels
+import boulder_kernels._jit
 from boulder_sweep.store import provenance
 from boulder_sweep.store.provenance import canonical, differences, file_metadata, identity, sha256_of
 
@@ -31,7 +31,7 @@ def test_an_identity_is_plain_data_and_equal_after_json():
 
 def test_kernels_are_hashed_by_content(tmp_path, monkeypatch):
     (tmp_path / "__init__.py").write_text("a = 1")
-    monkeypatch.setattr(boulder_kernels, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(boulder_kernels._jit, "__file__", str(tmp_path / "_jit.py"))
     one = provenance.kernels_sha256.__wrapped__()
     (tmp_path / "__init__.py").write_text("a = 2")
     two = provenance.kernels_sha256.__wrapped__()

@@ -42,7 +42,7 @@ def test_an_unfinished_result(tmp_path):
 
 
 def test_no_result(tmp_path):
-    with pytest.raises(NotASweepError, match="no result of a sweep"):
+    with pytest.raises(NotASweepError, match="is not the result of a sweep"):
         read(tmp_path)
     with pytest.raises(NotASweepError):
         read(tmp_path / "gone")

@@ -51,7 +51,7 @@ def test_truncated_and_lost_parts_are_found(tmp_path, verify):
     (out / "rows-000000000300-000000000400.parquet").unlink()
     found = status(out, verify=verify)
     assert found.damaged["rows-000000000100-000000000200.parquet"].startswith("truncated: 500 bytes instead of")
-    assert found.damaged["rows-000000000300-000000000400.parquet"] == "gone"
+    assert found.damaged["rows-000000000300-000000000400.parquet"] == "missing"
     assert found.missing == [(100, 200), (300, 400)]
     assert found.rows_done == ROWS - 200
     assert found.resume_command

@@ -41,8 +41,12 @@ def test_a_finished_folder_holds_parts_and_manifest_only(tmp_path):
 
 
 def test_an_empty_folder_is_taken(tmp_path):
-    (tmp_path / "out").mkdir()
-    finished_folder(tmp_path / "out")
+    out = tmp_path / "out"
+    out.mkdir()
+    inode = out.stat().st_ino
+    finished_folder(out)
+    assert out.stat().st_ino == inode
+    assert names(out) == [MANIFEST_NAME, *PARTS]
 
 
 def test_a_file_is_refused(tmp_path):
@@ -53,7 +57,7 @@ def test_a_file_is_refused(tmp_path):
 
 
 def test_a_folder_in_a_folder_that_does_not_exist_is_refused(tmp_path):
-    with pytest.raises(StoreError, match="there is no folder") as refused:
+    with pytest.raises(StoreError, match="does not exist") as refused:
         open_folder(tmp_path / "typo" / "out")
     assert refused.value.exit_code == 2
     assert names(tmp_path) == []

@@ -1,0 +1,31 @@
+"""Numbers and problems as short text for messages."""
+
+from __future__ import annotations
+
+_LONGEST_LINE = 200
+
+
+def size_text(size: float) -> str:
+    """Format a number of bytes: ``512 bytes``, ``1.5 MB``."""
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if size < 1000:
+            return f"{size:.0f} bytes" if unit == "bytes" else f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:,.0f} PB"
+
+
+def duration_text(seconds: float) -> str:
+    """Format a time: ``0.8 s``, ``2 min 05 s``, ``3 h 10 min``."""
+    if seconds < 60:
+        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest:02d} s"
+    return f"{minutes // 60:,} h {minutes % 60:02d} min"
+
+
+def one_line(problem: BaseException) -> str:
+    """Describe an exception in one line of bounded length."""
+    words = " ".join(str(problem).split())
+    text = f"{type(problem).__name__}: {words}" if words else type(problem).__name__
+    return text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 3]}..."
