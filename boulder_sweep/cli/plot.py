@@ -40,6 +40,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None)
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
     from boulder_sweep.views.pieces import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
+    from boulder_sweep.views.wording import terms_line
 
     require_matplotlib()
     folder = Path(out)
@@ -47,13 +48,15 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None)
     beside = folder if folder.name else folder.resolve()
     target = checked_kind(picture or f"{str(beside).removesuffix('.sweep')}.png")
     if finished.rows_done == 0:
-        raise PictureError(f"{out} holds no finished designs yet; `sweep status {out}` says how far it is")
-    title = str(finished.identity["settings"].get("name", ""))
-    shown = draw_verdict_map(finished_pieces(finished), target, title=title, at=held, **axes)
+        raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
+    settings = finished.identity["settings"]
+    shown = draw_verdict_map(
+        finished_pieces(finished), target, title=settings["name"], terms=terms_line(settings), at=held, **axes
+    )
     for name, value in held.items():
         taken = shown.fixed.get(name, value)
         if abs(taken - value) > 1e-6 * abs(value):
-            click.echo(f"note: {name} is drawn at {taken:.6g}, the nearest to {value:.6g} that there is", err=True)
+            click.echo(f"note: {name} is {taken:.6g} in this map, the value nearest to {value:.6g}", err=True)
     if finished.rows_done < finished.rows:
         click.echo(f"note: the run is not finished; {shown.total:,} designs are drawn", err=True)
     click.echo(f"{target}: {shown.count:,} of {shown.total:,} designs")
@@ -67,7 +70,7 @@ def _held(text: str) -> tuple[str, float]:
         return name.strip(), float(value)
     except ValueError:
         raise click.UsageError(
-            f"--at {text}: must be COLUMN=VALUE, a number in the unit of the column"
+            f"--at {text}: must be COLUMN=VALUE, with a number in the unit of the column"
             if equals
-            else f"--at {text}: lacks ="
+            else f"--at {text}: no = found; write COLUMN=VALUE"
         ) from None

@@ -12,7 +12,7 @@ from boulder_sweep.views import figures
 from boulder_sweep.views.scene import SideView
 from boulder_sweep.views.shapes import STYLES, Shape
 from boulder_sweep.views.trajectory import require_samples
-from boulder_sweep.views.wording import verdict_line
+from boulder_sweep.views.wording import NOT_A_TEST, verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,6 +68,7 @@ def stage(fig: Figure, view: SideView) -> Axes:
     axes.set_axis_off()
     draw(axes, view.ground(), behind=True)
     fig.suptitle(verdict_line(view.trajectory), x=0.01, ha="left", fontsize=11.0, fontweight="bold")
+    fig.text(0.99, 0.01, NOT_A_TEST, ha="right", fontsize=7.5, color=figures.GREY)
     return axes
 
 

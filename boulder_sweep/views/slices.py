@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,9 @@ UP = (HEIGHT, "boulder_width_m", "boulder_length_m", "vehicle_mass_kg")
 OVER = ("friction_angle_deg", "subgrade_reaction_MN_m3", "impact_speed_m_s", "boulder_width_m")
 """What is shown across, up and over small multiples, the first of each that varies."""
 DEPENDENT = ("impact_height_m",)
-"""Follows from other inputs unless a file gives it; never held fixed."""
+"""Follows from other inputs unless a file gives it; held only on request."""
+TRIPLET = {RATIO, DEPTH, HEIGHT}
+"""Two of them give the third."""
 DIGITS = 9
 """Inputs that agree to so many digits are the same value; products of axes differ in their last bits."""
 
@@ -41,7 +43,9 @@ class Slice:
     column_values, row_values : list of float
         Their values shown; [nan] where there is none.
     fixed : dict of str to float
-        What is held fixed, and at what.
+        Inputs that vary in the table and are held, with their values here.
+    constants : dict of str to float
+        Inputs that have one value in the whole table.
     total, count, passing : int
         How many rows the table has, how many of them lie in the plane, and how many of these pass.
     thinned : bool
@@ -58,6 +62,7 @@ class Slice:
     column_values: list[float]
     row_values: list[float]
     fixed: dict[str, float]
+    constants: dict[str, float]
     total: int
     count: int
     passing: int
@@ -88,56 +93,51 @@ def plane(
     columns, rows
         Inputs over small multiples; by default subgrade reaction and friction angle where they vary.
     at
-        Values at which other inputs are held; by default the middle one of those there are. The nearest value
-        there is is taken.
+        Values at which other inputs are held, by default the middle one of those in the table. The nearest value
+        in the table is taken.
     most
         Most columns and rows of small multiples; of more values, evenly spaced ones are shown.
 
     Raises
     ------
     PictureError
-        An input is unknown, or fewer than two vary.
+        An input is unknown, is used twice, or cannot be held at a value because it has another one in every design;
+        or fewer than two inputs vary.
     """
     pieces = pieces_of(table)
     levels, total = _levels_of(pieces)
-    varying = [name for name, values in levels.items() if len(values) > 1 and name not in DEPENDENT]
-    chosen = {"across": across, "up": up, "columns": columns, "rows": rows}
-    for name in (*(name for name in chosen.values() if name), *(at or {})):
-        if name not in levels:
-            raise PictureError(f"{name} is not an input column; there are {', '.join(levels)}")
-    # Embedment varies as depth or as ratio; the one with fewer values is the axis, the other follows.
-    if RATIO in varying and DEPTH in varying:
-        follows = DEPTH if len(levels[RATIO]) <= len(levels[DEPTH]) else RATIO
-        if follows not in (*chosen.values(), *(at or {})):
-            varying.remove(follows)
-            levels.pop(follows)
+    held = dict(at or {})
+    chosen: dict[str, str | None] = {"across": across, "up": up, "columns": columns, "rows": rows}
+    _check(levels, [name for name in chosen.values() if name], held)
+    varying = _independent(levels, {*filter(None, chosen.values()), *held})
     for place, wanted in (("across", ACROSS), ("up", UP), ("columns", OVER[::-1][2:]), ("rows", OVER)):
-        free = [name for name in varying if name not in chosen.values() and name not in (at or {})]
+        free = [name for name in varying if name not in chosen.values() and name not in held]
         if chosen[place] is None:
             candidates = [name for name in wanted if name in free]
             anything = free if place in ("across", "up") else []
             chosen[place] = next(iter([*candidates, *anything]), None)
     if chosen["across"] is None or chosen["up"] is None:
-        raise PictureError("a map needs two inputs that vary; of this table only one does, or none")
-    fixed = {}
+        raise PictureError("a map needs two inputs that vary and are not held at a value; this table has one or none")
+    fixed: dict[str, float] = {}
     for name in varying:
-        if name in levels and name not in chosen.values():
+        if name in chosen.values():
+            continue
+        if name in held or not _follows(name, {*filter(None, chosen.values()), *fixed}):
             values = levels[name]
-            middle = values[(len(values) - 1) // 2]
-            wanted_value = (at or {}).get(name, middle)
+            wanted_value = held.get(name, values[(len(values) - 1) // 2])
             fixed[name] = float(values[np.argmin(np.abs(values - wanted_value))])
     shown_columns, shown_rows = (
         _some(levels, chosen[place], n) for place, n in (("columns", most[0]), ("rows", most[1]))
     )
-    held = [(name, [value]) for name, value in fixed.items()]
+    admitted = [(name, [value]) for name, value in fixed.items()]
     multiples = ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows))
-    held += [(name, values) for name, values in multiples if name is not None]
+    admitted += [(name, values) for name, values in multiples if name is not None]
     kept = Kept(str(chosen["across"]), str(chosen["up"]), [chosen["columns"], chosen["rows"]], levels)
     for piece in pieces([*{*kept.columns, *fixed}]):
         keep = np.ones(len(piece), dtype=bool)
-        for name, admitted in held:
+        for name, shown in admitted:
             found = piece[name].to_numpy(dtype=float)
-            keep &= np.logical_or.reduce([_equal(found, value) for value in admitted])
+            keep &= np.logical_or.reduce([_equal(found, value) for value in shown])
         kept.add(piece[keep])
     left_out = {
         str(chosen[place]): len(levels[str(chosen[place])])
@@ -153,12 +153,47 @@ def plane(
         column_values=shown_columns,
         row_values=shown_rows,
         fixed=fixed,
+        constants={name: float(values[0]) for name, values in levels.items() if len(values) == 1},
         total=total,
         count=kept.count,
         passing=kept.passing,
         thinned=kept.thinned,
         left_out=left_out,
     )
+
+
+def _check(levels: Mapping[str, np.ndarray], chosen: Sequence[str], held: Mapping[str, float]) -> None:
+    """Refuse inputs that do not exist or are used twice, and values that no design has."""
+    named = [*chosen, *held]
+    for name in named:
+        if name not in levels:
+            raise PictureError(f"{name} is not an input column; there are {', '.join(levels)}")
+        if named.count(name) > 1:
+            raise PictureError(f"{name} is used twice; an input is one axis of the map, or it is held at a value")
+    for name, value in held.items():
+        if len(levels[name]) == 1 and not _equal(levels[name], value)[0]:
+            raise PictureError(f"{name} cannot be held at {value:.6g}: it is {levels[name][0]:.6g} in every design")
+
+
+def _independent(levels: Mapping[str, np.ndarray], asked: set[str]) -> list[str]:
+    """Inputs that vary of their own accord, and those asked for.
+
+    A grid has embedment as depth or as ratio. Unless both are asked for, the other one follows: the one that is not
+    asked for, or else the one with more values.
+    """
+    varying = [name for name, values in levels.items() if len(values) > 1 and (name in asked or name not in DEPENDENT)]
+    if RATIO in varying and DEPTH in varying:
+        fewer, more = (RATIO, DEPTH) if len(levels[RATIO]) <= len(levels[DEPTH]) else (DEPTH, RATIO)
+        if more not in asked:
+            varying.remove(more)
+        elif fewer not in asked:
+            varying.remove(fewer)
+    return varying
+
+
+def _follows(name: str, given: set[str]) -> bool:
+    """Whether an input is determined by others that are shown or held."""
+    return name in TRIPLET and len(TRIPLET & given) > 1
 
 
 def select(rows: pd.DataFrame, name: str | None, value: float) -> pd.DataFrame:
@@ -190,11 +225,14 @@ def value_text(name: str, value: float) -> str:
         "boulder_width_m": "width {} m",
         "boulder_length_m": "length {} m",
         "boulder_height_m": "height {} m",
-        "boulder_density_kg_m3": "density {} kg/m³",
-        "impact_speed_m_s": "{} m/s",
+        "boulder_density_kg_m3": "boulder {} kg/m³",
+        "soil_density_kg_m3": "soil {} kg/m³",
+        "impact_speed_m_s": "speed {} m/s",
         "vehicle_mass_kg": "vehicle {} kg",
+        "vehicle_spring_N_m": "spring {} kN/m",
+        "vehicle_damper_N_s_m": "damper {} kN·s/m",
     }
-    number = f"{value:.5g}"
+    number = f"{value / (1e3 if name in ('vehicle_spring_N_m', 'vehicle_damper_N_s_m') else 1.0):.5g}"
     if name in symbols:
         return symbols[name].format(number)
     unit = unit_of(name)

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from boulder_sweep.impact.trajectory import Trajectory
 
+BEYOND_LIMIT, AFTER_PEAK = "#F3E7DF", "#F0F0F0"
+"""Behind the curves where the model no longer holds, and where its soil springs back without memory."""
+
 
 def draw_trajectory(trajectory: Trajectory, path: str | Path) -> None:
     """Draw rotation, forces and displacements of one impact.
@@ -43,7 +46,7 @@ def draw_trajectory(trajectory: Trajectory, path: str | Path) -> None:
         _vehicle(vehicle, trajectory)
         for axes in (rotation, force, boulder, vehicle):
             axes.set_xlim(0.0, float(trajectory.time_s[-1]))
-            shade_beyond_limit(axes, trajectory)
+            shade_unreliable(axes, trajectory)
         for axes in (boulder, vehicle):
             axes.set_xlabel("time since first touch [s]")
         _peaks(rotation, force, boulder, vehicle, trajectory)
@@ -58,11 +61,30 @@ def require_samples(trajectory: Trajectory) -> None:
         raise PictureError(f"there is no motion to draw: {why}")
 
 
-def shade_beyond_limit(axes: Axes, trajectory: Trajectory) -> None:
-    """Shade the time after the rotation limit, where the model no longer holds."""
-    limit = trajectory.motion.outcome.t_limit
-    if math.isfinite(limit):
-        axes.axvspan(limit, float(trajectory.time_s[-1]), color="#F3E7DF", zorder=-2, linewidth=0)
+def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
+    """Return the time from which the motion is not to be relied on, and why.
+
+    Returns
+    -------
+    float
+        Time of the rotation limit; where it is not reached, of the last peak of rotation and displacement [s].
+    str
+        What makes the time after it unreliable.
+    """
+    outcome = trajectory.motion.outcome
+    if math.isfinite(outcome.t_limit):
+        limit = math.degrees(trajectory.motion.control.theta_limit)
+        return outcome.t_limit, f"shaded: beyond {limit:g}° the model no longer holds"
+    peak = max(outcome.maxima.t_theta, outcome.maxima.t_x_b)
+    return peak, "shaded: rebound (the soil of the model has no memory)"
+
+
+def shade_unreliable(axes: Axes, trajectory: Trajectory) -> None:
+    """Shade the time from the rotation limit, or from the peak, to the end."""
+    start, end = unreliable_from(trajectory)[0], float(trajectory.time_s[-1])
+    if start < end:
+        colour = BEYOND_LIMIT if math.isfinite(trajectory.motion.outcome.t_limit) else AFTER_PEAK
+        axes.axvspan(start, end, color=colour, zorder=-2, linewidth=0)
 
 
 def _rotation(axes: Axes, trajectory: Trajectory) -> None:
@@ -93,20 +115,19 @@ def _force(axes: Axes, trajectory: Trajectory) -> None:
     axes.plot(trajectory.time_s, soil, color=GREEN, linestyle="--", label="soil against boulder")
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     top = max(float(soil.max()), float(trajectory.contact_force_N.max() / 1e3))
-    figures.limit_y(axes, min(1.15 * float(soil.min()), -0.05 * top), 1.36 * top)
+    figures.limit_y(axes, min(1.15 * float(soil.min()), -0.05 * top), top)
+    _legend_above(axes)
     axes.set_title("Horizontal forces")
     axes.set_ylabel("force [kN]")
-    axes.legend(loc="upper left", ncols=2)
 
 
 def _boulder(axes: Axes, trajectory: Trajectory) -> None:
-    axes.plot(trajectory.time_s, trajectory.boulder_displacement_m, color=BLUE, label="boulder and soil wedge")
+    axes.plot(trajectory.time_s, trajectory.boulder_displacement_m, color=BLUE, label="boulder and wedge")
     centre = trajectory.boulder_centre_displacement_m
     axes.plot(trajectory.time_s, centre, color=PURPLE, linestyle="--", label="boulder alone (as filmed)")
-    _room_above(axes)
+    _legend_above(axes)
     axes.set_title("Displacement of the centre of mass")
     axes.set_ylabel("displacement [m]")
-    axes.legend(loc="lower right")
 
 
 def _vehicle(axes: Axes, trajectory: Trajectory) -> None:
@@ -114,16 +135,21 @@ def _vehicle(axes: Axes, trajectory: Trajectory) -> None:
     _room_above(axes)
     axes.set_title("Displacement of the vehicle")
     axes.set_ylabel("displacement [m]")
-    if math.isfinite(trajectory.motion.outcome.t_limit):
-        limit = math.degrees(trajectory.motion.control.theta_limit)
-        note = f"shaded: beyond {limit:g}° the model no longer holds"
-        axes.annotate(note, (0.98, 0.05), xycoords="axes fraction", ha="right", fontsize=8.5, color=GREY)
+    start, why = unreliable_from(trajectory)
+    if start < trajectory.time_s[-1]:
+        axes.annotate(why, (0.98, 0.05), xycoords="axes fraction", ha="right", fontsize=8.5, color=GREY)
 
 
-def _room_above(axes: Axes) -> None:
-    """Leave room for the label of a peak."""
+def _room_above(axes: Axes, share: float = 0.12) -> None:
+    """Leave room above the curves, for the label of a peak."""
     bottom, top = axes.get_ylim()
-    axes.set_ylim(bottom, top + 0.12 * (top - bottom))
+    axes.set_ylim(bottom, top + share * (top - bottom))
+
+
+def _legend_above(axes: Axes) -> None:
+    """Put the legend on a line of its own above curves and labels of peaks."""
+    _room_above(axes, share=0.32)
+    axes.legend(loc="upper left", ncols=2, columnspacing=1.0, handlelength=1.7, borderpad=0.2, borderaxespad=0.2)
 
 
 def _peaks(rotation: Axes, force: Axes, boulder: Axes, vehicle: Axes, trajectory: Trajectory) -> None:

@@ -34,6 +34,10 @@ NARROW = 2
 """With up to so many maps side by side there is no room for the legend beside the title."""
 CHARACTERS_PER_INCH = 15
 """Of the caption."""
+CAPTION_LINE_IN = 0.15
+"""Height of a line of the caption."""
+USUAL = (("strain_rate_factor", 1.0),)
+"""Constants that a caption need not mention."""
 
 
 def draw_verdict_map(
@@ -41,6 +45,7 @@ def draw_verdict_map(
     path: str | Path,
     *,
     title: str = "",
+    terms: str = "",
     across: str | None = None,
     up: str | None = None,
     columns: str | None = None,
@@ -58,6 +63,8 @@ def draw_verdict_map(
         Picture to write (.png, .svg, .pdf).
     title
         Name of the study.
+    terms
+        What a pass means, for the caption.
     across, up, columns, rows, at
         What is shown, see `boulder_sweep.views.slices.plane`.
 
@@ -80,7 +87,9 @@ def draw_verdict_map(
         )
     n_columns, n_rows = len(shown.column_values), len(shown.row_values)
     beside = n_columns <= NARROW
-    width, height = max(2.2 * n_columns + 1.9, 5.2) + 1.8 * beside, max(1.9 * n_rows + 1.6, 3.6)
+    width = max(2.2 * n_columns + 1.9, 5.2) + 1.8 * beside
+    caption = _caption(shown, terms, int(CHARACTERS_PER_INCH * width))
+    height = max(1.9 * n_rows + 1.45, 3.45) + CAPTION_LINE_IN * (caption.count("\n") + 1)
     with figures.figure(path, width, height) as fig:
         grid = fig.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
         present: set[int] = set()
@@ -103,13 +112,7 @@ def draw_verdict_map(
             fontsize=11.5,
             fontweight="bold",
         )
-        fig.supxlabel(
-            textwrap.fill(_caption(shown), int(CHARACTERS_PER_INCH * width)),
-            x=0.01,
-            ha="left",
-            fontsize=8.0,
-            color=GREY,
-        )
+        fig.supxlabel(caption, x=0.01, ha="left", fontsize=8.0, color=GREY)
     return shown
 
 
@@ -173,10 +176,18 @@ def _legend(fig: Any, present: set[int], *, beside: bool) -> None:
     fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
 
 
-def _caption(shown: Slice) -> str:
-    fixed = ", ".join(value_text(name, value) for name, value in shown.fixed.items())
+def _caption(shown: Slice, terms: str, width: int) -> str:
+    """Say what is shown, what is the same for all designs, and what a pass means; each from a line of its own."""
+    fixed = ", ".join(_unbroken(name, value) for name, value in shown.fixed.items())
     words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
     for name, count in shown.left_out.items():
-        words.append(f"{label(name).partition(' [')[0]}: a choice of its {count} values")
-    return " · ".join(words)
+        words.append(f"{label(name).partition(' [')[0]}: {count} values, not all shown")
+    same = [_unbroken(name, value) for name, value in shown.constants.items() if (name, value) not in USUAL]
+    lines = (" · ".join(words), f"All designs: {', '.join(same)}" if same else "", terms)
+    return "\n".join(textwrap.fill(line, width) for line in lines if line)
+
+
+def _unbroken(name: str, value: float) -> str:
+    """Value of an input that stays on one line."""
+    return value_text(name, value).replace(" ", "\N{NO-BREAK SPACE}")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from boulder_sweep.impact.trajectory import Trajectory
 
 REASON_WORDS = {
@@ -15,6 +17,9 @@ REASON_WORDS = {
     "horizon": "still moving at the end of the simulated time",
     "error": "too near to a limit for the accuracy",
 }
+
+
+NOT_A_TEST = "Simulation, not a rating by test"
 
 
 def verdict_line(trajectory: Trajectory) -> str:
@@ -31,11 +36,20 @@ def verdict_line(trajectory: Trajectory) -> str:
     return f"{name}: {trajectory.verdict.upper()}{words}, {detail}"
 
 
+def terms_line(settings: Mapping[str, Any]) -> str:
+    """Return what a pass means under the settings of a table: limits, readings, and that it is a simulation."""
+    limits, readings = settings["criterion"], settings["model"]["preset"].replace("_", " ")
+    return (
+        f"Pass: rotation up to {limits['max_rotation_deg']:g}° and rating {limits['rating']} · readings {readings}. "
+        f"{NOT_A_TEST}."
+    )
+
+
 def design_line(trajectory: Trajectory) -> str:
-    """Boulder, soil, vehicle and readings in one line."""
+    """Boulder, soil, vehicle and readings in one line; below it, that this is a simulation."""
     value = trajectory.inputs
     size = " × ".join(f"{value[f'boulder_{side}_m']:.4g}" for side in ("length", "width", "height"))
-    return " · ".join(
+    words = " · ".join(
         (
             f"boulder {size} m (L × W × H), {value['embedment_depth_m']:.4g} m deep",
             f"soil φ′ {value['friction_angle_deg']:.4g}°, β {value['subgrade_reaction_MN_m3']:.4g} MN/m³",
@@ -43,3 +57,4 @@ def design_line(trajectory: Trajectory) -> str:
             f"readings {trajectory.settings['model']['preset'].replace('_', ' ')}",
         )
     )
+    return f"{words}\n{NOT_A_TEST}"

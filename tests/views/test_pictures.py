@@ -10,6 +10,9 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from boulder_sweep.crash_tests.cases import crash_test
@@ -18,6 +21,7 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.views.energy import LAYERS
 from boulder_sweep.views.figures import checked_kind
+from boulder_sweep.views.trajectory import AFTER_PEAK, unreliable_from
 from boulder_sweep.views.verdict_map import CLASSES
 
 Draw = Callable[[Trajectory, Path], None]
@@ -54,6 +58,57 @@ def test_time_after_the_limit_is_shaded(held: Trajectory, overturned: Trajectory
     overturned.plot(tmp_path / "overturned.png")
     assert not has_colour(picture(tmp_path / "held.png"), "#F3E7DF")
     assert has_colour(picture(tmp_path / "overturned.png"), "#F3E7DF", least=20_000)
+
+
+def test_the_rebound_is_shaded(held: Trajectory, overturned: Trajectory, tmp_path: Path) -> None:
+    """The springs of the soil have no memory: what they do after the peak is not to be relied on."""
+    start, words = unreliable_from(held)
+    assert start == max(held.motion.outcome.maxima.t_theta, held.motion.outcome.maxima.t_x_b)
+    assert "rebound" in words
+    held.plot(tmp_path / "held.png")
+    assert has_colour(picture(tmp_path / "held.png"), AFTER_PEAK, least=20_000)
+    assert unreliable_from(overturned)[0] == overturned.motion.outcome.t_limit
+    assert "20°" in unreliable_from(overturned)[1]
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """Figures in the order in which they are finished."""
+    figures: list[Figure] = []
+    monkeypatch.setattr("boulder_sweep.views.figures.save", lambda fig, target: figures.append(fig))
+    return figures
+
+
+def test_legends_cover_nothing(
+    trajectories: dict[tuple[str, str], Trajectory], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked_at = []
+
+    def look(fig: Figure, target: Path) -> None:
+        FigureCanvasAgg(fig).draw()
+        for axes in fig.axes:
+            if axes.get_legend() is not None:
+                legend = axes.get_legend().get_window_extent()
+                looked_at.append(axes.get_title(loc="left"))
+                assert legend.x1 <= axes.get_window_extent().x1 + 1.0
+                for line in axes.lines:
+                    points = line.get_transform().transform(np.column_stack(line.get_data()))
+                    assert not any(legend.contains(x, y) for x, y in points)
+                assert not any(legend.overlaps(text.get_window_extent()) for text in axes.texts)
+
+    monkeypatch.setattr("boulder_sweep.views.figures.save", look)
+    for trajectory in trajectories.values():
+        trajectory.plot(tmp_path / "history.png")
+    assert looked_at == ["Horizontal forces", "Displacement of the centre of mass"] * 4
+
+
+@pytest.mark.parametrize("name", DRAWERS)
+def test_every_picture_says_that_it_is_a_simulation(
+    held: Trajectory, drawn: list[Figure], tmp_path: Path, name: str
+) -> None:
+    DRAWERS[name](held, tmp_path / "picture.png")
+    words = [text.get_text() for text in drawn[0].findobj(Text)]
+    assert any("Simulation, not a rating by test" in text for text in words)
 
 
 def test_printed_readings_show_what_comes_out_of_nothing(held: Trajectory, tmp_path: Path) -> None:

@@ -54,6 +54,63 @@ def test_depth_is_the_axis_where_it_has_fewer_values(table: pd.DataFrame) -> Non
     assert plane(by_depth).across == "embedment_depth_m"
 
 
+@pytest.fixture
+def by_depth() -> pd.DataFrame:
+    """A grid of 27 heights and 19 depths, whose ratios all differ, and 4 densities."""
+    axes = (np.linspace(1.6, 3.4, 27), np.linspace(0.8, 1.55, 19), (1.0, 1.5, 2.0, 2.5))
+    height, depth, density = (each.ravel() for each in np.meshgrid(*axes, indexing="ij"))
+    inputs = {name: np.ones(len(height)) for name in INPUT_COLUMNS}
+    inputs |= {"boulder_height_m": height, "embedment_depth_m": depth, "boulder_density_kg_m3": density}
+    return pd.DataFrame(inputs).assign(verdict="pass", reason="", impact_height_m=0.5 * (height - depth + 0.5))
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        {},
+        {"across": "embedment_ratio"},
+        {"up": "embedment_ratio", "across": "boulder_height_m"},
+        {"up": "embedment_ratio", "across": "embedment_depth_m"},
+    ],
+)
+def test_of_height_depth_and_ratio_two_give_the_third(by_depth, axes):
+    """The third is not held at a value too, which would leave a line of the plane."""
+    found = plane(by_depth, **axes)
+    assert found.fixed == {"boulder_density_kg_m3": 1.5}
+    assert (found.count, found.total) == (27 * 19, 27 * 19 * 4)
+
+
+def test_depth_across_a_grid_of_ratios_holds_no_ratio(table: pd.DataFrame) -> None:
+    found = plane(table, across="embedment_depth_m")
+    assert "embedment_ratio" not in found.fixed
+    assert found.count == 3 * 4 * 2 * 4
+
+
+def test_a_value_held_for_one_of_the_three_is_held(by_depth: pd.DataFrame) -> None:
+    found = plane(by_depth, up="boulder_density_kg_m3", at={"boulder_height_m": 2.5})
+    assert (found.across, found.count) == ("embedment_depth_m", 19 * 4)
+    assert set(found.rows.boulder_height_m) == {by_depth.boulder_height_m.unique()[13]}
+
+
+def test_impact_height_is_held_on_request(by_depth: pd.DataFrame) -> None:
+    assert "impact_height_m" not in plane(by_depth).fixed
+    assert "impact_height_m" in plane(by_depth, at={"impact_height_m": 1.0}).fixed
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"at": {"boulder_length_m": 2.0}}, "boulder_length_m cannot be held at 2: it is 1 in every design"),
+        ({"across": "boulder_height_m", "at": {"boulder_height_m": 2.0}}, "boulder_height_m is used twice"),
+        ({"across": "boulder_height_m", "up": "boulder_height_m"}, "boulder_height_m is used twice"),
+    ],
+)
+def test_a_value_that_would_change_nothing_is_refused(by_depth: pd.DataFrame, wrong, message: str) -> None:
+    with pytest.raises(PictureError, match=message):
+        plane(by_depth, **wrong)
+    assert plane(by_depth, at={"boulder_length_m": 1.0}).count == 27 * 19, "what holds anyway is no mistake"
+
+
 @pytest.mark.parametrize("wrong", [{"across": "weight"}, {"at": {"colour": 1.0}}])
 def test_unknown_inputs_are_refused(table: pd.DataFrame, wrong: dict[str, object]) -> None:
     with pytest.raises(PictureError, match=r"is not an input column; there are boulder_length_m"):
@@ -199,7 +256,7 @@ def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str]) -> N
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--at", "subgrade_reaction_MN_m3"], "lacks ="),
+        (["--at", "subgrade_reaction_MN_m3"], "no = found"),
         (["--at", "subgrade_reaction_MN_m3=stiff"], "must be COLUMN=VALUE"),
         (["--across", "weight"], "is not an input column"),
         (["-o", "map.jpeg"], "must end in .png"),
@@ -219,7 +276,7 @@ def test_command_says_where_there_is_no_result(tmp_path: Path, capsys: pytest.Ca
 
 def test_command_says_which_value_it_took(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=120"]) == 0
-    assert "subgrade_reaction_MN_m3 is drawn at 95, the nearest to 120" in capsys.readouterr().err
+    assert "subgrade_reaction_MN_m3 is 95 in this map, the value nearest to 120" in capsys.readouterr().err
     assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=60"]) == 0
     assert not capsys.readouterr().err
 
@@ -246,4 +303,20 @@ def test_a_long_caption_is_broken_into_lines_that_fit(
     assert found.column_values == [36.0, 42.0]
     (fig, text) = captions[0]
     assert max(map(len, text.splitlines())) <= 15 * fig.get_figwidth()
-    assert " ".join(text.split()).endswith("of them pass")
+    assert "of them pass" in text
+
+
+def test_the_caption_tells_truck_speed_and_constants(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib.figure
+
+    captions: list[str] = []
+    monkeypatch.setattr(matplotlib.figure.Figure, "supxlabel", lambda self, text, **_: captions.append(text))
+    assert execute(["plot", str(out)]) == 0
+    caption = " ".join(captions[0].replace("\N{NO-BREAK SPACE}", " ").split())
+    for words in ("length 1.65 m", "width 1.68 m", "boulder 2596 kg/m³", "soil 1859.9 kg/m³", "vehicle 6803.9 kg",
+                  "speed 13.411 m/s", "spring 3103.3 kN/m", "damper 138.91 kN·s/m", "bumper height 0.5 m"):  # fmt: skip
+        assert words in caption
+    assert "strain rate" not in caption
+    assert caption.endswith(
+        "Pass: rotation up to 20° and rating P1 · readings corrected. Simulation, not a rating by test."
+    )
