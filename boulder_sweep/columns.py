@@ -1,16 +1,30 @@
-"""Every column of the result table: name, type, unit, meaning, in the order of the table.
+"""Every column of the result table, in the order of the table: name, type, unit, meaning, and how it is computed.
 
-This is the one register. The settings take the input columns from it, the store its schema and field
-metadata, the command line and the documentation their texts. Types are plain words that do not depend on
-any table library: ``int64``, ``float64`` or ``dictionary`` (a text column with few different values).
+This is the one register. The settings take the input columns from it, the judge computes the outcome columns
+by it, the store takes its schema and field metadata from it, the command line and the documentation their
+texts. Types are plain words that do not depend on any table library: ``int64``, ``float64`` or ``dictionary``
+(a text column with few different values).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from boulder_sweep.judge.verdict import Facts
 
 ColumnType = Literal["int64", "float64", "dictionary"]
+Rows = Literal["computed", "standing", "overturned"]
+
+VERDICTS = ("pass", "fail", "undecided", "error")
+REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error")
+"""The reasons of every verdict but ``error``, which has reasons of its own."""
+RATINGS = ("P1", "P2", "P3")
+"""Penetration ratings of ASTM F2656, the best first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +47,25 @@ class ColumnSpec:
     type: ColumnType
     unit: str
     meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomeColumn(ColumnSpec):
+    """One column that a simulation fills.
+
+    Attributes
+    ----------
+    value : callable
+        From what is known of n rows to the values of the column, shape (n,): numbers in `unit`, or codes.
+    rows : {'computed', 'standing', 'overturned'}
+        Which rows have a number; null elsewhere. *Standing* are those computed that did not overturn.
+    words : tuple of str
+        What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
+    """
+
+    value: Callable[[Facts], np.ndarray]
+    rows: Rows = "computed"
+    words: tuple[str, ...] = ()
 
 
 DESIGN_ID = ColumnSpec(
@@ -59,48 +92,100 @@ INPUTS: tuple[ColumnSpec, ...] = (
     ColumnSpec("bed_offset_m", "float64", "m", "distance from the front bumper to the leading edge of the cargo bed"),
 )
 
-OUTCOMES: tuple[ColumnSpec, ...] = (
-    ColumnSpec("verdict", "dictionary", "", "pass, fail, undecided or error"),
-    ColumnSpec(
+OUTCOMES: tuple[OutcomeColumn, ...] = (
+    OutcomeColumn(
+        "verdict",
+        "dictionary",
+        "",
+        "pass, fail, undecided or error",
+        lambda facts: facts.verdict,
+        words=VERDICTS,
+    ),
+    OutcomeColumn(
         "reason",
         "dictionary",
         "",
         "why: empty for a pass, no_contact, overturns, penetration, horizon, error, "
         "or why the row could not be computed",
+        lambda facts: facts.reason,
+        words=REASONS,
     ),
-    ColumnSpec(
+    OutcomeColumn(
         "margin",
         "float64",
         "1",
         "least distance to a limit as a fraction of that limit, positive where the design passes; "
         "null where it overturned or was not touched",
+        lambda facts: facts.margin,
+        rows="standing",
     ),
-    ColumnSpec("max_rotation_deg", "float64", "deg", "largest rotation of the boulder, in either direction"),
-    ColumnSpec(
+    OutcomeColumn(
+        "max_rotation_deg",
+        "float64",
+        "deg",
+        "largest rotation of the boulder, in either direction",
+        lambda facts: np.degrees(facts.outcomes.theta_max),
+    ),
+    OutcomeColumn(
         "max_displacement_m",
         "float64",
         "m",
         "largest displacement of the centre of mass of boulder and soil wedge",
+        lambda facts: facts.outcomes.x_b_max,
     ),
-    ColumnSpec("max_vehicle_displacement_m", "float64", "m", "largest displacement of the vehicle"),
-    ColumnSpec("peak_force_kN", "float64", "kN", "largest force between vehicle and boulder"),
-    ColumnSpec(
+    OutcomeColumn(
+        "max_vehicle_displacement_m",
+        "float64",
+        "m",
+        "largest displacement of the vehicle",
+        lambda facts: facts.outcomes.x_v_max,
+    ),
+    OutcomeColumn(
+        "peak_force_kN",
+        "float64",
+        "kN",
+        "largest force between vehicle and boulder",
+        lambda facts: facts.outcomes.F_v_max / 1000.0,
+    ),
+    OutcomeColumn(
         "penetration_m",
         "float64",
         "m",
         "how far the leading edge of the cargo bed gets beyond the far face of the boulder "
         "(negative: it stays short of it)",
+        lambda facts: facts.penetration,
     ),
-    ColumnSpec(
+    OutcomeColumn(
         "rating",
         "dictionary",
         "",
         "penetration rating reached (P1, P2, P3); null beyond P3 or where not rated",
+        lambda facts: facts.rating,
+        words=RATINGS,
     ),
-    ColumnSpec("time_to_limit_s", "float64", "s", "time at which the rotation reached the limit; null where never"),
-    ColumnSpec("end_time_s", "float64", "s", "time simulated"),
-    ColumnSpec("rotation_error_deg", "float64", "deg", "estimated numerical error of max_rotation_deg"),
-    ColumnSpec("displacement_error_m", "float64", "m", "estimated numerical error of the displacements"),
+    OutcomeColumn(
+        "time_to_limit_s",
+        "float64",
+        "s",
+        "time at which the rotation reached the limit; null where never",
+        lambda facts: facts.outcomes.t_limit,
+        rows="overturned",
+    ),
+    OutcomeColumn("end_time_s", "float64", "s", "time simulated", lambda facts: facts.outcomes.t_end),
+    OutcomeColumn(
+        "rotation_error_deg",
+        "float64",
+        "deg",
+        "estimated numerical error of max_rotation_deg",
+        lambda facts: np.degrees(facts.outcomes.theta_error),
+    ),
+    OutcomeColumn(
+        "displacement_error_m",
+        "float64",
+        "m",
+        "estimated numerical error of the displacements",
+        lambda facts: facts.outcomes.x_error,
+    ),
 )
 
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)

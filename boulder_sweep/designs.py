@@ -1,4 +1,4 @@
-"""From axes to columns of designs, block by block: no grid is ever written out as a whole.
+"""From axes to columns of designs, block by block: the grid is never expanded as a whole.
 
 The number of a design is its position in the grid, the last axis changing fastest. Which value a design
 takes on an axis follows from its number by division, so any block of rows can be made without the others.
@@ -16,7 +16,7 @@ import numpy as np
 from boulder_sweep.columns import INPUT_COLUMNS
 
 MAX_DICTIONARY = 1 << 16
-"""Most values of a dictionary column; beyond that a column is written out."""
+"""Largest dictionary of a column; beyond that a column holds one value per row."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,10 +68,6 @@ class Reasons:
         """Whether some row cannot be computed."""
         return bool(self.codes.any())
 
-    def to_list(self) -> list[str]:
-        """Return one text per row, empty where the row can be computed."""
-        return [self.texts[code] for code in self.codes]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DesignBlock:
@@ -119,10 +115,10 @@ class Source:
         """Places in the dictionary for every value (None: its own place), and the dictionary."""
 
     def find_dictionary(self) -> None:
-        """Look for repeated values. Done once, before the first block: blocks must cost the same, all of them."""
+        """Look for repeated values; called once, before the first block, so that all blocks cost the same."""
         head = self.values[: 2 * MAX_DICTIONARY]
         if len(head) < len(self.values) and len(np.unique(head)) > MAX_DICTIONARY:
-            return  # a long list of ever different values: sorting the whole is for nothing
+            return  # a long list without repetition: sorting it all would be wasted
         unique, inverse = np.unique(self.values, return_inverse=True)
         if len(unique) < len(self.values):
             self.dictionary = inverse.astype(np.int32), unique
@@ -186,7 +182,7 @@ class DesignPlan:
         Lengths of the axes in the order of the file.
     given : dict of str to Source
         By column name; ``embedment_ratio`` in place of ``embedment_depth_m`` and a missing
-        ``impact_height_m`` are worked out here.
+        ``impact_height_m`` are computed here.
     """
 
     def __init__(self, lengths: Sequence[int], given: dict[str, Source]) -> None:
@@ -212,7 +208,7 @@ class DesignPlan:
         self.refusals = self.combine(refusal, height, embedment, bumper, hood, impact)
 
     def combine(self, function: Callable[..., np.ndarray], *inputs: Quantity) -> Quantity:
-        """Return ``function(*inputs)`` worked out over all combinations if these are few, else per row."""
+        """Return ``function(*inputs)`` over all combinations if these are few, else per row."""
         sources = [quantity for quantity in inputs if isinstance(quantity, Source)]
         if len(sources) < len(inputs):
             return Derived(function, inputs)

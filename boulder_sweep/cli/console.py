@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.columns import BY_NAME
+from boulder_sweep.columns import BY_NAME, VERDICTS
 from boulder_sweep.text import duration_text, size_text
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
-
-VERDICTS = ("pass", "fail", "undecided", "error")
 
 
 def say(text: str) -> None:

@@ -38,7 +38,7 @@ Examples:
     default=60.0,
     show_default=True,
     metavar="S",
-    help="After so long begin no further way.",
+    help="Start no new measurement after this many seconds.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
 @set_option
@@ -46,7 +46,7 @@ Examples:
 def tradeoff(
     grid: str, out: str | None, designs: int, seconds: float, quiet: bool, overrides: tuple[str, ...], as_json: bool
 ) -> int:
-    """Simulate a sample of GRID in many ways and compare each with a far finer solution.
+    """Simulate a sample of GRID by many methods and compare each with a far finer solution.
 
     The sample holds the corners of the grid and rows spread over all of its axes. Steps, soil in closed form and by
     sums over elements, both readings of the paper: errors, changed verdicts, and CPU time per design. With -o the table
@@ -73,8 +73,8 @@ def tradeoff(
         _show(found)
     for sentence in found.recommendation():
         click.echo(sentence)
-    for way in found.left_out:
-        click.echo(f"left out for time: {way.readings}, {way.soil}, {way.steps}")
+    for method in found.left_out:
+        click.echo(f"left out for time: {method.readings}, {method.soil}, {method.steps}")
     for file in files:
         click.echo(f"written  {file}")
     return 0
@@ -97,20 +97,20 @@ def _show(found: Tradeoff) -> None:
     table.add_column("", no_wrap=True)
     before = ("", 0, False, False)
     for point in found.points:
-        way = point.way
-        group = (way.readings, way.soil_elements, way.error_estimate, way.locate_yield)
+        method = point.method
+        group = (method.readings, method.soil_elements, method.error_estimate, method.locate_yield)
         if group != before and before[0]:
             table.add_section()
         before = group
         metres = (point.displacement_rms_m, point.displacement_p99_m, point.displacement_max_m)
         table.add_row(
-            way.readings,
-            way.soil,
-            way.steps,
+            method.readings,
+            method.soil,
+            method.steps,
             f"{point.cpu_us:.3g}" if point.cpu_us < 1000 else f"{point.cpu_us:,.0f}",
             *(f"{v:.1e}" for v in (point.rotation_rms_deg, point.rotation_p99_deg, point.rotation_max_deg)),
             *(f"{1e3 * v:.1e}" for v in metres),
-            f"{point.covered:.2%}" if way.error_estimate else "",
+            f"{point.covered:.2%}" if method.error_estimate else "",
             str(point.flips),
             str(point.undecided),
             f"{point.designs:,}",
@@ -119,7 +119,7 @@ def _show(found: Tradeoff) -> None:
     wide = Console(width=1000)
     console = Console(width=max(Console().width, wide.measure(table).maximum))
     console.print(table)
-    console.print("* no other way with these readings is both cheaper and more accurate (rotation, 99 %)")
+    console.print("* no other method with these readings is both cheaper and more accurate (rotation, 99 %)")
     for readings, error in found.reference_deg.items():
         console.print(f"{readings}: against steps of {found.reference_step_ms:g} ms, known to {error:.0e} deg")
     console.print()

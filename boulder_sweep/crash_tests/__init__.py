@@ -1,1 +1,1 @@
-"""Crash tests and crash pulses held against the model."""
+"""Crash tests and crash pulses compared with the model."""

@@ -7,9 +7,9 @@ over-damped below. Integrated once, it gives the displacement from velocity and 
     x = (m/c) (v_0 - v) - (m/k) v'
 
 The force ends where the acceleration returns to zero, at pi/b; from there the vehicle coasts backwards. An
-over-damped one never comes off.
+over-damped one never separates.
 
-Eq 49 as printed has its exponent around the whole bracket; with the bracket in its place,
+Eq 49 as printed has its exponent around the whole bracket; with the exponent outside it,
 x = -2a v_0/(a^2+b^2) + e^{at} {[(v_0 - 2a^2 v_0/(a^2+b^2))/b] sin bt + [2a v_0/(a^2+b^2)] cos bt}, it is the above.
 """
 
@@ -52,7 +52,7 @@ class RigidWall:
 
     @property
     def over_damped(self) -> bool:
-        """Whether the vehicle creeps to a stop without coming off: c_v <= sqrt(k_v m_v)/2."""
+        """Whether the vehicle creeps to a stop without separating: c_v <= sqrt(k_v m_v)/2."""
         return self.discriminant >= 0.0
 
     @property
@@ -110,7 +110,7 @@ class RigidWall:
         return self.response(time_s)[0]
 
     def response(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Displacement [m], velocity [m/s] and acceleration [m/s^2] (Eq 49 put right, with the release of Eq 47).
+        """Displacement [m], velocity [m/s] and acceleration [m/s^2] (Eq 49 corrected, with the release of Eq 47).
 
         Parameters
         ----------
@@ -145,17 +145,3 @@ class RigidWall:
         """Both rates of decay, the slow one from the product k/m of the two, without cancellation [1/s]."""
         fast = self.a - math.sqrt(self.discriminant)
         return self.spring_N_m / self.mass_kg / fast, fast
-
-
-def spring_and_damper(mass_kg: float, a: float, b: float) -> tuple[float, float]:
-    """Return spring [N/m] and damper [N s/m] from the fitting constants of Eq 49 (Eqs 50, 51).
-
-    Parameters
-    ----------
-    mass_kg
-        Mass of the vehicle.
-    a, b
-        Fitting constants [1/s]; a is negative.
-    """
-    damper = mass_kg * (a * a + b * b) / (-2.0 * a)
-    return -2.0 * a * damper, damper

@@ -61,7 +61,7 @@ def statement_table(found: list[Statement]) -> Table:
 
 
 def statements(trajectories: Trajectories, study: Convergence, wall: RigidWall) -> list[Statement]:
-    """Hold every statement of the paper against the model.
+    """Compare every statement of the paper with the model.
 
     Parameters
     ----------

@@ -22,13 +22,15 @@ from boulder_kernels import (
     simulate_design,
 )
 from boulder_kernels.design import design_at
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, empty_outcomes, estimate_errors, write_outcome
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
-from boulder_sweep.judge.evaluation import control_of, design_table, readings_of
+from boulder_sweep.judge.evaluation import control_of, readings_of
+from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.settings import Sweep, load
+from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
 
 __all__ = ["Trajectory", "simulate"]
@@ -37,9 +39,9 @@ SAMPLE_S = 0.0005
 """Time between two samples of a trajectory [s]."""
 MOST_SAMPLES = 1_000_000
 BEFORE_THE_END = 1.0 - 1e-14
-"""The last sample is taken so little before the end of the simulation that rounding cannot put it behind."""
+"""The last sample is taken this close to the end, so that rounding cannot place it after the end."""
 
-_DEFAULTS = {"strain_rate_factor": 1.0, "bumper_height_m": 0.5, "hood_height_m": 1.4, "bed_offset_m": 2.9}
+_DEFAULTS = {field.name: field.default for field in FIELDS if field.default is not None}
 """Inputs that a design given as a mapping may leave out, as a file may."""
 
 
@@ -87,7 +89,7 @@ def simulate(
     IndexError
         There is no such design.
     ValueError
-        An input is missing, or the times asked for make no sense.
+        An input is missing, or a time is not positive.
 
     Notes
     -----
@@ -105,8 +107,8 @@ def simulate(
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    table = design_table(block)
-    one, how = design_at(table, 0), readings_of(sweep)
+    designs = designs_of(block)
+    one, how = design_at(designs.table, 0), readings_of(sweep)
     control = _control(sweep)
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
@@ -115,14 +117,14 @@ def simulate(
     row = _outcome_row(outcome)
     if control.error_estimate:
         coarser = simulate_design(one, how, control._replace(halved=False), no_record())
-        _estimate(row, _outcome_row(coarser), table, how)
-    judged = judge(row, table.L, np.array([inputs["bed_offset_m"]]), limits)
+        _estimate(row, _outcome_row(coarser), designs.table, how)
+    judged = judge(row, designs, limits)
     motion = Motion(one, how, constants_of(one, how, control.elements), control, _kept(record, times, outcome), outcome)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
-    """Return what was asked for as a sweep."""
+    """Return the design as a sweep."""
     if isinstance(design, Sweep):
         return design
     if isinstance(design, str | Path):
@@ -146,7 +148,7 @@ def _changed(
     step_s: float | None,
     horizon_s: float | None,
 ) -> Sweep:
-    """Return the sweep with what the caller wants otherwise."""
+    """Return the sweep with the caller's changes."""
     model, solver = sweep.model, sweep.solver
     if readings is not None:
         choice = ReadingChoice.of_preset(readings) if isinstance(readings, str) else readings
@@ -186,7 +188,7 @@ def _sample_times(horizon: float, sample_s: float) -> np.ndarray:
 
 
 def _empty_record(times: np.ndarray) -> Record:
-    """Return a record to be filled at the given times; NaN where the simulation does not get."""
+    """Return a record to be filled at the given times; NaN at times the simulation does not reach."""
     n = len(times)
     asked = np.minimum(times, times[-1] * BEFORE_THE_END)
     states, exchanged = np.full((n, 6), np.nan), np.full((n, 4), np.nan)
@@ -195,13 +197,13 @@ def _empty_record(times: np.ndarray) -> Record:
 
 def _outcome_row(outcome: Outcome) -> OutcomeTable:
     """Return one outcome as a table of one row, without an estimate of its error."""
-    m = outcome.maxima
-    row = (m.theta, m.x_b, m.x_v, m.F_v, outcome.t_limit, outcome.t_end, math.nan, math.nan)
-    return OutcomeTable(np.array([outcome.status], np.int8), *(np.array([value]) for value in row))
+    row = empty_outcomes(1)
+    write_outcome(row, 0, outcome)
+    return row
 
 
 def _estimate(row: OutcomeTable, coarser: OutcomeTable, table: DesignTable, how: Readings) -> None:
-    """Write into a row its numerical errors, by the rule that a sweep has for its rows."""
+    """Write the numerical errors of a row, by the same rule as for the rows of a sweep."""
     estimate_errors(coarser, row, table, SAFETY if how.restoring_gravity else SAFETY_PRINTED)
     if math.isnan(coarser.t_limit[0]) != math.isnan(row.t_limit[0]):
         # That rule tells by the status which solution reached the limit; here they go on beyond it.

@@ -1,8 +1,7 @@
-"""The time history of one impact: arrays in SI units, what they amount to, and how to draw and keep them."""
+"""The time history of one impact: arrays in SI units, their summary, and methods to draw and save them."""
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
-from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
 from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY
-from boulder_sweep.judge.judged import RATINGS, VERDICTS, Judged
+from boulder_sweep.judge.judged import Judged
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -30,7 +28,7 @@ _PEAK_TIMES = {
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What the kernels were given and what they returned, in their own terms."""
+    """Input and output of the kernels, in their own units."""
 
     design: Design
     readings: Readings
@@ -63,8 +61,8 @@ class Trajectory:
         Displacement x_b and velocity of the common centre of mass of boulder and lumped soil.
     boulder_centre_displacement_m : ndarray
         Displacement of the boulder's own centre of mass, what a camera tracks:
-        x_b + (L/2 - c_x)(cos theta - 1) + (H/2 - c_y) sin theta (Eqs 53 to 55, with the bracket of Eq 55 in its
-        place, its sign put right, and the value at rest subtracted).
+        x_b + (L/2 - c_x)(cos theta - 1) + (H/2 - c_y) sin theta (Eqs 53 to 55, with bracket and sign of Eq 55
+        corrected, and the value at rest subtracted).
     rotation_rad, angular_velocity_rad_s : ndarray
         Rotation theta_b of the boulder, positive with its top away from the vehicle, and its rate.
     vehicle_displacement_m, vehicle_velocity_m_s, vehicle_acceleration_m_s2 : ndarray
@@ -153,12 +151,12 @@ class Trajectory:
     @property
     def verdict(self) -> str:
         """``pass``, ``fail``, ``undecided`` or ``error``."""
-        return VERDICTS[int(self.judged.verdict[0])]
+        return str(self.judged.row(0)["verdict"])
 
     @property
     def reason(self) -> str:
         """Why; empty for a pass."""
-        return self.judged.reasons[int(self.judged.reason[0])]
+        return str(self.judged.row(0)["reason"])
 
     def energy(self) -> EnergyLedger:
         """Return where the vehicle's energy is at every sample."""
@@ -175,14 +173,8 @@ class Trajectory:
             the representation of the soil close it.
         """
         found: dict[str, Any] = {"name": self.name, "design_id": self.design_id}
-        for name in OUTCOME_COLUMNS:
-            value = getattr(self.judged, name)[0]
-            if name in ("verdict", "reason"):
-                found[name] = getattr(self, name)
-            elif name == "rating":
-                found[name] = RATINGS[int(value)] if value >= 0 else None
-            else:
-                found[name] = _plain(value)
+        for name, value in self.judged.row(0).items():
+            found[name] = value
             if name in _PEAK_TIMES:
                 key, field = _PEAK_TIMES[name]
                 found[key] = _plain(getattr(self.motion.outcome.maxima, field))
@@ -254,10 +246,6 @@ class Trajectory:
     def animate(self, path: str | Path) -> None:
         """Draw a moving side view: .gif, .mp4 (needs ffmpeg) or .html; see `plot`."""
         draw("animation", "animate", self, path)
-
-    def to_json(self) -> str:
-        """Return the summary as one JSON object."""
-        return json.dumps(self.summary())
 
 
 def _plain(value: Any) -> float | None:

@@ -15,7 +15,7 @@ HISTORY: tuple[ColumnSpec, ...] = (
     _number(
         "boulder_centre_displacement_m",
         "m",
-        "displacement of the boulder's own centre of mass, as a camera tracks it (Eqs 53 to 55, put right)",
+        "displacement of the boulder's own centre of mass, as a camera tracks it (Eqs 53 to 55, corrected)",
     ),
     _number("boulder_velocity_m_s", "m/s", "velocity of the common centre of mass"),
     _number("rotation_rad", "rad", "rotation theta_b of the boulder, positive with its top away from the vehicle"),

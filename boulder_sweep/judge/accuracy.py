@@ -1,4 +1,4 @@
-"""From an accuracy asked for to the step that gives it, and what to say of it."""
+"""From the requested accuracy to a time step, and how it is reported."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ if TYPE_CHECKING:
 
 
 class Steps(NamedTuple):
-    """How the time is cut into steps."""
+    """Time steps of the integrator."""
 
     step_s: float
     """Length of a step [s]; where errors are estimated, the solution reported has half of it."""
     locate_yield: bool = False
-    """Whether steps also end where the soil reaches its ultimate resistance. A step costs a little more then, and the
-    error falls with the fifth power of its length in place of the third."""
+    """Whether steps also end where the soil reaches its ultimate resistance. This costs a little more per step, and the
+    error falls with the fifth power of the step instead of the third."""
 
 
 STEPS = {"fast": Steps(0.012), "balanced": Steps(0.008), "fine": Steps(0.004, locate_yield=True)}
-"""What is behind each named accuracy."""
+"""Steps of each named accuracy."""
 STEPS_PRINTED = {"fast": Steps(0.006), "balanced": Steps(0.004), "fine": Steps(0.002, locate_yield=True)}
 """The same where the restoring moment is read as printed: it jumps where the angular velocity passes zero, and a
-design that grazes this edge needs shorter steps to come down on the right side."""
+design close to that jump needs shorter steps to end on the right side of it."""
 LADDER = (
     *(Steps(0.012), Steps(0.008)),
     *(Steps(1e-3 * step, locate_yield=True) for step in (8, 6, 4, 3, 2, 1.5, 1, 0.75, 0.5, 0.375, 0.25, 0.125)),
 )
-"""What a pilot chooses from, the cheapest first. Longer steps save nothing: a design's events cost the same."""
+"""Steps a pilot run chooses from, cheapest first. Longer steps save nothing because events dominate the cost."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,16 @@ class Accuracy:
     asked
         ``fast``, ``balanced``, ``fine``, ``0.01 deg`` or ``step``.
     steps
-        Steps of the integrator; where the error is estimated, the finer of two solutions, by half of them, is reported.
+        Steps of the integrator; where the error is estimated, a second solution with half the step is reported.
     error_estimate
-        Whether the error of every row is estimated, and verdicts nearer to a limit than it are undecided.
+        Whether the error of every row is estimated; verdicts closer to a limit than that error are undecided.
     achieved_deg
-        Quantile `QUANTILE` of the estimated error of the rotation over the designs of a pilot [deg]; None where the
-        accuracy asked for is no number.
+        Quantile `QUANTILE` of the estimated error of the rotation over the designs of a pilot run [deg]; None unless
+        the requested accuracy is a number.
     pilot_designs
-        Designs of the pilot; 0 without one.
+        Designs of the pilot run; 0 without one.
     met
-        Whether what was asked for was achieved.
+        Whether the requested accuracy was achieved.
     """
 
     asked: str
@@ -76,5 +76,5 @@ class Accuracy:
 
 
 def steps_of(sweep: Sweep) -> dict[str, Steps]:
-    """Return what is behind the named accuracies, for the readings of a sweep."""
+    """Return the steps of the named accuracies for the readings of a sweep."""
     return STEPS_PRINTED if sweep.model.readings.restoring == "printed" else STEPS

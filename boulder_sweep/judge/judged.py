@@ -5,53 +5,68 @@ Numbers only, so that stored tables can be read and put together without the ker
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.columns import OUTCOMES, REASONS, VERDICTS, OutcomeColumn
 
-VERDICTS = ("pass", "fail", "undecided", "error")
-"""What a verdict may be; codes of `Judged.verdict` index it."""
-REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error")
-"""The reasons of every verdict but ``error``, which names its own."""
-RATINGS = ("P1", "P2", "P3")
-"""Penetration ratings; codes of `Judged.rating` index it, -1 is none."""
 PASS, FAIL, UNDECIDED, ERROR = range(len(VERDICTS))
 NO_REASON, NO_CONTACT, OVERTURNS, PENETRATION, HORIZON, NUMERICAL_ERROR = range(len(REASONS))
 
 
-class Judged(NamedTuple):
-    """Outcome columns of n rows under their names in the table: arrays of shape (n,), NaN for no value."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """Outcomes of n rows.
 
-    verdict: np.ndarray
-    """int8, index into `VERDICTS`."""
-    reason: np.ndarray
-    """int32, index into `reasons`."""
-    margin: np.ndarray
-    """Least (limit - value) / limit over the criteria; NaN where overturned or without contact."""
-    max_rotation_deg: np.ndarray
-    """Largest |theta_b|."""
-    max_displacement_m: np.ndarray
-    """Largest x_b."""
-    max_vehicle_displacement_m: np.ndarray
-    """Largest x_v."""
-    peak_force_kN: np.ndarray
-    """Largest contact force."""
-    penetration_m: np.ndarray
-    """How far the leading edge of the cargo bed came past the rear face of the boulder; negative if not."""
-    rating: np.ndarray
-    """int8, index into `RATINGS`; -1 where there is none."""
-    time_to_limit_s: np.ndarray
-    """Time at which the rotation reached its limit."""
-    end_time_s: np.ndarray
-    """Simulated time."""
-    rotation_error_deg: np.ndarray
-    """Estimated numerical error of the rotation."""
-    displacement_error_m: np.ndarray
-    """Estimated numerical error of the displacements."""
-    reasons: tuple[str, ...]
-    """`REASONS`, then the named reasons of rows that could not be computed. The words of `reason`."""
+    Attributes
+    ----------
+    columns : dict of str to ndarray, shape (n,)
+        Every outcome column of the table by its name: float64, NaN for no value, or int32 codes of words, -1 for none.
+    words : dict of str to tuple of str
+        What the codes of each dictionary column stand for: first those of the register, then those of these rows.
+    """
+
+    columns: dict[str, np.ndarray]
+    words: dict[str, tuple[str, ...]]
+
+    def __len__(self) -> int:
+        return len(self.verdict)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.columns[name]
+
+    @property
+    def verdict(self) -> np.ndarray:
+        """Codes of `VERDICTS`."""
+        return self.columns["verdict"]
+
+    @property
+    def reason(self) -> np.ndarray:
+        """Codes of `reasons`."""
+        return self.columns["reason"]
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """`REASONS`, then the reasons of rows that could not be computed."""
+        return self.words["reason"]
+
+    def rows(self, chosen: np.ndarray | slice) -> Judged:
+        """Return some rows, chosen by a mask, by their places or by a slice."""
+        return Judged({name: values[chosen] for name, values in self.columns.items()}, self.words)
+
+    def row(self, place: int) -> dict[str, Any]:
+        """Return one row as plain data by the names of the columns: words, numbers, None for no value."""
+        found: dict[str, Any] = {}
+        for name, values in self.columns.items():
+            value = values[place]
+            if name in self.words:
+                found[name] = self.words[name][int(value)] if value >= 0 else None
+            else:
+                found[name] = float(value) if math.isfinite(value) else None
+        return found
 
 
 def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
@@ -70,16 +85,16 @@ def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
         As many rows as `codes` has.
     """
     n = len(codes)
-    nothing = np.full(n, np.nan)
-    empty = dict.fromkeys(OUTCOME_COLUMNS, nothing)
-    empty["verdict"] = np.full(n, ERROR, dtype=np.int8)
-    empty["reason"] = (np.asarray(codes) + len(REASONS)).astype(np.int32)
-    empty["rating"] = np.full(n, -1, dtype=np.int8)
-    return Judged(**empty, reasons=(*REASONS, *reasons))
+    nothing, no_word = np.full(n, np.nan), np.full(n, -1, dtype=np.int32)
+    columns = {spec.name: no_word if spec.type == "dictionary" else nothing for spec in OUTCOMES}
+    columns["verdict"] = np.full(n, ERROR, dtype=np.int32)
+    columns["reason"] = (np.asarray(codes) + len(REASONS)).astype(np.int32)
+    words = {spec.name: spec.words for spec in OUTCOMES if spec.type == "dictionary"}
+    return Judged(columns, words | {"reason": (*REASONS, *reasons)})
 
 
 def joined(pieces: list[Judged]) -> Judged:
-    """Put consecutive pieces together; the named reasons in use end up sorted, whatever the pieces.
+    """Put consecutive pieces together; the words in use end up sorted behind those of the register.
 
     Parameters
     ----------
@@ -89,25 +104,35 @@ def joined(pieces: list[Judged]) -> Judged:
     Returns
     -------
     Judged
-        All rows, in the order of the pieces.
+        All rows, in the order of the pieces. The same rows give the same words and codes, however they were cut.
     """
-    used = {piece.reasons[code] for piece in pieces for code in np.flatnonzero(np.bincount(piece.reason))}
-    reasons = (*REASONS, *sorted(used - set(REASONS)))
-    place = {reason: code for code, reason in enumerate(reasons)}
-    translated = [piece._replace(reason=_translated(piece, place)) for piece in pieces]
-    if len(translated) == 1:
-        return translated[0]._replace(reasons=reasons)
-    columns = {name: np.concatenate([getattr(piece, name) for piece in translated]) for name in OUTCOME_COLUMNS}
-    return Judged(**columns, reasons=reasons)
+    columns: dict[str, np.ndarray] = {}
+    words: dict[str, tuple[str, ...]] = {}
+    for spec in OUTCOMES:
+        parts = [piece[spec.name] for piece in pieces]
+        if spec.type == "dictionary":
+            words[spec.name] = _words_in_use(spec, pieces)
+            parts = [_translated(piece, spec.name, words[spec.name]) for piece in pieces]
+        columns[spec.name] = parts[0] if len(parts) == 1 else np.concatenate(parts)
+    return Judged(columns, words)
 
 
-def rows_of(judged: Judged, start: int, stop: int) -> Judged:
-    """Return the rows [start, stop) of some judged rows; views, not copies."""
-    return Judged(**{name: getattr(judged, name)[start:stop] for name in OUTCOME_COLUMNS}, reasons=judged.reasons)
+def _words_in_use(spec: OutcomeColumn, pieces: list[Judged]) -> tuple[str, ...]:
+    """Words of a column: those of the register, then what else some row has, sorted."""
+    used = set()
+    for piece in pieces:
+        own = piece.words[spec.name]
+        if own != spec.words:
+            counts = np.bincount(piece[spec.name] + 1, minlength=1)[1:]
+            used |= {own[code] for code in np.flatnonzero(counts)}
+    return (*spec.words, *sorted(used - set(spec.words)))
 
 
-def _translated(piece: Judged, place: dict[str, int]) -> np.ndarray:
-    """Reason codes of a piece as indices into other words; words that no row uses need no place."""
-    if all(place.get(reason, code) == code for code, reason in enumerate(piece.reasons)):
-        return piece.reason
-    return np.array([place.get(reason, 0) for reason in piece.reasons], dtype=np.int32)[piece.reason]
+def _translated(piece: Judged, name: str, words: tuple[str, ...]) -> np.ndarray:
+    """Codes of a column of a piece as indices into other words; words that no row uses need no place."""
+    own, codes = piece.words[name], piece[name]
+    if own == words[: len(own)]:
+        return codes
+    place = {word: code for code, word in enumerate(words)}
+    # Code -1 takes the last entry, which stands for no word.
+    return np.array([*(place.get(word, 0) for word in own), -1], dtype=codes.dtype)[codes]

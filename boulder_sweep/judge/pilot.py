@@ -1,4 +1,4 @@
-"""From an accuracy asked for to the time steps: by its name, or by a pilot that simulates a sample of the designs."""
+"""From the requested accuracy to time steps: by name, or by a pilot run on a sample of the designs."""
 
 from __future__ import annotations
 
@@ -10,34 +10,35 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, simulate_table
 from boulder_sweep.judge.accuracy import LADDER, Accuracy, Steps, steps_of
-from boulder_sweep.judge.evaluation import design_table, readings_of
+from boulder_sweep.judge.evaluation import readings_of
+from boulder_sweep.judge.inputs import Designs, designs_of, put_together
 from boulder_sweep.judge.sampling import sampled_rows
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 DESIGNS = 4096
-"""Designs of a pilot with the soil in closed form."""
+"""Designs of a pilot run, soil in closed form."""
 FEWEST_DESIGNS = 256
-"""And at least, with any number of soil elements."""
+"""Smallest number of designs, for any number of soil elements."""
 ELEMENTS_AS_FAST = 16
-"""Number of soil elements that take about the time of the closed form."""
+"""Number of soil elements that cost about as much as the closed form."""
 QUANTILE = 0.999
-"""Share of the designs whose estimated error shall be no larger than what was asked for."""
+"""Fraction of the designs whose estimated error must not exceed the requested accuracy."""
 AT_ONCE = 256
-"""Designs simulated at once: an interruption waits for so many."""
+"""Designs simulated per call: an interruption waits for the current call."""
 
 
 def accuracy_of(sweep: Sweep) -> Accuracy:
     """Return how accurately a sweep is computed.
 
-    Where the accuracy is a number, a pilot on a sample of the sweep chooses the step. The sample and so the step depend
-    on nothing but the settings.
+    If the accuracy is a number, a pilot run on a sample of the sweep chooses the step. The sample, and therefore the
+    step, depends only on the settings.
 
     Parameters
     ----------
     sweep
-        The sweep, with a step, an accuracy by name, or the error admitted [deg].
+        The sweep, with a step, a named accuracy, or a tolerance [deg].
     """
     solver = sweep.solver
     if solver.step_s is not None:
@@ -50,21 +51,21 @@ def accuracy_of(sweep: Sweep) -> Accuracy:
 
 @lru_cache(maxsize=8)
 def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
-    """Choose the step of a sweep by a pilot on a sample of its designs.
+    """Choose the step of a sweep by a pilot run on a sample of its designs.
 
     Parameters
     ----------
     sweep
         The sweep.
     wanted_deg
-        Error of the rotation admitted [deg], in `QUANTILE` of the designs.
+        Tolerance of the rotation [deg], to be met by a fraction `QUANTILE` of the designs.
 
     Returns
     -------
     Accuracy
-        The first steps of `LADDER` that meet it or, where none does, those that come nearest.
+        The first steps of `LADDER` that meet it, or those that come closest if none does.
     """
-    table, _ = sampled_columns(sweep, pilot_size(sweep.model.soil_elements))
+    table = sampled_designs(sweep, pilot_size(sweep.model.soil_elements)).table
     readings = readings_of(sweep)
     found: list[tuple[float, int]] = []
     limit = math.radians(sweep.criterion.max_rotation_deg)
@@ -77,7 +78,7 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
             error_estimate=True,
             locate_yield=steps.locate_yield,
         )
-        # Rounded so that another processor, off in the last bits, finds the same.
+        # Rounded, so that a processor that differs in the last bits finds the same.
         achieved = float(f"{estimated_error_deg(table, readings, control):.3g}")
         found.append((achieved, rung))
         if achieved <= wanted_deg:
@@ -94,23 +95,18 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
 
 
 def pilot_size(elements: int) -> int:
-    """Return how many designs a pilot has, by the number of soil elements (0: closed form)."""
+    """Return the number of designs in a pilot run, by the number of soil elements (0: closed form)."""
     return max(FEWEST_DESIGNS, DESIGNS * ELEMENTS_AS_FAST // max(elements, ELEMENTS_AS_FAST))
 
 
-def sampled_columns(sweep: Sweep, count: int) -> tuple[DesignTable, np.ndarray]:
-    """Return about so many designs of a sweep that can be computed, in the units of the kernels, and bed offsets."""
+def sampled_designs(sweep: Sweep, count: int) -> Designs:
+    """Return about so many designs of a sweep that can be computed."""
     blocks = [sweep.block(row, row + 1) for row in sampled_rows(sweep, count).tolist()]
-    blocks = [block for block in blocks if not block.reasons.any]
-    if not blocks:
-        return DesignTable(*(np.empty(0) for _ in DesignTable._fields)), np.empty(0)
-    tables = [design_table(block) for block in blocks]
-    table = DesignTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
-    return table, np.concatenate([block.columns["bed_offset_m"].to_numpy() for block in blocks])
+    return put_together([designs_of(block) for block in blocks if not block.reasons.any])
 
 
 def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Simulate a table in pieces short enough for an interruption to wait for."""
+    """Simulate a table in pieces, so that an interruption need not wait long."""
     pieces = [
         simulate_table(DesignTable(*(column[at : at + AT_ONCE] for column in table)), readings, control)
         for at in range(0, table.L.size, AT_ONCE)

@@ -1,4 +1,4 @@
-"""A sample of a sweep's designs that depends on nothing but the sweep: its corners, and rows spread over every axis."""
+"""A deterministic sample of a sweep: its corners, and rows spread over every axis."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def sampled_rows(sweep: Sweep, count: int) -> np.ndarray:
     sweep
         The sweep.
     count
-        How many rows, about; all of them where it has no more.
+        Approximate number of rows; all rows if the sweep has no more.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def sampled_rows(sweep: Sweep, count: int) -> np.ndarray:
 
 
 def _corners(lengths: tuple[int, ...], most: int) -> list[tuple[int, ...]]:
-    """Places of the corners; where they are too many, both ends and those one axis away from either."""
+    """Places of the corners; if there are too many, both ends and their neighbours along one axis."""
     ends = [(0, length - 1) if length > 1 else (0,) for length in lengths]
     if math.prod(len(pair) for pair in ends) <= most:
         return list(product(*ends))

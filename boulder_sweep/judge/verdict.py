@@ -1,11 +1,10 @@
-"""From what the kernels computed to pass, fail, undecided or error, with the reason.
+"""From computed outcomes to pass, fail, undecided or error, with the reason.
 
-The rules, worst reason first; the first that holds for a row decides it:
+The rules, worst first; the first that applies decides the row:
 
 1. ``error``: the row could not be computed; the reason says why.
 2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
-3. ``fail / overturns``: the rotation reached its limit. Never outvoted by the penetration, which such a
-   boulder may well keep small.
+3. ``fail / overturns``: the rotation reached its limit. A small penetration does not change that.
 4. ``fail / penetration``: the truck's cargo bed ends further behind the boulder than its rating allows.
 5. ``undecided / horizon``: at the end of the simulated time something was still growing.
 6. ``undecided / error``: a peak below its limit lies nearer to it than the estimated numerical error.
@@ -22,6 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_kernels import OutcomeTable, Status
+from boulder_sweep.columns import OUTCOMES, RATINGS, REASONS, Rows
+from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import (
     ERROR,
     FAIL,
@@ -31,8 +32,6 @@ from boulder_sweep.judge.judged import (
     OVERTURNS,
     PASS,
     PENETRATION,
-    RATINGS,
-    REASONS,
     UNDECIDED,
     Judged,
 )
@@ -40,11 +39,10 @@ from boulder_sweep.judge.judged import (
 PENETRATION_LIMITS_M = {"P1": 1.0, "P2": 7.0, "P3": 30.0}
 """Largest penetration of each rating [m] (ASTM F2656)."""
 
-NEWTON_PER_KILONEWTON = 1000.0
 _TOO_FAST = "(more time steps than allowed; a shorter solver.step allows more)"
 STATUS_REASONS = {
-    Status.UNSTABLE: "the motion grew without bound in the time step used: ask for a finer accuracy",
-    Status.STEP_BUDGET: "the time step asked for is too short for the horizon, or the modes change without end",
+    Status.UNSTABLE: "the motion grew without bound at this time step: use a finer accuracy",
+    Status.STEP_BUDGET: "the requested time step is too short for the horizon, or the contact modes keep switching",
     Status.STIFF_SOIL: f"the soil is too stiff for the mass of the boulder {_TOO_FAST}",
     Status.STIFF_VEHICLE: f"the vehicle's spring is too stiff for the mass of vehicle or boulder {_TOO_FAST}",
     Status.WEAK_DAMPER: f"the vehicle's damper is too weak for its spring {_TOO_FAST}",
@@ -52,12 +50,12 @@ STATUS_REASONS = {
     Status.LITTLE_INERTIA: f"the boulder is too light or too thin for the forces that turn it {_TOO_FAST}",
     Status.INVALID: "a constant of the design (mass, inertia or stiffness) is zero, negative or not finite",
 }
-"""Why a row that the kernels gave up has no result."""
+"""Reason of a row that the kernels could not compute."""
 NOT_FINITE = "the computed result is not a finite number"
 
 
 class Limits(NamedTuple):
-    """What a design must keep to."""
+    """Limits of the criterion."""
 
     rotation: float
     """Largest rotation [rad]."""
@@ -70,17 +68,39 @@ class Limits(NamedTuple):
         return PENETRATION_LIMITS_M[self.rating]
 
 
-def judge(outcomes: OutcomeTable, boulder_length: np.ndarray, bed_offset: np.ndarray, limits: Limits) -> Judged:
+class Facts(NamedTuple):
+    """What is known of n rows: what the columns of the table are computed from. Arrays have the shape (n,)."""
+
+    outcomes: OutcomeTable
+    """What the kernels computed; rad, m, N, s."""
+    designs: Designs
+    """Inputs of the same rows."""
+    limits: Limits
+    rows: dict[Rows, np.ndarray]
+    """Masks: which rows were computed, stand, overturned."""
+    penetration: np.ndarray
+    """How far the leading edge of the cargo bed came past the far face of the boulder [m]."""
+    margin: np.ndarray
+    """Least (limit - value) / limit over the criteria."""
+    verdict: np.ndarray
+    """Codes of the verdicts."""
+    reason: np.ndarray
+    """Codes of the reasons."""
+    reasons: tuple[str, ...]
+    """What the codes of the reasons stand for."""
+    rating: np.ndarray
+    """Codes of the ratings; -1 where there is none."""
+
+
+def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Judged:
     """Apply the rules of this module to n rows.
 
     Parameters
     ----------
     outcomes
         What the kernels computed, arrays of shape (n,); rad, m, N, s.
-    boulder_length
-        Length of the boulder along the direction of travel [m], shape (n,).
-    bed_offset
-        Distance from the front bumper to the leading edge of the cargo bed [m], shape (n,).
+    designs
+        Inputs of the same rows.
     limits
         Largest rotation and required rating.
 
@@ -89,17 +109,31 @@ def judge(outcomes: OutcomeTable, boulder_length: np.ndarray, bed_offset: np.nda
     Judged
         One verdict a row; no row is dropped.
     """
+    facts = facts_of(outcomes, designs, limits)
+    columns, words = {}, {}
+    for spec in OUTCOMES:
+        values = spec.value(facts)
+        if spec.type == "dictionary":
+            columns[spec.name] = values
+            words[spec.name] = facts.reasons if spec.name == "reason" else spec.words
+        else:
+            columns[spec.name] = _kept(values, facts.rows[spec.rows])
+    return Judged(columns, words)
+
+
+def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
+    """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
     no_contact = status == Status.NO_CONTACT
     simulated = np.isin(status, (Status.LIMIT, Status.SETTLED, Status.HORIZON, Status.OUTWARD))
     finite = np.ones(status.shape, dtype=bool)
     for maximum in (outcomes.theta_max, outcomes.x_b_max, outcomes.x_v_max, outcomes.F_v_max, outcomes.t_end):
         finite &= np.isfinite(maximum)
-    valid = simulated & finite
+    computed = simulated & finite
 
-    overturned = valid & ((status == Status.LIMIT) | (outcomes.theta_max >= limits.rotation))
-    standing = valid & ~overturned
-    penetration = _kept(outcomes.x_v_max - bed_offset - boulder_length, valid)
+    overturned = computed & ((status == Status.LIMIT) | (outcomes.theta_max >= limits.rotation))
+    standing = computed & ~overturned
+    penetration = outcomes.x_v_max - designs.bed_offset - designs.table.L
     too_deep = standing & (penetration > limits.penetration)
     outward = standing & (status == Status.OUTWARD)
     unsure = (limits.rotation - outcomes.theta_max < outcomes.theta_error) | (
@@ -107,8 +141,8 @@ def judge(outcomes: OutcomeTable, boulder_length: np.ndarray, bed_offset: np.nda
     )
 
     reason, reasons = _error_reasons(status, simulated & ~finite)
-    verdict = np.where(reason >= len(REASONS), ERROR, PASS).astype(np.int8)
-    # From the mildest rule to the worst, so that the worst is the one that stays.
+    verdict = np.where(reason >= len(REASONS), ERROR, PASS).astype(np.int32)
+    # Mildest rule first, so that the worst one stays.
     for rows, kind, why in (
         (standing & unsure, UNDECIDED, NUMERICAL_ERROR),
         (outward, UNDECIDED, HORIZON),
@@ -118,26 +152,20 @@ def judge(outcomes: OutcomeTable, boulder_length: np.ndarray, bed_offset: np.nda
     ):
         verdict[rows] = kind
         reason[rows] = why
-
-    margin = np.minimum(
-        (limits.rotation - outcomes.theta_max) / limits.rotation,
-        (limits.penetration - penetration) / limits.penetration,
-    )
-    return Judged(
+    return Facts(
+        outcomes=outcomes,
+        designs=designs,
+        limits=limits,
+        rows={"computed": computed, "standing": standing, "overturned": overturned},
+        penetration=penetration,
+        margin=np.minimum(
+            (limits.rotation - outcomes.theta_max) / limits.rotation,
+            (limits.penetration - penetration) / limits.penetration,
+        ),
         verdict=verdict,
         reason=reason,
-        margin=_kept(margin, standing),
-        max_rotation_deg=_kept(np.degrees(outcomes.theta_max), valid),
-        max_displacement_m=_kept(outcomes.x_b_max, valid),
-        max_vehicle_displacement_m=_kept(outcomes.x_v_max, valid),
-        peak_force_kN=_kept(outcomes.F_v_max / NEWTON_PER_KILONEWTON, valid),
-        penetration_m=penetration,
-        rating=_ratings(penetration, standing),
-        time_to_limit_s=_kept(outcomes.t_limit, overturned),
-        end_time_s=_kept(outcomes.t_end, valid),
-        rotation_error_deg=_kept(np.degrees(outcomes.theta_error), valid),
-        displacement_error_m=_kept(outcomes.x_error, valid),
         reasons=reasons,
+        rating=_ratings(penetration, standing),
     )
 
 
@@ -150,7 +178,7 @@ def _ratings(penetration: np.ndarray, standing: np.ndarray) -> np.ndarray:
     """Code of the best rating each penetration [m] keeps to; -1 beyond the last and where nothing stands."""
     bounds = np.array([PENETRATION_LIMITS_M[rating] for rating in RATINGS])
     codes = np.searchsorted(bounds, np.where(standing, penetration, np.inf), side="left")
-    return np.where(codes < len(RATINGS), codes, -1).astype(np.int8)
+    return np.where(codes < len(RATINGS), codes, -1).astype(np.int32)
 
 
 def _error_reasons(status: np.ndarray, not_finite: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.judge.judged import VERDICTS, Judged, joined
+from boulder_sweep.columns import VERDICTS
+from boulder_sweep.judge.judged import Judged, joined
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.store.writer import OutputFolder
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.fields import BY_NAME, MAX_ELEMENTS, Field
 from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
-from boulder_sweep.settings.model import ACCURACIES, CLOSED_FORM, PRESETS, PRINTED, RATINGS, SWITCHES, ReadingChoice
+from boulder_sweep.settings.model import ACCURACIES, CLOSED_FORM, PRESETS, PRINTED, SWITCHES, ReadingChoice
 from boulder_sweep.settings.numbers import NumberError, read_count, split_number
 from boulder_sweep.settings.problems import did_you_mean, shorten
 from boulder_sweep.settings.tree import Mapping, Node, Scalar

@@ -16,7 +16,6 @@ SWITCHES: dict[str, str] = {
 """The five readings of the paper, in the order of the kernels, each with the name of its corrected form."""
 
 PRINTED = "printed"
-RATINGS = ("P1", "P2", "P3")
 ACCURACIES = ("fast", "balanced", "fine")
 CLOSED_FORM = "closed_form"
 

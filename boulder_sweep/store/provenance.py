@@ -26,7 +26,7 @@ PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
-_DECIDING_SOURCES = ("designs.py", "judge/*.py")
+_DECIDING_SOURCES = ("designs.py", "columns.py", "judge/*.py")
 """Modules, in addition to the kernels, whose code determines the rows."""
 
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUTS, OUTCOME_COLUMNS, OUTCOMES, ColumnSpec
-from boulder_sweep.judge.judged import RATINGS, REASONS, VERDICTS, Judged
+from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUTS, OUTCOMES, ColumnSpec, OutcomeColumn
+from boulder_sweep.judge.judged import Judged
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import Column, DesignBlock
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 COMPRESSION, COMPRESSION_LEVEL = "zstd", 3
 PANDAS_ATTRIBUTES = b"PANDAS_ATTRS"
 """Metadata that pandas copies into ``DataFrame.attrs``."""
-_WORDS = {"verdict": VERDICTS, "rating": RATINGS}
 _TYPES = {
     "int64": pa.int64(),
     "float64": pa.float64(),
@@ -62,7 +61,7 @@ def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, byte
     """
     arrays = [_array(block.design_id())]
     arrays += [_input_array(block.columns[spec.name]) for spec in INPUTS]
-    arrays += [_outcome_array(spec.name, judged) for spec in OUTCOMES]
+    arrays += [_outcome_array(spec, judged) for spec in OUTCOMES]
     fields = [_field(spec, array.type) for spec, array in zip(COLUMNS, arrays, strict=True)]
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata)))
 
@@ -88,17 +87,13 @@ def encode(table: pa.Table) -> memoryview:
 
 def judged_rows(table: pa.Table) -> Judged:
     """Return the outcomes of a table that was read back, as they were before it was written."""
-    columns: dict[str, Any] = {}
-    for name in OUTCOME_COLUMNS:
-        column = table[name]
-        if name == "reason":
-            reasons, columns[name] = _coded(column, REASONS)
-        elif name in _WORDS:
-            _, columns[name] = _coded(column, _WORDS[name])
-            columns[name] = columns[name].astype(np.int8)
+    columns, words = {}, {}
+    for spec in OUTCOMES:
+        if spec.type == "dictionary":
+            words[spec.name], columns[spec.name] = _coded(table[spec.name], spec.words)
         else:
-            columns[name] = column.to_numpy()  # null becomes NaN
-    return Judged(**columns, reasons=reasons)
+            columns[spec.name] = table[spec.name].to_numpy()  # null becomes NaN
+    return Judged(columns, words)
 
 
 def _field(spec: ColumnSpec, type_: pa.DataType) -> pa.Field:
@@ -124,13 +119,11 @@ def _input_array(column: Column) -> pa.Array:
     return pa.DictionaryArray.from_arrays(_array(column.codes, mask), _array(column.values))
 
 
-def _outcome_array(name: str, judged: Judged) -> pa.Array:
+def _outcome_array(spec: OutcomeColumn, judged: Judged) -> pa.Array:
     """One outcome column."""
-    values = getattr(judged, name)
-    if name == "reason":
-        return _word_array(values, judged.reasons)
-    if name in _WORDS:
-        return _word_array(values, _WORDS[name])
+    values = judged[spec.name]
+    if spec.type == "dictionary":
+        return _word_array(values, judged.words[spec.name])
     return _array(values, np.isnan(values))
 
 

@@ -1,4 +1,4 @@
-"""One way of simulating a sample of designs: what it costs, and how far it is from a far finer solution."""
+"""One method of simulating a sample: its cost, and its error against a far finer solution."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROUNDING_DEG = 1e-9
 """Errors below it are rounding, of the finer solution as well [deg]."""
 
 
-class Way(NamedTuple):
+class Method(NamedTuple):
     """How designs are simulated."""
 
     readings: str
@@ -52,14 +52,14 @@ class Way(NamedTuple):
 
 @dataclass
 class Point:
-    """What one way costs and how accurate it is.
+    """Cost and accuracy of one method.
 
     Parameters
     ----------
-    way
+    method
         How the designs were simulated.
     accuracy
-        Name of the accuracy that stands for this way; empty where none does.
+        Named accuracy that uses this method; empty where none does.
     designs
         Designs of the sample.
     cpu_us
@@ -82,10 +82,10 @@ class Point:
         Share of the designs that neither solution stopped at the limit whose estimated error is no smaller than their
         error. NaN without an estimate.
     pareto
-        Whether no other way with these readings is both cheaper and more accurate (rotation, 99 %).
+        Whether no other method with these readings is both cheaper and more accurate (rotation, 99 %).
     """
 
-    way: Way
+    method: Method
     accuracy: str
     designs: int
     cpu_us: float
@@ -104,8 +104,8 @@ class Point:
 
     def to_dict(self) -> dict[str, object]:
         """Return one row of the table of results; None where there is no value."""
-        own = {name: None if value != value else value for name, value in vars(self).items() if name != "way"}
-        return {**self.way._asdict(), **own}
+        own = {name: None if value != value else value for name, value in vars(self).items() if name != "method"}
+        return {**self.method._asdict(), **own}
 
 
 class Spread(NamedTuple):
@@ -126,20 +126,20 @@ def spread(errors: np.ndarray) -> Spread:
 
 
 def compared(
-    way: Way,
+    method: Method,
     accuracy: str,
     cpu_us: float,
     found: tuple[OutcomeTable, Judged],
     known: tuple[OutcomeTable, Judged],
 ) -> Point:
-    """Compare the outcomes of one way with those of a far finer solution.
+    """Compare the outcomes of one method with those of a far finer solution.
 
     Parameters
     ----------
-    way, accuracy, cpu_us
+    method, accuracy, cpu_us
         As of `Point`.
     found, known
-        Outcomes and verdicts of this way and of the finer solution, n designs each.
+        Outcomes and verdicts of this method and of the finer solution, n designs each.
     """
     (out, judged), (ref, truth) = found, known
     limit = Status.LIMIT
@@ -151,10 +151,10 @@ def compared(
     boulder, truck = np.abs(out.x_b_max - ref.x_b_max), np.abs(out.x_v_max - ref.x_v_max)
     displacement = spread(np.maximum(boulder, truck)[alike])
     verdicts = judged.verdict, truth.verdict
-    estimated_p99_9_deg, covered = _estimates(way, out, errors, standing)
+    estimated_p99_9_deg, covered = _estimates(method, out, errors, standing)
     decided = np.isin(verdicts[0], (PASS, FAIL)) & np.isin(verdicts[1], (PASS, FAIL))
     return Point(
-        way,
+        method,
         accuracy,
         len(out.status),
         cpu_us,
@@ -168,9 +168,9 @@ def compared(
     )
 
 
-def _estimates(way: Way, out: OutcomeTable, errors: np.ndarray, standing: np.ndarray) -> tuple[float, float]:
+def _estimates(method: Method, out: OutcomeTable, errors: np.ndarray, standing: np.ndarray) -> tuple[float, float]:
     """Quantile of the estimated errors [deg], and how often they cover the errors of the standing designs."""
-    if not way.error_estimate:
+    if not method.error_estimate:
         return math.nan, math.nan
     estimated = np.degrees(out.theta_error[standing])
     if not estimated.size:
@@ -183,7 +183,7 @@ def mark_front(points: Iterable[Point]) -> None:
     """Mark the points that no other one with the same readings beats in both cost and accuracy."""
     points = list(points)
     for point in points:
-        rivals = (p for p in points if p.way.readings == point.way.readings and p is not point)
+        rivals = (p for p in points if p.method.readings == point.method.readings and p is not point)
         point.pareto = not any(
             p.cpu_us <= point.cpu_us and p.rotation_p99_deg <= point.rotation_p99_deg for p in rivals
         )

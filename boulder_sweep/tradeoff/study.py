@@ -1,8 +1,8 @@
 """Speed against accuracy, measured on the designs of a sweep.
 
-A sample of the grid, its corners included, is simulated in many ways: by longer and shorter steps, with the soil in
-closed form and by sums over N elements, as printed and corrected. Each is compared with one far finer solution of the
-same readings, with the soil in closed form, which the sums approach.
+A sample of the grid, its corners included, is simulated by many methods: with longer and shorter steps, with the soil
+in closed form and by sums over N elements, as printed and corrected. Each is compared with one far finer solution of
+the same readings with the soil in closed form, the limit of the sums.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from boulder_sweep.drawing import draw
 from boulder_sweep.errors import NothingToMeasureError
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
 from boulder_sweep.judge.evaluation import readings_of
-from boulder_sweep.judge.pilot import sampled_columns
+from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.judge.verdict import Limits
-from boulder_sweep.tradeoff.points import Point, Way, mark_front
+from boulder_sweep.tradeoff.points import Method, Point, mark_front
 from boulder_sweep.tradeoff.sample import Sample
 
 if TYPE_CHECKING:
@@ -54,9 +54,9 @@ class Tradeoff:
     sweep
         The sweep.
     points
-        Every way of simulating, in the order they were measured.
+        Every method, in the order they were measured.
     reference_deg
-        By how much the finer solution itself differs from one by twice its step, at most [deg], by readings.
+        Largest difference between the reference solution and one with twice its step [deg], by readings.
     left_out
         Ways for which the time did not suffice.
     """
@@ -64,7 +64,7 @@ class Tradeoff:
     sweep: Sweep
     points: tuple[Point, ...]
     reference_deg: dict[str, float]
-    left_out: tuple[Way, ...]
+    left_out: tuple[Method, ...]
 
     reference_step_ms = 1e3 * REFERENCE_STEP_S
 
@@ -74,19 +74,19 @@ class Tradeoff:
         return self.sweep.model.preset
 
     def best(self, wanted_deg: float, *, error_estimate: bool) -> Point | None:
-        """Return the cheapest way with the readings of the sweep whose largest error keeps to an angle [deg].
+        """Return the cheapest method with the readings of the sweep whose largest error keeps to an angle [deg].
 
         Parameters
         ----------
         wanted_deg
             The angle.
         error_estimate
-            Whether to look among the ways with an error for every design, or among plain steps.
+            Whether to choose among methods that estimate the error of every design, or among plain steps.
         """
         fit = [
             point
             for point in self._own()
-            if (point.way.error_estimate if error_estimate else point.way.is_plain)
+            if (point.method.error_estimate if error_estimate else point.method.is_plain)
             and point.rotation_max_deg <= wanted_deg
             and not point.flips
         ]
@@ -95,7 +95,7 @@ class Tradeoff:
     def recommendation(self) -> list[str]:
         """Return what to use for which accuracy on this grid, and what it costs, in sentences."""
         if not self.points:
-            return ["Nothing was measured in so little time."]
+            return ["Nothing was measured: the time limit was too short."]
         asked = self.sweep.solver.accuracy
         targets = (asked, *TARGETS_DEG) if isinstance(asked, float) else TARGETS_DEG
         by_words: dict[str, list[str]] = {}
@@ -107,10 +107,10 @@ class Tradeoff:
             found.append(
                 "An accuracy given as a number bounds the estimated errors, which are larger than the true ones."
             )
-        sums = [p for p in self._own() if p.way.soil_elements == max(ELEMENTS)]
-        closed = {p.way.step_ms: p.cpu_us for p in self._own() if p.way.is_plain}
+        sums = [p for p in self._own() if p.method.soil_elements == max(ELEMENTS)]
+        closed = {p.method.step_ms: p.cpu_us for p in self._own() if p.method.is_plain}
         if sums:
-            ratio = sums[0].cpu_us / closed[sums[0].way.step_ms]
+            ratio = sums[0].cpu_us / closed[sums[0].method.step_ms]
             found.append(
                 f"Sums over {max(ELEMENTS)} soil elements cost {ratio:,.0f} times the closed form, which is their "
                 f"limit, and are {min(p.rotation_max_deg for p in sums):.1g} deg off it at most: for comparison only."
@@ -119,24 +119,24 @@ class Tradeoff:
 
     def _own(self) -> Iterator[Point]:
         """Yield the points with the readings of the sweep."""
-        return (point for point in self.points if point.way.readings == self.own_readings)
+        return (point for point in self.points if point.method.readings == self.own_readings)
 
     def _advice(self, wanted_deg: float) -> str:
         """Say what to use for an accuracy [deg]."""
         guarded, plain = (self.best(wanted_deg, error_estimate=estimate) for estimate in (True, False))
         if guarded is None:
-            return "none of the steps measured is short enough"
+            return "no measured step is short enough"
         ask = guarded.accuracy or f"{_rounded_up(guarded.estimated_p99_9_deg):g} deg"
         text = (
-            f"use solver: {{accuracy: {ask}}} (steps of {guarded.way.steps}): {guarded.cpu_us:.3g} us a design, "
+            f"use solver: {{accuracy: {ask}}} (steps of {guarded.method.steps}): {guarded.cpu_us:.3g} us a design, "
             f"{_duration(guarded, self.sweep.n_designs)} for this grid on one core, with an error for every design"
         )
         if plain is not None:
-            text += f"; without one, solver: {{step: {plain.way.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
+            text += f"; without one, solver: {{step: {plain.method.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
         return text
 
     def table(self) -> pa.Table:
-        """Return one row for every way."""
+        """Return one row for every method."""
         import pyarrow as pa  # heavy, and the measuring does without it
 
         return pa.Table.from_pylist([point.to_dict() for point in self.points])
@@ -149,7 +149,7 @@ class Tradeoff:
             "reference_step_s": REFERENCE_STEP_S,
             "reference_error_deg": self.reference_deg,
             "points": [point.to_dict() for point in self.points],
-            "left_out": [way._asdict() for way in self.left_out],
+            "left_out": [method._asdict() for method in self.left_out],
             "recommendation": self.recommendation(),
         }
 
@@ -180,7 +180,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
     designs
         Size of the sample. The sample depends on the sweep alone, and so do the errors; the times do not.
     seconds
-        After so much time no further way is begun [s].
+        No new measurement is started after this much time [s].
     tell
         Told what is being measured.
 
@@ -191,8 +191,8 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
     """
     begun = time.monotonic()
     sweep.require_values()
-    table, bed_offset = sampled_columns(sweep, designs)
-    if not table.L.size:
+    sample_designs = sampled_designs(sweep, designs)
+    if not sample_designs.size:
         raise NothingToMeasureError(
             f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
             "the table of a run says why"
@@ -204,45 +204,45 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
     presets = dict(sorted(presets.items(), key=lambda item: item[0] != sweep.model.preset))
 
     points: list[Point] = []
-    left_out: list[Way] = []
+    left_out: list[Method] = []
     references: dict[str, float] = {}
     for name, readings in presets.items():
         if time.monotonic() - begun > seconds:
-            left_out += _ways(name)
+            left_out += _methods(name)
             continue
-        sample = Sample(table, bed_offset, readings, limits, sweep.solver.horizon_s)
+        sample = Sample(sample_designs, readings, limits, sweep.solver.horizon_s)
         if tell is not None:
-            tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {table.L.size:,}")
+            tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {sample_designs.size:,}")
         known = sample.solve(REFERENCE_STEP_S, locate_yield=True)
         twice = sample.solve(2.0 * REFERENCE_STEP_S, locate_yield=True)
         references[name] = _largest_difference_deg(known, twice)
-        for way in _ways(name):
+        for method in _methods(name):
             if time.monotonic() - begun > seconds:
-                left_out.append(way)
+                left_out.append(method)
                 continue
             if tell is not None:
-                tell(f"{name}: {way.soil}, {way.steps}")
-            points.append(sample.measured(way, known, _name_of(way, readings)))
+                tell(f"{name}: {method.soil}, {method.steps}")
+            points.append(sample.measured(method, known, _name_of(method, readings)))
     mark_front(points)
     return Tradeoff(sweep, tuple(points), references, tuple(left_out))
 
 
-def _ways(readings: str) -> Iterator[Way]:
-    """Yield the ways of simulating, cheap ones first."""
-    yield from (Way(readings, 0, step, False, False) for step in STEPS_MS)
-    yield from (Way(readings, 0, step, True, False) for step in STEPS_LOCATED_MS)
-    yield from (Way(readings, 0, step, False, True) for step in STEPS_WITH_ERROR_MS)
-    yield from (Way(readings, 0, step, True, True) for step in STEPS_LOCATED_MS)
-    yield from (Way(readings, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
+def _methods(readings: str) -> Iterator[Method]:
+    """Yield the methods, cheap ones first."""
+    yield from (Method(readings, 0, step, False, False) for step in STEPS_MS)
+    yield from (Method(readings, 0, step, True, False) for step in STEPS_LOCATED_MS)
+    yield from (Method(readings, 0, step, False, True) for step in STEPS_WITH_ERROR_MS)
+    yield from (Method(readings, 0, step, True, True) for step in STEPS_LOCATED_MS)
+    yield from (Method(readings, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
 
 
-def _name_of(way: Way, readings: Readings) -> str:
-    """Name of the accuracy that a way stands for, or nothing."""
-    if way.soil_elements:
+def _name_of(method: Method, readings: Readings) -> str:
+    """Name of the accuracy that a method stands for, or nothing."""
+    if method.soil_elements:
         return ""
-    own = Steps(1e-3 * way.step_ms, way.locate_yield)
+    own = Steps(1e-3 * method.step_ms, method.locate_yield)
     for name, steps in (STEPS if readings.restoring_gravity else STEPS_PRINTED).items():
-        if steps == own and way.error_estimate == (name != "fast"):
+        if steps == own and method.error_estimate == (name != "fast"):
             return name
     return ""
 
@@ -254,7 +254,7 @@ def _largest_difference_deg(one: OutcomeTable, other: OutcomeTable) -> float:
 
 
 def _rounded_up(value: float) -> float:
-    """Round up to one digit."""
+    """Round up to one significant digit."""
     if value <= 0.0:
         return 1e-9
     unit = 10.0 ** math.floor(math.log10(value))

@@ -1,4 +1,4 @@
-"""Work against precision: the error of a sample over the CPU time per design, with what no other way beats."""
+"""Work against precision: the error of a sample over the CPU time per design, with what no other method beats."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def draw_tradeoff(found: Tradeoff, path: str | Path) -> None:
     path
         Picture to write.
     """
-    names = list(dict.fromkeys(point.way.readings for point in found.points))
+    names = list(dict.fromkeys(point.method.readings for point in found.points))
     with figure(path, 5.4 * len(names), 5.0) as fig:
         panels = fig.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
-            _panel(axes, [point for point in found.points if point.way.readings == name])
+            _panel(axes, [point for point in found.points if point.method.readings == name])
             own = " (this file)" if name == found.own_readings else ""
             axes.set_title(f"{WORDS.get(name, name)}{own}")
             axes.set_xlabel("CPU time per design, one core [µs]")
@@ -48,7 +48,7 @@ def draw_tradeoff(found: Tradeoff, path: str | Path) -> None:
 
 
 def _panel(axes: Axes, points: list[Point]) -> None:
-    """Draw the ways of one reading."""
+    """Draw the methods of one reading."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.margins(x=0.12)
@@ -62,9 +62,9 @@ def _panel(axes: Axes, points: list[Point]) -> None:
         linewidth=7.0,
         solid_capstyle="round",
         zorder=1,
-        label="no other way is cheaper and better",
+        label="no other method is cheaper and better",
     )
-    groups = dict.fromkeys((p.way.soil_elements, p.way.error_estimate, p.way.locate_yield) for p in points)
+    groups = dict.fromkeys((p.method.soil_elements, p.method.error_estimate, p.method.locate_yield) for p in points)
     sums = iter(zip(COLOURS, MARKERS, strict=True))
     for group in groups:
         elements, estimate, located = group
@@ -75,16 +75,16 @@ def _panel(axes: Axes, points: list[Point]) -> None:
             colour, marker = (GREEN, "s") if estimate else (BLUE, "o")
             words = "error for each design" if estimate else "closed form"
             words += ", yield located" if located else ""
-        these = [p for p in points if (p.way.soil_elements, p.way.error_estimate, p.way.locate_yield) == group]
+        these = [p for p in points if (p.method.soil_elements, p.method.error_estimate, p.method.locate_yield) == group]
         _way(axes, these, colour, marker, words)
 
 
 def _way(axes: Axes, points: list[Point], colour: str, marker: str, words: str) -> None:
-    """Draw one way over its steps."""
+    """Draw one method over its steps."""
     cost = [p.cpu_us for p in points]
     usual = [max(p.rotation_p99_deg, LEAST_DEG) for p in points]
     largest = [max(p.rotation_max_deg, LEAST_DEG) for p in points]
-    located = points[0].way.locate_yield
+    located = points[0].method.locate_yield
     axes.plot(
         cost,
         usual,
@@ -99,9 +99,9 @@ def _way(axes: Axes, points: list[Point], colour: str, marker: str, words: str) 
     )
     axes.vlines(cost, usual, largest, color=colour, linewidth=0.8, alpha=0.6, zorder=2)
     for point, x, y in zip(points, cost, usual, strict=True):
-        left = not point.way.error_estimate and point.way.step_ms != FIRST_STEP_MS
-        shown = not point.way.error_estimate and point.way.step_ms in NAMED_STEPS_MS[located]
-        text = point.accuracy or (f"{point.way.step_ms:g} ms" if shown else "")
+        left = not point.method.error_estimate and point.method.step_ms != FIRST_STEP_MS
+        shown = not point.method.error_estimate and point.method.step_ms in NAMED_STEPS_MS[located]
+        text = point.accuracy or (f"{point.method.step_ms:g} ms" if shown else "")
         axes.annotate(
             text,
             (x, y),

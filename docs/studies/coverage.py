@@ -12,7 +12,7 @@ import numpy as np
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps
-from boulder_sweep.judge.pilot import sampled_columns
+from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.settings import load
 from docs.studies.random_designs import random_designs
 
@@ -80,7 +80,7 @@ def random_table(count: int, seed: int) -> DesignTable:
 
 def grid_table(path: Path, count: int) -> DesignTable:
     """Return a sample of the designs of a file."""
-    return sampled_columns(load(path), count)[0]
+    return sampled_designs(load(path), count).table
 
 
 def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:

@@ -9,15 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from boulder_kernels import simulate_table
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.tables import Table, number
-from boulder_sweep.designs import DesignBlock
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.judge.evaluation import Evaluation, design_table, evaluation_of
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, PASS
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import PRESETS, PRINTED, SWITCHES, Model, ReadingChoice
 
@@ -208,17 +206,9 @@ def passing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
         chosen = block.design_id() % every == 0
         computable = chosen & (np.asarray(block.reasons.codes) == 0)
         verdict = np.full(len(block), ERROR, dtype=np.int8)
-        verdict[computable] = _judged(evaluation, block, computable)
+        verdict[computable] = evaluation.judged(designs_of(block, computable)).verdict
         passes.append(verdict[chosen] == PASS)
     return np.concatenate(passes)
-
-
-def _judged(evaluation: Evaluation, block: DesignBlock, rows: np.ndarray) -> np.ndarray:
-    """Verdict codes of some rows of a block."""
-    table = design_table(block, rows)
-    outcomes = simulate_table(table, evaluation.readings, evaluation.control)
-    bed_offset = block.columns["bed_offset_m"].to_numpy()[rows]
-    return judge(outcomes, table.L, bed_offset, evaluation.limits).verdict
 
 
 def _verdict(verdict: str, reason: str) -> str:

@@ -12,6 +12,7 @@ from boulder_kernels.table import empty_outcomes, estimate_errors
 from boulder_sweep.judge.verdict import Limits, judge
 from docs.studies.coverage import coverages, grid_table, random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
+from tests.judge.plain import plain_designs
 
 GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
 
@@ -55,7 +56,7 @@ def test_where_only_one_solution_reached_the_limit_the_error_is_infinite() -> No
 def test_nearer_to_the_limit_than_the_error_is_undecided(error: float, verdict: int) -> None:
     out = outcomes([Status.SETTLED.value], [LIMIT - 0.005])
     out.x_v_max[:], out.theta_error[:], out.x_error[:] = 0.5, error, 0.0
-    assert judge(out, np.array([1.65]), np.array([2.9]), Limits(LIMIT, "P1")).verdict[0] == verdict
+    assert judge(out, plain_designs(L=1.65), Limits(LIMIT, "P1")).verdict[0] == verdict
 
 
 def test_no_estimate_unless_asked_for() -> None:

@@ -65,8 +65,7 @@ MUTATIONS = (
         (47,), _MODES, "if modes.touching or not readings.separation_released else 0.0", "if modes.touching else 0.0"
     ),
     Mutation((49,), _WALL, "x = m / c * (v_0 - v) + v_0 * odd", "x = m / c * (v_0 - v)"),
-    Mutation((50,), _WALL, "(a * a + b * b) / (-2.0 * a)", "(a * a - b * b) / (-2.0 * a)"),
-    Mutation((51,), _WALL, "return -2.0 * a * damper, damper", "return -a * damper, damper"),
+    Mutation((50, 51), _WALL, "/ (2.0 * self.damper_N_s_m)", "/ self.damper_N_s_m"),
     Mutation((52,), _DYNAMICS, "s.net * M + couple_moment", "M + couple_moment"),
     Mutation((53, 54, 55), _TRAJECTORY, "+ up * np.sin(theta)", "- up * np.sin(theta)"),
     Mutation((53, 54, 55), _TRAJECTORY, "x_b - along *", "x_b + along *"),

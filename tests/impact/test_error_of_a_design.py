@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import boulder_sweep
+from boulder_sweep.columns import VERDICTS
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.judged import VERDICTS
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings.model import PRESETS
 
@@ -45,4 +45,4 @@ def test_error_is_infinite_where_only_one_solution_reaches_the_limit() -> None:
     found = simulate(between)
     assert found.verdict == VERDICTS[row.verdict[0]]
     assert np.isinf(row.displacement_error_m[0])
-    assert np.isinf(found.judged.displacement_error_m[0])
+    assert np.isinf(found.judged["displacement_error_m"][0])

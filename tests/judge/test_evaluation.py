@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from boulder_kernels import simulate_table
-from boulder_sweep.columns import OUTCOME_COLUMNS
-from boulder_sweep.judge.evaluation import by_kernels, control_of, design_table, evaluation_of, readings_of
-from boulder_sweep.judge.judged import ERROR, VERDICTS
+from boulder_sweep.columns import OUTCOME_COLUMNS, VERDICTS
+from boulder_sweep.judge.evaluation import by_kernels, control_of, evaluation_of, readings_of
+from boulder_sweep.judge.inputs import designs_of
+from boulder_sweep.judge.judged import ERROR
 from boulder_sweep.judge.pilot import accuracy_of
 from tests.runner.grids import grid, partly_impossible, plausible
 
@@ -18,7 +19,7 @@ from tests.runner.grids import grid, partly_impossible, plausible
 def test_the_kernels_get_si_and_radians():
     sweep = grid()
     block = sweep.block(0, sweep.n_designs)
-    table = design_table(block)
+    table = designs_of(block).table
     assert table.phi == pytest.approx(np.radians(block.columns["friction_angle_deg"].to_numpy()))
     assert table.beta == pytest.approx(block.columns["subgrade_reaction_MN_m3"].to_numpy())
     assert table.e_bumper[0] == 0.5
@@ -58,7 +59,7 @@ def test_impossible_rows_never_enter_the_kernels_and_keep_their_place():
         alone = evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(row, row + 1))
         for name in OUTCOME_COLUMNS:
             if name != "reason":
-                assert np.array_equal(getattr(alone, name), getattr(rows, name)[row : row + 1], equal_nan=True)
+                assert np.array_equal(alone[name], rows[name][row : row + 1], equal_nan=True)
         assert alone.reasons[alone.reason[0]] == rows.reasons[rows.reason[row]]
         assert (VERDICTS[alone.verdict[0]] == "error" and bool(block.reasons[row])) == impossible[row]
 
@@ -85,7 +86,7 @@ def test_an_evaluation_is_sent_by_name_not_as_source():
 def test_the_plain_function_is_the_kernel():
     sweep = grid()
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
-    table = design_table(sweep.block(0, 9))
+    table = designs_of(sweep.block(0, 9)).table
     direct = simulate_table(table, evaluation.readings, evaluation.control)
     for one, other in zip(direct, by_kernels(table, evaluation.readings, evaluation.control), strict=True):
         assert np.array_equal(one, other, equal_nan=True)

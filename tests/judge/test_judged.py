@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.judged import REASONS, VERDICTS, joined, not_computed, rows_of
+from boulder_sweep.judge.judged import joined, not_computed
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner.collector import verdict_counts
 from tests.runner.grids import partly_impossible, plausible
@@ -24,9 +24,8 @@ def whole():
 
 
 def equal(one, other) -> bool:
-    return one.reasons == other.reasons and all(
-        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=getattr(one, name).dtype.kind == "f")
-        for name in OUTCOME_COLUMNS
+    return one.words == other.words and all(
+        np.array_equal(one[name], other[name], equal_nan=one[name].dtype.kind == "f") for name in OUTCOME_COLUMNS
     )
 
 
@@ -36,7 +35,7 @@ def test_pieces_joined_are_the_whole_wherever_it_is_cut(whole, data):
     n = len(whole.verdict)
     cuts = sorted(data.draw(st.sets(st.integers(1, n - 1), max_size=6)))
     edges = [0, *cuts, n]
-    pieces = [joined([rows_of(whole, a, b)]) for a, b in pairwise(edges)]
+    pieces = [joined([whole.rows(slice(a, b))]) for a, b in pairwise(edges)]
     assert equal(joined(pieces), whole)
 
 

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from boulder_kernels import OutcomeTable, Status
-from boulder_sweep.columns import OUTCOME_COLUMNS
-from boulder_sweep.judge.judged import RATINGS, REASONS, VERDICTS, Judged
+from boulder_sweep.columns import OUTCOME_COLUMNS, RATINGS, REASONS, VERDICTS
+from boulder_sweep.judge.judged import Judged
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, Limits, judge
-from boulder_sweep.settings.model import RATINGS as RATINGS_IN_FILES
+from tests.judge.plain import plain_designs
 
 LIMIT = math.radians(20.0)
 NAN = math.nan
@@ -44,7 +44,7 @@ def not_simulated(status: Status) -> OutcomeTable:
 
 def judged(outcomes: OutcomeTable, rating: str = "P1") -> Judged:
     n = len(outcomes.status)
-    return judge(outcomes, np.full(n, LENGTH), np.full(n, BED), Limits(LIMIT, rating))
+    return judge(outcomes, plain_designs(n, L=LENGTH, bed_offset=BED), Limits(LIMIT, rating))
 
 
 def only(row: Judged) -> tuple[str, str]:
@@ -53,38 +53,38 @@ def only(row: Judged) -> tuple[str, str]:
 
 
 def test_outcome_columns_are_those_of_the_register():
-    assert Judged._fields == (*OUTCOME_COLUMNS, "reasons")
-    assert RATINGS == RATINGS_IN_FILES == tuple(PENETRATION_LIMITS_M)
+    assert tuple(judged(outcome(Status.SETTLED)).columns) == OUTCOME_COLUMNS
+    assert tuple(PENETRATION_LIMITS_M) == RATINGS
 
 
 @pytest.mark.parametrize("status", [Status.SETTLED, Status.HORIZON])
 def test_pass(status):
     row = judged(outcome(status))
     assert only(row) == ("pass", "")
-    assert row.margin[0] == pytest.approx((LIMIT - 0.1) / LIMIT)
-    assert row.max_rotation_deg[0] == pytest.approx(math.degrees(0.1))
-    assert row.peak_force_kN[0] == 1000.0
-    assert row.penetration_m[0] == pytest.approx(1.0 - BED - LENGTH)
-    assert RATINGS[row.rating[0]] == "P1"
-    assert np.isnan(row.time_to_limit_s[0])
+    assert row["margin"][0] == pytest.approx((LIMIT - 0.1) / LIMIT)
+    assert row["max_rotation_deg"][0] == pytest.approx(math.degrees(0.1))
+    assert row["peak_force_kN"][0] == 1000.0
+    assert row["penetration_m"][0] == pytest.approx(1.0 - BED - LENGTH)
+    assert RATINGS[row["rating"][0]] == "P1"
+    assert np.isnan(row["time_to_limit_s"][0])
 
 
 def test_no_contact_fails_without_any_value():
     row = judged(not_simulated(Status.NO_CONTACT))
     assert only(row) == ("fail", "no_contact")
-    assert row.rating[0] == -1
+    assert row["rating"][0] == -1
     for name in OUTCOME_COLUMNS[2:]:
         if name != "rating":
-            assert np.isnan(getattr(row, name)[0]), name
+            assert np.isnan(row[name][0]), name
 
 
 def test_overturned_fails_whatever_the_penetration():
     row = judged(outcome(Status.LIMIT, theta_max=LIMIT, t_limit=0.08))
     assert only(row) == ("fail", "overturns")
-    assert np.isnan(row.margin[0])
-    assert row.rating[0] == -1
-    assert row.time_to_limit_s[0] == 0.08
-    assert row.penetration_m[0] < 0  # reported, but it decides nothing
+    assert np.isnan(row["margin"][0])
+    assert row["rating"][0] == -1
+    assert row["time_to_limit_s"][0] == 0.08
+    assert row["penetration_m"][0] < 0  # reported, but it decides nothing
 
 
 def test_a_design_exactly_on_the_rotation_limit_overturns():
@@ -101,17 +101,17 @@ def x_v(penetration: float) -> float:
 def test_penetration_beyond_the_required_rating_fails(required, limit):
     beyond = judged(outcome(Status.SETTLED, x_v_max=x_v(limit * 1.01)), required)
     assert only(beyond) == ("fail", "penetration")
-    assert beyond.margin[0] == pytest.approx(-0.01)
+    assert beyond["margin"][0] == pytest.approx(-0.01)
     within = judged(outcome(Status.SETTLED, x_v_max=x_v(limit * 0.99)), required)
     assert only(within) == ("pass", "")
-    assert within.margin[0] == pytest.approx(0.01)
+    assert within["margin"][0] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(
     ("penetration", "rating"), [(-3.0, "P1"), (0.99, "P1"), (1.01, "P2"), (6.9, "P2"), (29.0, "P3"), (31.0, None)]
 )
 def test_rating_is_the_best_that_is_kept(penetration, rating):
-    code = judged(outcome(Status.SETTLED, x_v_max=x_v(penetration)), "P3").rating[0]
+    code = judged(outcome(Status.SETTLED, x_v_max=x_v(penetration)), "P3")["rating"][0]
     assert (RATINGS[code] if code >= 0 else None) == rating
 
 
@@ -139,15 +139,15 @@ def test_a_crossing_is_decided_whatever_its_error():
 def test_without_an_error_estimate_the_verdict_is_unguarded():
     row = judged(outcome(Status.SETTLED, theta_max=np.nextafter(LIMIT, 0.0)))
     assert only(row) == ("pass", "")
-    assert np.isnan(row.rotation_error_deg[0])
+    assert np.isnan(row["rotation_error_deg"][0])
 
 
 @pytest.mark.parametrize("status", list(STATUS_REASONS))
 def test_designs_that_the_kernels_gave_up_are_errors_with_a_reason(status):
     row = judged(not_simulated(status))
     assert only(row) == ("error", STATUS_REASONS[status])
-    assert row.rating[0] == -1
-    assert np.isnan(row.margin[0])
+    assert row["rating"][0] == -1
+    assert np.isnan(row["margin"][0])
 
 
 def test_every_status_is_either_computed_or_has_its_reason():
@@ -158,7 +158,7 @@ def test_every_status_is_either_computed_or_has_its_reason():
 def test_a_result_that_is_not_finite_is_an_error_not_a_pass():
     row = judged(outcome(Status.SETTLED, theta_max=NAN))
     assert only(row) == ("error", NOT_FINITE)
-    assert np.isnan(row.max_displacement_m[0])
+    assert np.isnan(row["max_displacement_m"][0])
 
 
 def test_an_unknown_status_is_an_error():
@@ -211,7 +211,7 @@ def test_vectorised_rules_are_the_plain_ones(table, rating):
     named = result.reasons[len(REASONS) :]
     assert list(named) == sorted(set(named))
     errors = result.verdict == VERDICTS.index("error")
-    assert np.isnan(result.max_rotation_deg[errors]).all()
+    assert np.isnan(result["max_rotation_deg"][errors]).all()
     overturned = np.isin(result.reason, (REASONS.index("overturns"), REASONS.index("no_contact")))
-    assert np.isnan(result.margin[overturned]).all()
-    assert (result.rating[overturned] == -1).all()
+    assert np.isnan(result["margin"][overturned]).all()
+    assert (result["rating"][overturned] == -1).all()

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError
-from boulder_sweep.judge.judged import REASONS, VERDICTS, Judged, not_computed
+from boulder_sweep.judge.judged import Judged, not_computed
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.backends import Backend
 from boulder_sweep.runner.estimate import blocks
@@ -26,12 +27,13 @@ class Rows(NamedTuple):
 def good(block: Rows) -> Judged:
     """Judged rows whose margin is the number of the row."""
     n = block.stop - block.start
-    return not_computed(("x",), np.zeros(n, dtype=int))._replace(
-        verdict=np.zeros(n, dtype=np.int8),
-        reason=np.zeros(n, dtype=np.int32),
-        reasons=REASONS,
-        margin=np.arange(block.start, block.stop, dtype=float),
-    )
+    rows = not_computed(("x",), np.zeros(n, dtype=int))
+    own = {
+        "verdict": np.zeros(n, dtype=np.int8),
+        "reason": np.zeros(n, dtype=np.int32),
+        "margin": np.arange(block.start, block.stop, dtype=float),
+    }
+    return Judged(rows.columns | own, rows.words | {"reason": REASONS})
 
 
 def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, backend="threading"):
@@ -50,7 +52,7 @@ def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, backend="threadi
         n = len(piece.judged.verdict)
         place = slice(piece.start, piece.start + n)
         assert (verdict[place] == -1).all(), "rows came twice"
-        margin[place], verdict[place] = piece.judged.margin, piece.judged.verdict
+        margin[place], verdict[place] = piece.judged["margin"], piece.judged.verdict
         reasons[place] = [piece.judged.reasons[code] for code in piece.judged.reason]
         admission.release(n)
     engine.close()

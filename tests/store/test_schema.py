@@ -11,9 +11,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUT_COLUMNS
+from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUT_COLUMNS, OUTCOME_COLUMNS
 from boulder_sweep.designs import Column, DesignBlock
 from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import Judged
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.store.schema import encode, judged_rows, part_table, table_schema
 from tests.runner.grids import partly_impossible, plausible
@@ -64,19 +65,17 @@ def test_inputs_are_never_written_out_row_by_row(block, judged):
 
 def test_outcomes_come_back(block, judged):
     again = judged_rows(written(block, judged))
-    for name in judged._fields:
-        one, other = getattr(judged, name), getattr(again, name)
-        if name == "reasons":
-            assert one == other
-        else:
-            assert one.dtype == other.dtype
-            assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
+    for name in OUTCOME_COLUMNS:
+        one, other = judged[name], again[name]
+        assert one.dtype == other.dtype
+        assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
+    assert again.words == judged.words
 
 
 def test_a_missing_value_is_null_never_nan(block, judged):
     table = written(block, judged)
-    for name in judged._fields[:-1]:
-        values = getattr(judged, name)
+    for name in OUTCOME_COLUMNS:
+        values = judged[name]
         missing = np.isnan(values) if values.dtype.kind == "f" else values < 0
         assert table[name].null_count == np.count_nonzero(missing)
         if values.dtype.kind == "f":
@@ -135,11 +134,12 @@ def test_tables_pass_the_checks_of_arrow(block, judged):
     reasons = (*judged.reasons, "Böschung zu steil: 35° > 30°", "")
     last = judged.reason.copy()
     last[:2] = len(reasons) - 2, len(reasons) - 1
-    table = part_table(block, judged._replace(reason=last, reasons=reasons), {})
+    changed = Judged(judged.columns | {"reason": last}, judged.words | {"reason": reasons})
+    table = part_table(block, changed, {})
     table.validate(full=True)
     assert table["reason"].slice(0, 2).to_pylist() == ["Böschung zu steil: 35° > 30°", ""]
     for name in ("margin", "penetration_m"):
-        values = getattr(judged, name)
+        values = judged[name]
         assert table[name].equals(pa.chunked_array([pa.array(values, mask=np.isnan(values))])), name
 
 

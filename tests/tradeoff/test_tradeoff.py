@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from boulder_sweep.cli.main import cli, execute
 from boulder_sweep.settings import load
-from boulder_sweep.tradeoff.points import Point, Way, mark_front
+from boulder_sweep.tradeoff.points import Method, Point, mark_front
 from boulder_sweep.tradeoff.study import TARGETS_DEG, Tradeoff, measure
 from tests.runner.grids import grid
 
@@ -26,9 +26,9 @@ def found() -> Tradeoff:
 
 
 def test_every_representation_step_and_reading_is_there(found: Tradeoff) -> None:
-    ways = {point.way for point in found.points}
-    assert {way.readings for way in ways} == {"corrected", "as_printed"}
-    assert {way.soil_elements for way in ways} == {0, 50, 200, 1000, 5000}
+    methods = {point.method for point in found.points}
+    assert {method.readings for method in methods} == {"corrected", "as_printed"}
+    assert {method.soil_elements for method in methods} == {0, 50, 200, 1000, 5000}
     assert not found.left_out
     assert all(point.cpu_us > 0.0 for point in found.points)
     assert {point.accuracy for point in found.points} == {"", "fast", "balanced", "fine"}
@@ -39,9 +39,13 @@ def test_errors_are_ordered_and_fall_with_the_step(found: Tradeoff) -> None:
         assert 0.0 <= point.rotation_rms_deg <= point.rotation_max_deg
         assert point.rotation_p99_deg <= point.rotation_max_deg
         assert point.displacement_p99_m <= point.displacement_max_m
-    plain = [p for p in found.points if p.way.is_plain and p.way.readings == "corrected"]
+    plain = [p for p in found.points if p.method.is_plain and p.method.readings == "corrected"]
     assert plain[0].rotation_max_deg > 100 * plain[-1].rotation_max_deg
-    sums = [p for p in found.points if p.way.readings == "corrected" and p.way.step_ms == 2.0 and p.way.soil_elements]
+    sums = [
+        p
+        for p in found.points
+        if p.method.readings == "corrected" and p.method.step_ms == 2.0 and p.method.soil_elements
+    ]
     assert [p.rotation_rms_deg for p in sums] == sorted((p.rotation_rms_deg for p in sums), reverse=True)
 
 
@@ -66,8 +70,8 @@ def test_the_best_way_keeps_to_what_is_wanted(found: Tradeoff) -> None:
 
 def test_front_holds_what_nothing_beats() -> None:
     def point(cost: float, error: float, readings: str = "corrected") -> Point:
-        way = Way(readings, 0, 1.0, False, False)
-        return Point(way, "", 1, cost, error, error, error, 0.0, 0.0, 0.0, 0, 0, 0, 0.0, 1.0)
+        method = Method(readings, 0, 1.0, False, False)
+        return Point(method, "", 1, cost, error, error, error, 0.0, 0.0, 0.0, 0, 0, 0, 0.0, 1.0)
 
     points = [point(1, 1e-2), point(2, 1e-3), point(3, 2e-3), point(3, 1e-9, "as_printed")]
     mark_front(points)

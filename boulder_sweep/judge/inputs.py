@@ -1,0 +1,85 @@
+"""Designs as the judge takes them: in the units of the kernels, with what only the verdict asks for beside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from boulder_kernels import DesignTable
+
+if TYPE_CHECKING:
+    from boulder_sweep.designs import DesignBlock
+
+_SOURCES = {
+    "L": "boulder_length_m",
+    "W": "boulder_width_m",
+    "H": "boulder_height_m",
+    "rho_b": "boulder_density_kg_m3",
+    "d": "embedment_depth_m",
+    "e": "impact_height_m",
+    "rho_s": "soil_density_kg_m3",
+    "phi": "friction_angle_deg",
+    "beta": "subgrade_reaction_MN_m3",
+    "K_epsilon": "strain_rate_factor",
+    "m_v": "vehicle_mass_kg",
+    "v_0": "impact_speed_m_s",
+    "k_v": "vehicle_spring_N_m",
+    "c_v": "vehicle_damper_N_s_m",
+    "e_bumper": "bumper_height_m",
+}
+"""Column of the table that each field of a `DesignTable` comes from; only the angle changes its unit."""
+
+
+class Designs(NamedTuple):
+    """Designs that can be computed, n of them."""
+
+    table: DesignTable
+    """What the kernels simulate: contiguous float64 arrays of shape (n,); SI, phi in rad, beta in MN/m^3."""
+    bed_offset: np.ndarray
+    """Distance from the front bumper to the leading edge of the cargo bed [m], shape (n,)."""
+
+    @property
+    def size(self) -> int:
+        """Number of designs."""
+        return len(self.bed_offset)
+
+    def rows(self, chosen: np.ndarray | slice) -> Designs:
+        """Return some of the designs, chosen by a mask, by their places or by a slice."""
+        table = DesignTable(*(np.ascontiguousarray(column[chosen]) for column in self.table))
+        return Designs(table, self.bed_offset[chosen])
+
+
+def designs_of(block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
+    """Return the designs of a block.
+
+    Parameters
+    ----------
+    block
+        Inputs of n rows under the names and units of the table.
+    rows
+        Which of them (bool, shape (n,)); all by default.
+    """
+    columns = {field: _values(block, source, rows) for field, source in _SOURCES.items()}
+    columns["phi"] = np.radians(columns["phi"])
+    return Designs(DesignTable(**columns), _values(block, "bed_offset_m", rows))
+
+
+def put_together(pieces: Sequence[Designs]) -> Designs:
+    """Return the designs of several pieces as one; none where there are no pieces."""
+    if not pieces:
+        return Designs(DesignTable(*(np.empty(0) for _ in DesignTable._fields)), np.empty(0))
+    columns = zip(*(piece.table for piece in pieces), strict=True)
+    table = DesignTable(*(np.concatenate(column) for column in columns))
+    return Designs(table, np.concatenate([piece.bed_offset for piece in pieces]))
+
+
+def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:
+    """Values of one input column, one a row."""
+    column = block.columns[name]
+    if rows is None:
+        values = column.to_numpy()
+    else:
+        values = column.values[rows] if column.codes is None else column.values[column.codes[rows]]
+    return np.ascontiguousarray(values, dtype=np.float64)
