@@ -99,7 +99,7 @@ def test_time_runs_out_gracefully(tmp_path: Path) -> None:
     found = measure(grid(), designs=40, seconds=0.0)
     assert not found.points
     assert found.left_out
-    assert found.recommendation() == ["Nothing was measured in so little time."]
+    assert found.recommendation() == ["Nothing was measured: the time limit was too short."]
     assert found.write(tmp_path) == []
     assert list(tmp_path.iterdir()) == []
 
