@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from boulder_sweep.columns import OUTCOMES
+from boulder_sweep.columns import OUTCOMES, RATINGS
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
-from boulder_sweep.settings.model import CLOSED_FORM, RATINGS, Criterion, SolverSettings
+from boulder_sweep.settings.model import CLOSED_FORM, Criterion, SolverSettings
 from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.units import EXPECTED
 

@@ -141,9 +141,9 @@ def test_verdict_is_that_of_a_row_of_a_sweep() -> None:
             assert found["time_to_limit_s"] == pytest.approx(row.time_to_limit_s[0], abs=1e-6)
         elif found["reason"] == "":
             for name in ("margin", "max_rotation_deg", "max_displacement_m", "peak_force_kN", "penetration_m"):
-                assert found[name] == pytest.approx(getattr(row, name)[0], rel=1e-6), name
+                assert found[name] == pytest.approx(row[name][0], rel=1e-6), name
             for name in ("rotation_error_deg", "displacement_error_m"):
-                assert found[name] == pytest.approx(getattr(row, name)[0], rel=1e-3), name
+                assert found[name] == pytest.approx(row[name][0], rel=1e-3), name
 
 
 def test_a_design_may_be_a_file_a_mapping_or_a_row_of_a_table(tmp_path: Path) -> None:

@@ -138,13 +138,6 @@ def test_rows_outside_of_the_grid(load_it, example, start, stop):
         load_it(example).block(start, stop)
 
 
-def test_impact_height():
-    """Eq 9: halfway up the face that truck and boulder share; the paper's own heights follow from it."""
-    height, depth = np.array([3.44, 2.2, 2.2]), np.array([2.03, 1.2, 1.2])
-    bumper, hood = np.array([0.5, 0.508, 0.5]), np.array([1.4, 1.4, 0.8])
-    assert impact_height_of_face(height, depth, bumper, hood) == pytest.approx([0.95, 0.754, 0.65])
-
-
 def test_an_empty_block(load_it, example):
     block = load_it(example).block(7, 7)
     assert len(block) == 0
