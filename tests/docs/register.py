@@ -102,6 +102,7 @@ def _resolve(name: str) -> Any:
 
 def _documentation(name: str, function: Any) -> str:
     """Docstrings of a function, its class and its module, and the comments and fields of what it returns."""
+    function = function.fget if isinstance(function, property) else function
     plain = getattr(function, "py_func", function)
     module: ModuleType | None = inspect.getmodule(plain)
     assert module is not None, name

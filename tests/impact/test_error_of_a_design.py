@@ -29,8 +29,8 @@ def test_error_is_estimated_also_where_the_step_is_shortened(preset: str, change
     assert found["verdict"] == VERDICTS[row.verdict[0]]
     assert found["rotation_error_deg"] > 0.0
     # A row stops at the limit and may take longer steps; each is known to within its own error.
-    apart = abs(found["max_rotation_deg"] - row.max_rotation_deg[0])
-    assert apart <= found["rotation_error_deg"] + row.rotation_error_deg[0]
+    apart = abs(found["max_rotation_deg"] - row["max_rotation_deg"][0])
+    assert apart <= found["rotation_error_deg"] + row["rotation_error_deg"][0]
 
 
 def test_error_is_infinite_where_only_one_solution_reaches_the_limit() -> None:
@@ -44,5 +44,5 @@ def test_error_is_infinite_where_only_one_solution_reaches_the_limit() -> None:
     row = evaluation_of(between, accuracy_of(between))(between.block(0, 1))
     found = simulate(between)
     assert found.verdict == VERDICTS[row.verdict[0]]
-    assert np.isinf(row.displacement_error_m[0])
+    assert np.isinf(row["displacement_error_m"][0])
     assert np.isinf(found.judged["displacement_error_m"][0])

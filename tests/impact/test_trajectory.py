@@ -138,7 +138,7 @@ def test_verdict_is_that_of_a_row_of_a_sweep() -> None:
         assert found["verdict"] == VERDICTS[row.verdict[0]]
         assert found["reason"] == REASONS[row.reason[0]]
         if found["reason"] == "overturns":
-            assert found["time_to_limit_s"] == pytest.approx(row.time_to_limit_s[0], abs=1e-6)
+            assert found["time_to_limit_s"] == pytest.approx(row["time_to_limit_s"][0], abs=1e-6)
         elif found["reason"] == "":
             for name in ("margin", "max_rotation_deg", "max_displacement_m", "peak_force_kN", "penetration_m"):
                 assert found[name] == pytest.approx(row[name][0], rel=1e-6), name
@@ -230,7 +230,6 @@ def test_parquet_holds_units_meanings_and_settings(trajectories: Trajectories, t
     assert table["rotation_rad"].to_numpy() == pytest.approx(t.rotation_rad, abs=0)
     settings = json.loads(table.schema.metadata[b"boulder_sweep.settings"])
     assert settings["model"]["preset"] == "corrected"
-    assert json.loads(t.to_json()) == t.summary()
 
 
 def test_crash_tests_are_those_of_the_settings_files() -> None:
