@@ -8,11 +8,11 @@ from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import CHECK_EXAMPLES, set_option
 
 
-@click.command(short_help="Check a file: every mistake at once, with its line.", epilog=CHECK_EXAMPLES)
+@click.command(short_help="Check a file: all mistakes at once, with their lines.", epilog=CHECK_EXAMPLES)
 @click.argument("grid", type=click.Path())
 @set_option
 def check(grid: str, overrides: tuple[str, ...]) -> int:
-    """Check GRID without simulating: every mistake at once, with file, line and column."""
+    """Check GRID without simulating: all mistakes at once, with file, line and column."""
     from boulder_sweep.cli import console
 
     sweep = load_sweep(grid, overrides, quiet=False)

@@ -1,4 +1,4 @@
-"""Settings loaded as every command does."""
+"""Load settings the way every command does."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
-    """Load settings and show the remarks on them."""
+    """Load settings and print the notes on them."""
     from boulder_sweep.cli.console import say
     from boulder_sweep.settings import load
 

@@ -1,4 +1,4 @@
-"""The command ``sweep``: parse, call, print. It calls the Python interface and adds nothing of its own."""
+"""The command ``sweep``: parse, call, print. All work is done by the Python interface."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import NoReturn
 
 import click
 
-# Every module of a command imports what is heavy (numba, pandas, pyarrow, even numpy) inside its function:
-# `sweep --help` and `sweep check` answer at once.
+# Every module of a command imports heavy packages (numba, pandas, pyarrow, even numpy) inside its function, so that
+# `sweep --help` and `sweep check` are instant.
 from boulder_sweep.cli.check import check
 from boulder_sweep.cli.explain import explain
 from boulder_sweep.cli.fit_vehicle import fit_vehicle
@@ -26,13 +26,13 @@ from boulder_sweep.errors import EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepErro
 COMMANDS = (run, check, simulate, status, plot, explain, tradeoff, validate, fit_vehicle)
 """In the order of ``sweep --help``."""
 EXIT_INTERRUPTED = 130
-REPORT = "this is a mistake in boulder-sweep, not in your file; please report it with command and file"
+REPORT = "this is a bug in boulder-sweep, not in your file; please report it with the command and the file"
 
 
 @click.group(cls=OrderedGroup, epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
 @version_option
 def cli() -> None:
-    """Tell which boulder, buried how deep in which soil, stops a truck.
+    """Find out which boulder, buried how deep in which soil, stops a truck.
 
     A file describes boulders, soils and a vehicle as ranges of values. `sweep run` simulates every
     combination and writes one table with a verdict for each.
@@ -63,7 +63,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        # Not cli.main(): it would replace an interruption by an exception without the signal and the message.
+        # Not cli.main(): it would replace an interruption with an exception that lacks the signal and the message.
         with cli.make_context("sweep", words) as context:
             code = cli.invoke(context)
         sys.stdout.flush()
@@ -74,7 +74,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
         error.show()
         return EXIT_WRONG_USE
     except BrokenPipeError:
-        # The reader of our output has gone (sweep status ... | head); keep Python from reporting it at exit.
+        # The reader of the output has gone (sweep status ... | head); keep Python from reporting it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Interrupted as stop:

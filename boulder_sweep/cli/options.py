@@ -12,9 +12,9 @@ Command = Callable[..., Any]
 
 # "\b" tells click to keep the lines of a paragraph as they are.
 GROUP_EPILOG = """\b
-Begin with:
-  sweep check configs/m30_sizing.yaml     is the file right, how many designs are in it?
-  sweep run configs/m30_sizing.yaml       simulate them all into the folder m30-sizing.sweep
+Start with:
+  sweep check configs/m30_sizing.yaml     is the file valid, how many designs has it?
+  sweep run configs/m30_sizing.yaml       simulate them all into m30-sizing.sweep
   sweep simulate configs/rwg.yaml         one design with its time history
 
 \b

@@ -1,4 +1,4 @@
-"""Checks that need more than one entry: what is missing, what contradicts, what excludes each other."""
+"""Checks across entries: what is missing, contradictory or mutually exclusive."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from boulder_sweep.settings.model import SolverSettings
 
 
 def check_complete(entries: Entries) -> None:
-    """Report what is required and missing, what is given twice, and axes beside a table."""
+    """Report missing entries, entries given twice, and axes beside a table."""
     listed = set() if entries.table is None else set(entries.table.columns)
-    # What a table lacks that could not be read is unknown.
+    # What a table that could not be read may contain is unknown.
     unread_table = entries.root.get("table") is not None and entries.table is None
     present = {field.path for field in fields.INPUTS if field.name in listed} | entries.given
     for field in fields.INPUTS:
@@ -23,7 +23,7 @@ def check_complete(entries: Entries) -> None:
     if entries.root.get("table") is not None:
         for name, leaf in entries.leaves.items():
             if leaf.is_axis:
-                message = "takes one value beside a table; lists and ranges are axes of a grid"
+                message = "must be one value beside a table; lists and ranges are axes of a grid"
                 entries.problems.add(leaf.place, fields.BY_NAME[name].path, message)
 
 
@@ -38,7 +38,7 @@ def _check_embedment(entries: Entries, present: set[str], unread_table: bool) ->
 
 
 def check_pairs(entries: Entries) -> None:
-    """Report single values that contradict each other; those of axes and tables are told row by row."""
+    """Report contradictory single values; those of axes and tables are reported row by row in the result."""
     bumper, hood = entries.single("bumper_height_m"), entries.single("hood_height_m")
     if bumper is not None and hood is not None and hood < bumper:
         key = "hood_height" if "vehicle.hood_height" in entries.given else "bumper_height"

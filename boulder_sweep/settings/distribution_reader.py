@@ -18,7 +18,7 @@ from boulder_sweep.settings.tree import Mapping, Node, Scalar
 T = TypeVar("T")
 _CENTRES = ("mean", "characteristic")
 _SPREADS = ("sd", "cov")
-_NEEDED = {
+NEEDED = {
     "normal": (_CENTRES, _SPREADS),
     "lognormal": (_CENTRES, _SPREADS),
     "uniform": (("low",), ("high",)),
@@ -122,7 +122,7 @@ def _kind(node: Mapping) -> str:
 
 def _check_keys(node: Mapping, kind: str) -> None:
     """Report keys that are unknown, do not belong to this kind, are missing or exclude each other."""
-    taken = {"distribution", "low", "high", *(key for group in _NEEDED[kind] for key in group)}
+    taken = {"distribution", "low", "high", *(key for group in NEEDED[kind] for key in group)}
     mistakes = []
     for entry in node:
         if entry.key not in taken:
@@ -130,7 +130,7 @@ def _check_keys(node: Mapping, kind: str) -> None:
             known = ", ".join(key for key in _KEYS if key in taken)
             message = f"'{shorten(entry.key)}' is not a key of a {kind} distribution ({known}){hint}"
             mistakes.append(Mistake(entry.place, message))
-    for group in _NEEDED[kind]:
+    for group in NEEDED[kind]:
         given = [key for key in group if key in node.entries]
         if len(given) > 1:
             mistakes.append(Mistake(node.entries[given[1]].place, f"give {' or '.join(group)}, not both"))

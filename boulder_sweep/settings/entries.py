@@ -1,4 +1,4 @@
-"""The entries of a file, read block by block; after a mistake reading goes on with the next entry."""
+"""Read the entries of a file block by block; after a mistake reading goes on with the next entry."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TOP_KEYS = ("name", *fields.SECTIONS, "table")
 
 
 class Entries:
-    """What a file gives, as far as it can be read.
+    """What a file says, as far as it can be read.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Entries:
         if not isinstance(node, Scalar) or not node.text.strip():
             self.problems.add(node.place, "table", "must be the name of a .csv or .parquet file")
             return
-        # A name in the file is meant from the file's folder, one typed behind --set from where one stands.
+        # A name in the file is relative to the file's folder, one given by --set to the current directory.
         folder = self.path.parent if node.place.file == str(self.path) else Path()
         self.table = read_table(node, folder, self.problems)
 
@@ -95,7 +95,7 @@ class Entries:
                     self.problems.add(mistake.place, field.path, mistake.message)
 
     def _unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
-        """Report a key nobody knows, with the nearest one that is known."""
+        """Report an unknown key, with the nearest known one."""
         word = entry.key.lower()
         synonym = next((field.key for field in fields.fields_of(section) if word in field.also), None)
         meant = synonym or (None if self.problems.full else nearest(entry.key, known))
@@ -109,11 +109,11 @@ class Entries:
             if other is not None:
                 hint = f"; {other.key} belongs under {other.section}"
             elif word[:1].isdigit():
-                hint = "; if it is the rest of a number, write a decimal point in place of the comma"
-        where = f"under {section}" if section else "at the top level"
+                hint = "; for a list, use brackets; for the rest of a number, use a decimal point in place of the comma"
+        where = section or "the file"
         name = shorten(entry.key) or "(empty)"
         path = f"{section}.{name}" if section else name
-        self.problems.add(entry.place, path, f"is not known {where} (known: {', '.join(known)}){hint}")
+        self.problems.add(entry.place, path, f"is not a key of {where} (keys: {', '.join(known)}){hint}")
 
     def single(self, name: str) -> float | None:
         """Return the single value of a quantity, its default where it has one, None for axes and tables."""

@@ -4,8 +4,8 @@ The reader, the checks, the tables of the documentation and the JSON Schema for 
 and meaning of an input that is a column of the result come from the register of columns.
 
 The admitted range is wide: at least a million times either side of what is normal wherever a material or
-mechanical constant is concerned. Beyond it a value is a slip of the pen and refused. Outside the usual range a
-value is computed as given, with a note.
+mechanical constant is concerned. A value beyond it is a typing mistake and refused. A value outside the usual range
+is computed as given, with a note.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ def read_leaf(node: Node, field: Field) -> Leaf:
     if not items:
         raise LeafError([Mistake(node.place, "the list is empty; give at least one value")])
     if len(items) > MAX_AXIS:
-        raise LeafError([Mistake(node.place, f"{len(items)} values are too many; an axis takes {MAX_AXIS}")])
+        raise LeafError([Mistake(node.place, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")])
     quantities = _read_all(items, field, node.unit if isinstance(node, Sequence) else None)
     values = _checked(quantities, items, field)
     return Leaf(np.array(values), isinstance(node, Sequence), node.place)
@@ -147,7 +147,7 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
     if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:
         bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.has_unit)
         text = shorten(bare.text) if isinstance(bare, Scalar) else ""
-        message = f"'{text}' has no unit while its neighbours have one; give a unit to all or to none"
+        message = f"'{text}' has no unit while the others have one; give all of them a unit, or none"
         mistakes[message] = Mistake(bare.place, message)
     if mistakes:
         raise LeafError(list(mistakes.values()))
@@ -207,29 +207,29 @@ def _check_range_keys(node: Mapping) -> None:
 def _count_of_count(first: Fraction, last: Fraction, node: Node) -> int:
     count = read_count(node, "count", MAX_AXIS)
     if count == 1 and first != last:
-        raise NumberError("count 1 cannot hold both ends of the range; give a count of 2 or more, or one value")
+        raise NumberError("a count of 1 cannot hold both ends of the range; give a count of 2 or more, or one value")
     return count
 
 
 def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str) -> int:
     """Return how many values the steps make; the last one must be the end of the range, exactly."""
     if step == 0:
-        raise NumberError("a step of 0 never arrives")
+        raise NumberError("step must not be 0")
     steps = (last - first) / step
     if steps < 0:
         way = "downwards" if last < first else "upwards"
         raise NumberError(
-            f"the range goes {way} and the step does not; exchange from and to, or change the sign of the step"
+            f"the range goes {way} and the step does not; swap from and to, or change the sign of the step"
         )
     if steps >= MAX_AXIS:
-        raise NumberError(f"this makes more than {MAX_AXIS} values, the most for one axis; take a larger step")
+        raise NumberError(f"this gives more than {MAX_AXIS} values, the limit for one axis; use a larger step")
     if steps.denominator != 1:
         below = first + math.floor(steps) * step
         above = below + step
         raise NumberError(
-            f"steps of {describe(float(step), unit)} from {describe(float(first), unit)} do not arrive at "
-            f"{describe(float(last), unit)} but at {describe(float(below), unit)} and then "
-            f"{describe(float(above), unit)}; write one of these behind 'to', or use count"
+            f"steps of {describe(float(step), unit)} from {describe(float(first), unit)} do not end at "
+            f"{describe(float(last), unit)} but at {describe(float(below), unit)} or "
+            f"{describe(float(above), unit)}; use one of these for 'to', or give count"
         )
     return int(steps) + 1
 

@@ -1,4 +1,4 @@
-"""From a file to a checked sweep, with every mistake reported at once."""
+"""Load a file as a checked sweep; every mistake is reported at once."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAX_DESIGNS = 2**63 - 1
 """Most designs of a sweep: ``design_id`` is a 64-bit number."""
 
 Part = TypeVar("Part", Criterion, Model, SolverSettings)
-_NAME = re.compile(r"\w[\w .+-]{0,79}")
+NAME = re.compile(r"\w[\w .+-]{0,79}")
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
@@ -73,16 +73,14 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
 
 
 def _read_name(entries: Entries) -> str:
-    """Return the name of the sweep; it also names files, so its signs are few."""
+    """Return the name of the sweep; it also names files, so few characters are allowed."""
     default = re.sub(r"[^\w.+-]+", "-", entries.path.stem).strip("-.")[:80] or "sweep"
     node = entries.root.get("name")
     if node is None:
         return default
-    if isinstance(node, Scalar) and _NAME.fullmatch(node.text):
+    if isinstance(node, Scalar) and NAME.fullmatch(node.text):
         return node.text
-    entries.problems.add(
-        node.place, "name", "must be up to 80 letters, digits, spaces and the signs - _ . +, as in m30-sizing"
-    )
+    entries.problems.add(node.place, "name", "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing")
     return default
 
 

@@ -1,4 +1,4 @@
-"""Remarks on settings that are valid and yet worth a second look. They never stop a run."""
+"""Notes on settings that are valid but deserve a second look. They never stop a run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TERZAGHI_ANGLES, _TERZAGHI = np.array([30.0, 35.0, 40.0]), np.array([2.2, 6.6, 
 
 
 def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
-    """Yield a remark for every unrealistic value and for data that do not belong together.
+    """Yield a note for every unusual value and for data that do not belong together.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
             yield _note(places[name], BY_NAME[name].path, message)
     for axis in sweep.axes:
         if len(np.unique(axis.values)) < len(axis.values):
-            yield _note(places[axis.name], BY_NAME[axis.name].path, "holds a value more than once")
+            yield _note(places[axis.name], BY_NAME[axis.name].path, "contains a value more than once")
     limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
     if usual is not None and limit > usual.high:
         remark = usual.remark
@@ -59,7 +59,7 @@ def _note(place: Place, key: str, message: str) -> Problem:
 
 
 def _unrealistic(name: str, values: np.ndarray) -> str:
-    """Return a remark if a value lies outside the range met in practice."""
+    """Return a note if a value lies outside the range met in practice."""
     usual, unit = BY_NAME[name].usual, BY_NAME[name].unit
     if usual is None:
         return ""
@@ -73,7 +73,7 @@ def _unrealistic(name: str, values: np.ndarray) -> str:
 
 
 def _mixed_families(sweep: Sweep, angle: np.ndarray, reaction: np.ndarray) -> str:
-    """Return a remark if some soils follow Terzaghi's values and others those of the API curve."""
+    """Return a note if some soils follow Terzaghi's values and others the API curve."""
     if sweep.table is not None and len(angle) > 1 and len(reaction) > 1:
         pairs = angle, reaction
     else:

@@ -1,4 +1,4 @@
-"""Numbers as engineers write them: a plain decimal number, with or without a unit behind it.
+"""Numbers as engineers write them: a plain decimal number, with or without a unit after it.
 
 A number is kept as an exact fraction of its decimal digits, so that ``0.40 + 15 * 0.02`` is 0.70 to the bit.
 """
@@ -16,16 +16,17 @@ from boulder_sweep.settings.units import EXPECTED, UnitError, factor
 _NUMBER = re.compile(r"([+-]?)(\d*)(?:\.(\d*))?(?:[eE]([+-]?\d+))?", re.ASCII)
 _YES_NO = frozenset({"true", "false", "yes", "no", "on", "off", "y", "n"})
 _NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)\b.*", re.IGNORECASE)
+_FEET_AND_INCHES = re.compile(r"[+-]?[\d.]+\s*['′](?!\d{3}).*|[+-]?[\d.]+\s*(\"|″|'')")
 _MAX_DIGITS = 40
 _MAX_EXPONENT = 300
 
 
 class NumberError(ValueError):
-    """Not a number of the kind that is asked for; the message says what is allowed."""
+    """Not the kind of number that is needed; the message says what is allowed."""
 
 
 class Quantity(NamedTuple):
-    """An exact number in the unit of the table, and whether a unit was written behind it."""
+    """An exact number in the unit of the table, and whether it was given with a unit."""
 
     value: Fraction
     has_unit: bool
@@ -41,7 +42,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Qu
     unit : str
         Unit of the table; the unit of a bare number.
     outer_unit : Scalar, optional
-        Unit written behind the bracket of the list the number stands in.
+        Unit after the bracket of the list that holds the number.
 
     Raises
     ------
@@ -50,7 +51,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Qu
     """
     if not isinstance(node, Scalar):
         kind = "a list" if isinstance(node, Sequence) else "a block"
-        raise NumberError(f"{kind} stands where one number is needed")
+        raise NumberError(f"one number is needed here, not {kind}")
     number, unit_text = split_number(node.text, unit)
     if outer_unit is not None:
         if unit_text:
@@ -81,7 +82,7 @@ def split_number(text: str, unit: str) -> tuple[Fraction, str]:
     if not stripped or stripped in ("~", "null", "Null", "NULL"):
         raise NumberError(f"is empty; {needed}")
     if stripped.lower() in _YES_NO:
-        raise NumberError(f"{quoted} is a yes/no word; {needed}")
+        raise NumberError(f"{quoted} is a yes/no value; {needed}")
     if _NOT_FINITE.fullmatch(stripped):
         raise NumberError(f"{quoted} is not a finite number; {needed}")
     match = _NUMBER.match(stripped)
@@ -92,17 +93,21 @@ def split_number(text: str, unit: str) -> tuple[Fraction, str]:
     if whole == "0" and rest[:1].lower() in ("x", "o", "b"):
         raise NumberError(f"{quoted} is not a decimal number; {needed}")
     if len(whole) > 1 and whole.startswith("0"):
-        raise NumberError(f"{quoted} begins with a zero, which some programs read as an octal number; write it without")
+        raise NumberError(f"{quoted} begins with a zero, which some programs read as octal; remove the zero")
+    if _FEET_AND_INCHES.fullmatch(stripped):
+        raise NumberError(f"{quoted} is in feet and inches; write one number, such as 5.5 ft or 66 in")
+    if re.match(r"\s*[,;]\s+\d", rest) or rest[:1] == ";":
+        raise NumberError(f"{quoted} is not one number; write a list in brackets, such as [34, 38] deg")
     if rest[:1] in (",", "_", "'", ".") or re.match(r"\s+\d", rest):
         raise NumberError(
-            f"{quoted} is not a plain number; write a decimal point and no signs between the thousands, as in 6800.5"
+            f"{quoted} is not a plain number; use a decimal point and no thousands separators, as in 6800.5"
         )
     if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
         raise NumberError(f"{quoted} is not one number; {needed}, or a range {{from: ..., to: ..., count: ...}}")
     digits = whole + (decimals or "")
     power = _MAX_EXPONENT + 1 if len(exponent or "") > 9 else int(exponent or 0)
     if len(digits) > _MAX_DIGITS or abs(power) > _MAX_EXPONENT:
-        raise NumberError(f"{quoted} has too many digits or too large an exponent for a number of this world")
+        raise NumberError(f"{quoted} has too many digits or too large an exponent")
     value = Fraction(int(digits)) * Fraction(10) ** (power - len(decimals or ""))
     return (-value if sign == "-" else value), rest.strip()
 
@@ -120,7 +125,7 @@ def read_count(node: Node, what: str, largest: int) -> int:
         if value <= largest:
             return value
     shown = f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
-    raise NumberError(f"{shown} is not possible here; {what} is a whole number from 1 to {largest}")
+    raise NumberError(f"{shown} is not valid; {what} must be a whole number from 1 to {largest}")
 
 
 def describe(value: float, unit: str) -> str:

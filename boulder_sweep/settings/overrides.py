@@ -1,4 +1,4 @@
-"""``--set KEY=VALUE``: single entries put into the tree in place of what the file says."""
+"""``--set KEY=VALUE``: replace single entries of the file."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _ALTERNATIVES = {
     "solver.accuracy": "step",
     "solver.step": "accuracy",
 }
-"""Setting the one takes the other away, since a file holds only one of them."""
+"""Setting one removes the other, since a file holds only one of them."""
 
 OPTIONS = {"--accuracy": "solver.accuracy"}
-"""Options of their own that set an entry: a mistake in one is said to stand there, not in a ``--set``."""
+"""Options that set an entry: a mistake is reported for the option, not for ``--set``."""
 
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""
@@ -45,7 +45,7 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
             problems.add(place, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
             continue
         if len(text) > MAX_OVERRIDE:
-            problems.add(place, name, f"is longer than {MAX_OVERRIDE} characters; write it into the file")
+            problems.add(place, name, f"is longer than {MAX_OVERRIDE} characters; put it into the file")
             continue
         value = _read_value(value_text, name, place, problems)
         if value is not None:
@@ -67,7 +67,7 @@ def _read_value(text: str, name: str, place: Place, problems: ProblemList) -> No
 
 
 def _move(node: Node, place: Place) -> None:
-    """Give a whole tree the place of its option: a line within an option tells nobody anything."""
+    """Give a whole tree the place of its option: a line number within an option means nothing."""
     node.place = place
     if isinstance(node, Scalar):
         return

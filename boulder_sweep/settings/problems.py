@@ -1,4 +1,4 @@
-"""Mistakes in a settings file: where each one is and what would be right instead."""
+"""Problems in a settings file: where each one is and what is allowed instead."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from boulder_sweep.errors import BoulderSweepError
 
 MAX_REPORTED = 100
-"""Most problems reported at once; a longer list helps nobody and a hostile file could make it endless."""
+"""Most problems reported at once: a longer list does not help, and a hostile file could make it endless."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One mistake, or one remark, about a file of settings.
+    """One mistake in a settings file, or one note on it.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class SettingsError(BoulderSweepError):
         return str(self)
 
     def __reduce__(self) -> tuple[type[SettingsError], tuple[list[Problem]]]:
-        """Pickle by the problems, so that the error survives the way between processes."""
+        """Pickle by the problems, so that the error can pass between processes."""
         return type(self), (self.problems,)
 
 
@@ -113,7 +113,7 @@ class ProblemList:
 
 
 def shorten(text: str, limit: int = 60) -> str:
-    """Return text fit for quoting in a message: one line, printable, not longer than `limit`."""
+    """Return text that can be quoted in a message: one line, printable, not longer than `limit`."""
     flat = "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
     return flat if len(flat) <= limit else flat[: limit - 3] + "..."
 

@@ -1,4 +1,4 @@
-"""Read a small text file that may come from anyone: regular file, bounded size, UTF-8."""
+"""Read a small text file from an untrusted source: regular file, bounded size, UTF-8."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def refuse(file: str, message: str, line: int | None = None, column: int | None 
 
 
 def check_regular_file(path: Path, max_bytes: int, what: str) -> None:
-    """Refuse whatever is not a regular file of at most `max_bytes`, before a byte is read.
+    """Refuse anything but a regular file of at most `max_bytes`, before a byte is read.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def check_regular_file(path: Path, max_bytes: int, what: str) -> None:
     max_bytes : int
         Largest size admitted.
     what : str
-        What to say to someone whose file is too large.
+        Advice for a file that is too large.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def read_settings_text(path: Path) -> str:
     SettingsError
         The file cannot be read, is too large, or is not UTF-8 text.
     """
-    check_regular_file(path, MAX_BYTES, "Put a long list of designs into a file of its own: table: designs.csv")
+    check_regular_file(path, MAX_BYTES, "Put a long list of designs into a separate file: table: designs.csv")
     try:
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)  # a file may grow between the check and the reading
@@ -75,7 +75,7 @@ def read_settings_text(path: Path) -> str:
 
 
 def decode(data: bytes, label: str) -> str:
-    """Return `data` as text, or say plainly why it is none.
+    """Return `data` as text, or say why it cannot be.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A sweep: everything a file of settings says, checked and in the units of the table."""
+"""A sweep: everything a settings file says, checked and in the units of the table."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class Sweep:
         Partial factor on tan(friction angle). The friction angles in `constants`, `axes` and `table` are design
         values: the factor has been applied to them.
     notes : tuple of Problem
-        Remarks that are no errors.
+        Notes that are not errors.
     """
 
     name: str
@@ -147,7 +147,7 @@ class Sweep:
         """Return everything that decides the results as plain data: defaults filled in, units in the names.
 
         Two files that mean the same designs, written in other units or another layout, give the same.
-        Very long axes and tables are stood for by a SHA-256 of their values.
+        Very long axes and tables are represented by a SHA-256 of their values.
         """
         inputs: dict[str, Any] = {}
         varying = {axis.name: axis.values for axis in self.axes}

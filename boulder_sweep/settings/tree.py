@@ -1,4 +1,4 @@
-"""The file as a tree of plain text with positions, before anything is given a meaning.
+"""The file as a tree of plain text with positions, before it is interpreted.
 
 YAML's own guesses (``no`` is false, ``1:30`` is 90, ``010`` is 8) never happen: every scalar keeps its text.
 """

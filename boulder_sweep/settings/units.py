@@ -1,8 +1,8 @@
-"""Units at the edge: every unit a user may write, its conversion, and what does not fit.
+"""Units: every unit a user may write, and its exact conversion.
 
-The vocabulary is closed, so that a slip of the pen is an error and not some exotic unit of the same name, and
-conversions are exact fractions, so that 30 mph is 13.4112 m/s to the bit. (A units library would bring half
-of the scientific stack along at import; checking a file has to answer at once.)
+The vocabulary is closed, so that a typing mistake is an error and not some exotic unit of the same name. Conversions
+are exact fractions, so that 30 mph is 13.4112 m/s to the bit. (A units library would import half of the scientific
+stack; checking a file must be instant.)
 """
 
 from __future__ import annotations
@@ -289,7 +289,7 @@ class _Reader:
 
 def _full_name(name: str, known: dict[str, tuple[str, Unit]]) -> str:
     if name.lower() in ("ton", "tons"):
-        raise UnitError(f"'{name}' may be one of three; say short_ton, long_ton or tonne")
+        raise UnitError(f"'{name}' is ambiguous; use short_ton, long_ton or tonne")
     if name not in known:
         raise UnitError(f"'{shorten(name)}' is not a known unit{did_you_mean(name, known)}")
     return known[name][0]

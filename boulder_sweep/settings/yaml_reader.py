@@ -1,7 +1,7 @@
-"""YAML 1.2 text to a tree with positions: plain data only, bounded in depth and size.
+"""Parse YAML 1.2 text into a tree with positions: plain data only, bounded in depth and size.
 
-ruamel.yaml does the parsing; its events are put together here without recursion. So tags never construct
-anything, aliases cannot multiply without bound, and no nesting exhausts the stack.
+ruamel.yaml does the parsing; its events are assembled here without recursion. So tags never construct anything,
+aliases cannot multiply without bound, and no nesting exhausts the stack.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 MAX_DEPTH = 20
 """Deepest nesting of lists and blocks; the format itself needs four levels."""
 MAX_NODES = 100_000
-"""Most values in a file with every alias written out."""
+"""Most values in a file once its aliases are expanded."""
 
 MAX_UNIT = 100
 """Longest unit behind a bracket, in characters."""
@@ -41,18 +41,18 @@ _PLAIN_WORDS = (
     (r"found character '\t'", "indent with spaces, not with tabs"),
     (
         "expected '<document start>'",
-        "text stands where a key should begin; check quotation marks and indentation",
+        "a key is needed here; check quotation marks and indentation",
     ),
-    ("cannot start any token", "this character cannot stand here; put the text into quotation marks"),
+    ("cannot start any token", "unexpected character; put the text in quotation marks"),
     (
         "mapping values are not allowed here",
-        "a ':' where none can stand; check the indentation and the quotation marks",
+        "unexpected ':'; check the indentation and the quotation marks",
     ),
-    ("could not find expected ':'", "a key without ':' behind it"),
+    ("could not find expected ':'", "a key without ':' after it"),
     ("found unexpected end of stream", "quotation marks are not closed"),
-    ("expected <block end>", "the indentation does not fit the lines above"),
+    ("expected <block end>", "the indentation does not match the lines above"),
 )
-"""Messages of the parser, and what they mean for people who do not write YAML every day."""
+"""Messages of the parser, and plain words for them."""
 
 
 class _TooDeepError(YAMLError):
@@ -122,7 +122,7 @@ def parse(text: str, label: str, problems: ProblemList) -> Mapping | None:
     label : str
         Name of the file in messages.
     problems : ProblemList
-        Receives duplicate keys, tags and other mistakes one can read on after.
+        Receives duplicate keys, tags and other mistakes after which reading can go on.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def parse(text: str, label: str, problems: ProblemList) -> Mapping | None:
     if root is None:
         problems.add(Place(label), "", "is empty; it needs at least the blocks boulder, site, soil and vehicle")
     else:
-        problems.add(root.place, "", "a file of settings is made of blocks such as 'boulder: {length: 1.65 m}'")
+        problems.add(root.place, "", "a settings file consists of blocks such as 'boulder: {length: 1.65 m}'")
     return None
 
 
@@ -162,7 +162,7 @@ def parse_node(text: str, label: str, problems: ProblemList) -> Node | None:
 
 
 def _events(yaml: YAML, text: str) -> Iterator[Any]:
-    """Yield the events of the parser; whatever it stumbles over is a YAMLError."""
+    """Yield the events of the parser; any failure is a YAMLError."""
     try:
         yield from yaml.parse(text)
     except YAMLError:
@@ -174,7 +174,7 @@ def _events(yaml: YAML, text: str) -> Iterator[Any]:
 
 
 class _Builder:
-    """Puts events together to a tree, with a stack of its own in place of recursion."""
+    """Assembles events into a tree, with a stack of its own in place of recursion."""
 
     def __init__(self, label: str, problems: ProblemList) -> None:
         self.label = label
@@ -189,7 +189,7 @@ class _Builder:
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
             if self.documents == 2:
-                self.problems.add(self.place(event), "", "a second document begins here; one per file is read")
+                self.problems.add(self.place(event), "", "a second document begins here; a file may hold only one")
         elif self.documents > 1:
             return
         elif isinstance(event, ScalarEvent):
@@ -230,7 +230,7 @@ class _Builder:
             )
 
     def alias(self, event: Any) -> None:
-        """Hang the node an alias stands for in once more."""
+        """Insert the node that an alias stands for."""
         name = shorten(str(event.anchor))
         if event.anchor not in self.anchors:
             self.problems.add(self.place(event), "", f"*{name} is not defined: there is no &{name} before it")
@@ -242,7 +242,7 @@ class _Builder:
         self.close(Scalar(self.place(event), "") if node is None else node, size, None)
 
     def close(self, node: Node, size: int, anchor: str | None) -> None:
-        """Hang a finished node into the list or block it stands in."""
+        """Put a finished node into its list or block."""
         if anchor is not None:
             self.anchors[anchor] = (node, size)
         if not self.stack:
@@ -251,7 +251,7 @@ class _Builder:
         parent = self.stack[-1]
         parent.size += size
         if parent.size > MAX_NODES:
-            raise YAMLError(f"the file holds more than {MAX_NODES} values with its aliases written out")
+            raise YAMLError(f"the file holds more than {MAX_NODES} values once its aliases are expanded")
         if isinstance(parent.node, Sequence):
             parent.node.items.append(node)
         elif parent.key is None:
@@ -278,11 +278,11 @@ class _Builder:
         else:
             words = [*(opened.key.text for opened in self.stack if opened.key), key.text]
             path = ".".join(shorten(word) for word in words)
-            self.problems.add(key.place, path, f"is given twice (first in line {first.place.line})")
+            self.problems.add(key.place, path, f"is given twice (first on line {first.place.line})")
 
 
 def _explained(error: Any) -> str:
-    """Return a YAML syntax error in words for people who do not write YAML every day."""
+    """Return a YAML syntax error in plain words."""
     problem = " ".join(str(getattr(error, "problem", None) or error).split())
     for technical, plain in _PLAIN_WORDS:
         if technical in problem:

@@ -96,7 +96,7 @@ def test_empty(problems_of, text):
 @pytest.mark.parametrize("text", ["42", "- boulder", "[boulder]", "just text", "'x'"])
 def test_no_blocks(problems_of, text):
     (problem,) = problems_of(text)
-    assert "made of blocks" in problem.message
+    assert "consists of blocks" in problem.message
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_no_blocks(problems_of, text):
         ("boulder: [1, 2\nsite: 3", 2, "not valid YAML"),
         ("a: 'b\n", 2, "quotation marks are not closed"),
         ("a:\n\t- b", 2, "not with tabs"),
-        ("a: b: c", 1, "':' where none can stand"),
+        ("a: b: c", 1, "unexpected ':'"),
         ("a: @b", 1, "quotation marks"),
         ("a: 1\n  b: 2", 2, "not valid YAML"),
         ('a: "\\q"', 1, "not valid YAML"),

@@ -39,10 +39,10 @@ EXPECTED = [
     (6, 12, "boulder.density", "a density is needed (kg/m^3, t/m^3, pcf or kN/m^3)"),
     (8, 31, "site.embedment_ratio", "'.nan' is not a finite number"),
     (11, 19, "soil.friction_angle", "the list is empty"),
-    (12, 22, "soil.subgrade_reaction", "yes/no word"),
+    (12, 22, "soil.subgrade_reaction", "yes/no value"),
     (13, 23, "soil.strain_rate_factor", "begins with a zero"),
     (15, 9, "vehicle.mass", "short_ton, long_ton or tonne"),
-    (17, 3, "vehicle.speed", "is given twice (first in line 16)"),
+    (17, 3, "vehicle.speed", "is given twice (first on line 16)"),
     (20, 21, "criterion.rating", "P1, P2, P3"),
 ]
 
@@ -97,8 +97,8 @@ def test_on_the_command_line_without_anything_heavy(tmp_path):
         ("vehicel", "did you mean vehicle?"),
         ("modle", "did you mean model?"),
         ("solver.acuracy", "did you mean accuracy?"),
-        ("xyzzy", "known: name, boulder"),
-        ("boulder.65 m", "write a decimal point in place of the comma"),
+        ("xyzzy", "keys: name, boulder"),
+        ("boulder.65 m", "use a decimal point in place of the comma"),
     ],
 )
 def test_unknown_keys_are_told_with_what_was_meant(the_problem, key, hint):

@@ -124,7 +124,7 @@ def test_the_header_is_checked(messages_of):
 
 def test_semicolons_with_decimal_commas_are_told(messages_of):
     (message, *_) = messages_of((HEADER + ROWS).replace(",", ";").replace(".", ","))
-    assert message.startswith("designs.csv:2:1: boulder_length_m: '0,762' is not a plain number; write a decimal point")
+    assert message.startswith("designs.csv:2:1: boulder_length_m: '0,762' is not a plain number; use a decimal point")
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_table_and_file_must_not_give_the_same(messages_of):
 
 def test_axes_beside_a_table_are_refused(messages_of):
     (message,) = messages_of(HEADER + ROWS, grid=GRID.replace("speed: 13.4", "speed: [13.4, 20]"))
-    assert message.startswith("grid.yaml:4:30: vehicle.speed: takes one value beside a table")
+    assert message.startswith("grid.yaml:4:30: vehicle.speed: must be one value beside a table")
 
 
 def test_what_neither_table_nor_file_gives_is_missing(messages_of):

@@ -1,0 +1,176 @@
+"""The JSON Schema of a settings file, made from the register of its entries: for completion and checks in editors."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from boulder_sweep.settings.distribution_reader import NEEDED
+from boulder_sweep.settings.fields import EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
+from boulder_sweep.settings.leaf import MAX_AXIS
+from boulder_sweep.settings.loader import NAME
+from boulder_sweep.settings.model import (
+    ACCURACIES,
+    CLOSED_FORM,
+    PRESETS,
+    PRINTED,
+    RATINGS,
+    SWITCHES,
+    Criterion,
+    SolverSettings,
+)
+from boulder_sweep.settings.units import EXPECTED
+
+FILE = Path("docs/sweep.schema.json")
+_NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+_QUANTITY = rf"^\s*{_NUMBER}\s*([^\d\s.,;\[\]][^,;\[\]]*)?$"
+"""A number and perhaps a unit. Which units fit is left to the program: their products are too many to list."""
+
+Schema = dict[str, Any]
+
+
+def schema() -> Schema:
+    """Return the JSON Schema (draft 2020-12) of a settings file."""
+    units = sorted({field.unit for field in FIELDS if field.unit})
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Settings of boulder-sweep",
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {
+            "name": {"type": "string", "pattern": f"^({NAME.pattern})$", "description": "name of the sweep"},
+            **{section: _block(section, words) for section, words in SECTIONS.items()},
+            "table": {"type": "string", "pattern": r"\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT])$"},
+        },
+        **_what_is_required(),
+        "$defs": {
+            "count": {"type": "integer", "minimum": 1, "maximum": MAX_AXIS},
+            "list_as_text": {"type": "string", "pattern": r"^\s*\[.*\]\s*[^\[\],]*$"},
+            **{_named(unit): _quantity(unit) for unit in units},
+            **{f"{_named(field.unit)}_mean": _mean(field.unit) for field in INPUTS},
+            **{f"{_named(field.unit)}_distribution": _distribution(field.unit) for field in INPUTS},
+            **{field.path: _value(field) for field in FIELDS if field.admitted is not None},
+        },
+    }
+
+
+def text() -> str:
+    """Return the text of the schema file."""
+    return json.dumps(schema(), indent=1) + "\n"
+
+
+def _block(section: str, words: str) -> Schema:
+    """Return the schema of one block."""
+    defaults = {**asdict(Criterion()), **asdict(SolverSettings())}
+    entries: Schema = {}
+    for field in FIELDS:
+        if field.section == section:
+            entry = {"description": _described(field), **_entry(field)}
+            default = defaults.get(field.name, field.default)
+            entries[field.key] = entry if default is None else {**entry, "default": default}
+    return {"type": ["object", "null"], "description": words, "additionalProperties": False, "properties": entries}
+
+
+def _described(field: Field) -> str:
+    if field.unit in ("", "1"):
+        return field.meaning
+    unit = EXPECTED[field.unit]
+    return f"{field.meaning}; {unit.words} ({unit.examples}), a bare number is in {field.unit}"
+
+
+def _entry(field: Field) -> Schema:
+    """Return what an entry may be."""
+    if field.name in _FORMS:
+        return _FORMS[field.name]
+    value = _ref(field.path)
+    if field not in INPUTS:
+        return value
+    step = _object({"from": value, "to": value, "step": _ref(_named(field.unit))}, ("from", "to", "step"))
+    count = _object({"from": value, "to": value, "count": _ref("count")}, ("from", "to", "count"))
+    spread = _ref(f"{_named(field.unit)}_distribution")
+    return {"anyOf": [value, _list(value), _ref("list_as_text"), step, count, spread]}
+
+
+def _mean(unit: str) -> Schema:
+    """Return the means of a distribution: one value, a list or a range."""
+    value = _ref(_named(unit))
+    ranges = [_object({"from": value, "to": value, key: {}}, ("from", "to", key)) for key in ("step", "count")]
+    return {"anyOf": [value, _list(value), _ref("list_as_text"), *ranges]}
+
+
+def _distribution(unit: str) -> Schema:
+    """Return the forms of a distribution of quantities in some unit, one for each kind."""
+    mean = _ref(f"{_named(unit)}_mean")
+    keys = {"mean": mean, "characteristic": mean, "cov": _ref(_named("1"))}
+    forms = []
+    for kind, groups in NEEDED.items():
+        taken = ("low", "high", *(key for group in groups for key in group))
+        entries: Schema = {"distribution": {"const": kind}, **{key: keys.get(key, _ref(_named(unit))) for key in taken}}
+        needed = [key for group in groups if len(group) == 1 for key in group]
+        either = [{"oneOf": [{"required": [key]} for key in group]} for group in groups if len(group) > 1]
+        form = _object(entries, (*(() if kind == "normal" else ("distribution",)), *needed))
+        forms.append({**form, "allOf": either} if either else form)
+    return {"anyOf": forms}
+
+
+def _value(field: Field) -> Schema:
+    """Return one number within its bounds, or text with a number and a unit."""
+    assert field.admitted is not None
+    bounds = {"minimum": field.admitted.low, "maximum": field.admitted.high}
+    return {"anyOf": [{"type": "number", **bounds}, {"type": "string", "pattern": _QUANTITY}]}
+
+
+def _quantity(unit: str) -> Schema:
+    """Return any number, or text with a number and a unit."""
+    words = f"{EXPECTED[unit].words} ({EXPECTED[unit].examples})"
+    return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": _QUANTITY}], "description": words}
+
+
+def _named(unit: str) -> str:
+    """Return the name of the definition for a unit."""
+    return EXPECTED[unit].words.partition(" (")[0].removeprefix("a ").removeprefix("an ").replace(" ", "_")
+
+
+def _ref(name: str) -> Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _list(items: Schema) -> Schema:
+    return {"type": "array", "minItems": 1, "maxItems": MAX_AXIS, "items": items}
+
+
+def _object(entries: Schema, required: tuple[str, ...]) -> Schema:
+    return {"type": "object", "additionalProperties": False, "properties": entries, "required": list(required)}
+
+
+def _words(*words: str) -> Schema:
+    return {"enum": list(words)}
+
+
+_READINGS = {name: _words(PRINTED, corrected, "corrected") for name, corrected in SWITCHES.items()}
+_FORMS: dict[str, Schema] = {
+    "rating": _words(*RATINGS),
+    "readings": {"anyOf": [_words(*PRESETS), _object({"preset": _words(*PRESETS), **_READINGS}, ())]},
+    "soil_elements": {
+        "anyOf": [
+            _words(CLOSED_FORM),
+            _object({"elements": {"type": "integer", "minimum": 1, "maximum": MAX_ELEMENTS}}, ("elements",)),
+        ]
+    },
+    "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
+}
+"""Entries that are more than a quantity."""
+
+
+def _what_is_required() -> Schema:
+    """Return what must be there; beside a table, its columns may hold any of it."""
+    sections: Schema = {}
+    for field in INPUTS:
+        if not field.optional:
+            sections.setdefault(field.section, {"required": []})["required"].append(field.key)
+    embedment = [field for field in INPUTS if field.name in EMBEDMENT]
+    sections[embedment[0].section] = {"oneOf": [{"required": [field.key]} for field in embedment]}
+    whole = {"required": list(sections), "properties": sections}
+    return {"if": {"not": {"required": ["table"]}}, "then": whole}
