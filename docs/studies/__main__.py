@@ -10,9 +10,13 @@ from pathlib import Path
 from docs.studies.contents import CONTENTS, compute
 from docs.studies.documents import differences, write
 from docs.studies.example_pulse import example_pulse
+from docs.studies.json_schema import FILE as SCHEMA
+from docs.studies.json_schema import text as schema_text
 from docs.studies.pictures import draw_all
 
 PULSE = Path("docs/examples/rigid_wall_pulse.csv")
+WRITTEN = {PULSE: example_pulse, SCHEMA: schema_text}
+"""Whole files, and what writes them."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,12 +37,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     if asked.check:
         found = differences(root, compute(root))
-        if not (root / PULSE).exists() or (root / PULSE).read_text(encoding="utf-8") != example_pulse():
-            found.append(f"{PULSE}: differs from what is computed")
+        for path, text in WRITTEN.items():
+            if not (root / path).exists() or (root / path).read_text(encoding="utf-8") != text():
+                found.append(f"{path}: differs from what is computed")
         print("\n".join(found) or "every number in the documentation is what the commands give")
         return 1 if found else 0
-    (root / PULSE).parent.mkdir(parents=True, exist_ok=True)
-    (root / PULSE).write_text(example_pulse(), encoding="utf-8")
+    for path, text in WRITTEN.items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / path).write_text(text(), encoding="utf-8")
     changed = write(root, compute(root))
     if not asked.no_pictures:
         changed += draw_all(root)
