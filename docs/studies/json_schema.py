@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.fields import EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
 from boulder_sweep.settings.leaf import MAX_AXIS
@@ -16,7 +17,6 @@ from boulder_sweep.settings.model import (
     CLOSED_FORM,
     PRESETS,
     PRINTED,
-    RATINGS,
     SWITCHES,
     Criterion,
     SolverSettings,
