@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from boulder_sweep.answers.need import Need, need
     from boulder_sweep.impact.simulation import Trajectory, simulate
     from boulder_sweep.runner.sweeper import Summary, run
     from boulder_sweep.settings import SettingsError, Sweep, load
@@ -21,12 +22,14 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Need",
     "SettingsError",
     "Summary",
     "Sweep",
     "Trajectory",
     "__version__",
     "load",
+    "need",
     "read",
     "run",
     "simulate",
@@ -34,6 +37,8 @@ __all__ = [
 
 # Names are fetched at first use: the import of numba or pandas takes longer than checking a file.
 _HOME = {
+    "Need": "boulder_sweep.answers.need",
+    "need": "boulder_sweep.answers.need",
     "SettingsError": "boulder_sweep.settings",
     "Sweep": "boulder_sweep.settings",
     "load": "boulder_sweep.settings",

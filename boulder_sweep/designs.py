@@ -8,7 +8,7 @@ A column that depends on few values stays a dictionary of them with a code per r
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -189,6 +189,7 @@ class DesignPlan:
         self.lengths = tuple(int(length) for length in lengths)
         self.n_designs = math.prod(self.lengths)
         self.strides = tuple(math.prod(self.lengths[k + 1 :]) for k in range(len(self.lengths)))
+        self.given = dict(given)
         quantities: dict[str, Quantity] = dict(given)
         height, bumper, hood = given["boulder_height_m"], given["bumper_height_m"], given["hood_height_m"]
         if "embedment_depth_m" not in quantities:
@@ -230,12 +231,54 @@ class DesignPlan:
         IndexError
             The rows are not within the sweep.
         """
-        if not 0 <= start <= stop <= self.n_designs:
-            raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
-        rows = _Rows(self, start, stop)
+        rows = self._rows(start, stop)
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
         codes = rows.values(self.refusals)
         return DesignBlock(start, stop, columns, Reasons(codes, REASONS))
+
+    def given_rows(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Return what is given of the designs ``[start, stop)``, one value a row; what follows from it is left out.
+
+        Raises
+        ------
+        IndexError
+            The rows are not within the sweep.
+        """
+        rows = self._rows(start, stop)
+        return {name: rows.values(source) for name, source in self.given.items()}
+
+    def _rows(self, start: int, stop: int) -> _Rows:
+        """Return a range of rows that must be within the sweep."""
+        if not 0 <= start <= stop <= self.n_designs:
+            raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
+        return _Rows(self, start, stop)
+
+
+def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
+    """Return designs given row by row as a block.
+
+    Parameters
+    ----------
+    given
+        Arrays of shape (n,) by column name, in the units of the table; ``embedment_ratio`` may stand in place of
+        ``embedment_depth_m``, and ``impact_height_m`` may be missing, as in a file.
+
+    Returns
+    -------
+    DesignBlock
+        The designs, numbered from 0, with the same bits as the same designs in a grid.
+    """
+    values = dict(given)
+    height, bumper, hood = values["boulder_height_m"], values["bumper_height_m"], values["hood_height_m"]
+    if "embedment_depth_m" not in values:
+        values["embedment_depth_m"] = embedment_of_ratio(values["embedment_ratio"], height)
+    embedment = values["embedment_depth_m"]
+    impact = values.get("impact_height_m", np.zeros(1))
+    if "impact_height_m" not in values:
+        values["impact_height_m"] = impact_height_of_face(height, embedment, bumper, hood)
+    codes = refusal(height, embedment, bumper, hood, impact)
+    columns = {name: Column(None, np.ascontiguousarray(values[name])) for name in INPUT_COLUMNS}
+    return DesignBlock(0, len(codes), columns, Reasons(codes, REASONS))
 
 
 class _Rows:

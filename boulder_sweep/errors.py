@@ -55,6 +55,10 @@ class PictureError(BoulderSweepError):
     """A picture cannot be made."""
 
 
+class QuestionError(BoulderSweepError, ValueError):
+    """A question that cannot be answered as it is put."""
+
+
 class Interrupted(KeyboardInterrupt):
     """A run was stopped by a signal; the finished rows are safe and the run can be resumed.
 

@@ -1,0 +1,221 @@
+"""What a question may ask for: an input by its word, within which bounds, how finely."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.errors import QuestionError
+from boulder_sweep.settings import fields
+from boulder_sweep.settings.bounds import ADMITTED, REALISTIC
+from boulder_sweep.settings.leaf import LeafError, outside, read_single
+from boulder_sweep.settings.problems import Place, did_you_mean
+from boulder_sweep.settings.tree import Scalar
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from boulder_sweep.settings import Sweep
+
+BOULDER_MASS = fields.Field("boulder", "mass", "boulder_mass_kg", "kg")
+"""The mass of the boulder, which is no input but follows from four."""
+Ends = tuple[str | float, str | float] | None
+"""Range to be searched, as given by the user."""
+TOLERANCES = {
+    "m": 1e-3,
+    "1": 1e-3,
+    "deg": 0.01,
+    "m/s": 0.01,
+    "kg": 1.0,
+    "kg/m^3": 1.0,
+    "MN/m^3": 0.1,
+    "N/m": 1000.0,
+    "N*s/m": 100.0,
+}
+"""Distance of the values that are tried, by unit."""
+LEAST_RATIO = REALISTIC["embedment_ratio"].low
+"""Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
+may slide a metre in place of turning, and pass; buried deeper it is held at its foot and turns over."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """The input that is asked for.
+
+    Parameters
+    ----------
+    field
+        The input.
+    most
+        Whether its largest value is wanted, not its smallest.
+    tolerance
+        Distance of the values tried, in the unit of the table. Answers are multiples of it.
+    """
+
+    field: fields.Field
+    most: bool
+    tolerance: float
+
+    @property
+    def name(self) -> str:
+        """Column of the input (or ``embedment_ratio``)."""
+        return self.field.name
+
+    @property
+    def answer(self) -> str:
+        """Column of the answer: ``least_embedment_depth_m``."""
+        return f"{'most' if self.most else 'least'}_{self.name}"
+
+    def values(self, places: np.ndarray) -> np.ndarray:
+        """Return the values at some places (whole numbers) of the lattice that is searched."""
+        per_unit = round(1.0 / self.tolerance)
+        if per_unit > 1 and math.isclose(per_unit * self.tolerance, 1.0, rel_tol=1e-12):
+            return places / per_unit  # the float nearest to 1.234, as a file would give it
+        return places * self.tolerance
+
+    def ends(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places of the lattice nearest to both ends of a range, within it."""
+        first = np.ceil(low / self.tolerance - 1e-6).astype(np.int64)
+        last = np.floor(high / self.tolerance + 1e-6).astype(np.int64)
+        return first, np.maximum(first, last)
+
+
+def key_of(word: str, *, most: bool = False, tolerance: str | float | None = None) -> Key:
+    """Return the input a word means.
+
+    Parameters
+    ----------
+    word
+        Key of the file (``embedment_depth``, ``soil.density``) or column of the table.
+    most
+        Whether its largest value is wanted.
+    tolerance
+        Distance of the values tried, ``"1 mm"`` or a number in the unit of the table; `TOLERANCES` by default.
+
+    Raises
+    ------
+    QuestionError
+        The word means no input, or several; or the tolerance is no positive value of its kind.
+    """
+    field = _field(word)
+    value = TOLERANCES[field.unit] if tolerance is None else quantity(tolerance, field.unit, "--tolerance")
+    if not 0.0 < value < math.inf:
+        raise QuestionError(f"--tolerance {tolerance}: must be positive")
+    return Key(field, most, value)
+
+
+def _field(word: str) -> fields.Field:
+    if word in (BOULDER_MASS.key, BOULDER_MASS.path, BOULDER_MASS.name):
+        return BOULDER_MASS
+    found = [field for field in fields.FIELDS if word in (field.path, field.name)]
+    found = found or [field for field in fields.FIELDS if word == field.key]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise QuestionError(f"'{word}' may be {' or '.join(field.path for field in found)}; say which")
+    other = next((field for field in fields.FIELDS if word.lower() in field.also), None)
+    hint = f"; did you mean {other.key}?" if other else did_you_mean(word, _words())
+    raise QuestionError(f"'{word}' is not an input ({', '.join(_words())}){hint}")
+
+
+def _words() -> list[str]:
+    """Return the shortest word of every input, and of the mass of the boulder."""
+    every = (*fields.FIELDS, BOULDER_MASS)
+    keys = [field.key for field in every]
+    return [BOULDER_MASS.key, *(f.path if keys.count(f.key) > 1 else f.key for f in fields.FIELDS)]
+
+
+def quantity(text: str | float, unit: str, option: str) -> float:
+    """Return a number that may have a unit behind it, in the unit of the table.
+
+    Raises
+    ------
+    QuestionError
+        It is no number of that kind.
+    """
+    from boulder_sweep.settings.numbers import NumberError, read_quantity
+
+    if not isinstance(text, str):
+        return float(text)
+    try:
+        return float(read_quantity(Scalar(Place(option), text), unit).value)
+    except NumberError as problem:
+        raise QuestionError(f"{option} {text}: {problem}") from None
+
+
+def share(text: str | float, option: str) -> float:
+    """Return a number such as 0.25 or ``25 %``."""
+    return quantity(text, "1", option)
+
+
+def bound(text: str | float, field: fields.Field) -> float:
+    """Return an end of the range to be searched, which must be an admitted value.
+
+    Raises
+    ------
+    QuestionError
+        It is none.
+    """
+    option = "--between"
+    if not isinstance(text, str):
+        problem = outside(float(text), field.name, field.unit)
+        if problem:
+            raise QuestionError(f"{option}: {problem}")
+        return float(text)
+    try:
+        return read_single(Scalar(Place(option), text), field.name, field.unit)
+    except LeafError as problem:
+        raise QuestionError(f"{option} {text}: {problem}") from None
+
+
+def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends) -> tuple[np.ndarray, np.ndarray]:
+    """Return the range of the input that is searched, row by row.
+
+    Parameters
+    ----------
+    sweep
+        The sweep. Where the input is an axis of its grid, the axis is the range.
+    key
+        The input.
+    given
+        The other inputs of n rows.
+    between
+        Ends given by the user, which go before all others.
+
+    Returns
+    -------
+    low, high : ndarray, shape (n,)
+        Ends in the unit of the table.
+
+    Raises
+    ------
+    QuestionError
+        The range is empty.
+    """
+    one = np.ones(len(next(iter(given.values()))))
+    if between is not None:
+        low, high = (bound(end, key.field) for end in between)
+        if not low < high:
+            raise QuestionError(f"--between {between[0]} {between[1]}: the first must be less than the second")
+        return low * one, high * one
+    axes = {axis.name: (axis.values.min(), axis.values.max()) for axis in sweep.axes}
+    if key.name in axes:
+        low, high = axes[key.name]
+        return low * one, high * one
+    if key.name == "embedment_depth_m":
+        height, bumper = given["boulder_height_m"], given["bumper_height_m"]
+        low, high = axes.get("embedment_ratio", (LEAST_RATIO, 1.0))
+        return low * height, np.minimum(high * height, height - bumper)
+    if key.name == "embedment_ratio":
+        height, bumper = given["boulder_height_m"], given["bumper_height_m"]
+        if "embedment_depth_m" in axes:
+            low, high = axes["embedment_depth_m"]
+            return np.minimum(low / height, 1.0), np.minimum(high / height, 1.0)
+        return LEAST_RATIO * one, 1.0 - bumper / height
+    if key.name == "impact_height_m":
+        return 0.0 * one, given["hood_height_m"]
+    usual = REALISTIC.get(key.name, ADMITTED[key.name])
+    return usual.low * one, usual.high * one

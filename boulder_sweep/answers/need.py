@@ -1,0 +1,229 @@
+"""The least that passes: how deep, how high, how strong a soil; or the most: how fast a truck.
+
+For every combination of the other inputs the values of one are scanned and the change from failing to passing is
+bisected down to two neighbours on a lattice of round numbers, quickly; then both neighbours are judged as
+``sweep run`` would judge them. Where that disagrees, the row is searched again with the accuracy of the sweep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import joblib
+
+from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, share
+from boulder_sweep.answers.lightest import SIDES, LightestQuestion
+from boulder_sweep.answers.questions import Question
+from boulder_sweep.answers.search import WORDS
+from boulder_sweep.answers.trials import judges_of, ranges
+from boulder_sweep.drawing import draw
+from boulder_sweep.errors import QuestionError
+from boulder_sweep.settings.model import Model, ReadingChoice
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+    from boulder_sweep.settings import Sweep
+
+Told = Callable[[int, int], None]
+"""Told how many rows of how many are done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Need:
+    """Answers to a question, one row for every combination of the other inputs. Made by `need`.
+
+    Attributes
+    ----------
+    sweep : Sweep
+        The sweep asked about.
+    key : Key
+        The input asked for.
+    least_margin : float
+        Margin asked for.
+    arrow : pyarrow.Table
+        Inputs, answer, bracket, outcome at the answer; units in the field metadata.
+    simulated : int
+        Designs simulated on the way.
+    """
+
+    sweep: Sweep
+    key: Key
+    least_margin: float
+    arrow: pa.Table
+    simulated: int
+
+    def __len__(self) -> int:
+        return len(self.arrow)
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """The answers as a data frame; units and meanings in ``.attrs``."""
+        frame = self.arrow.to_pandas()
+        metadata = {field.name: field.metadata or {} for field in self.arrow.schema}
+        for entry in ("unit", "meaning"):
+            frame.attrs[f"{entry}s"] = {name: own.get(entry.encode(), b"").decode() for name, own in metadata.items()}
+        return frame
+
+    @property
+    def others(self) -> list[str]:
+        """Names of the other readings by which the question was answered, too."""
+        before = f"{self.key.answer}_"
+        return [name.removeprefix(before) for name in self.arrow.column_names if name.startswith(before)]
+
+    @property
+    def derived(self) -> tuple[str, ...]:
+        """Input columns that follow from others, or from the answer, and are not given."""
+        given = self.sweep.plan.given
+        derived = tuple(name for name in ("embedment_depth_m", "impact_height_m") if name not in given)
+        return (*derived, *SIDES, "embedment_depth_m") if self.key.name == BOULDER_MASS.name else derived
+
+    def lines(self, width: int = 80) -> list[str]:
+        """Return the answers as lines for a terminal."""
+        from boulder_sweep.answers.printing import need_lines
+
+        return need_lines(self, width)
+
+    def counts(self) -> dict[str, int]:
+        """Return how many rows were answered in which way."""
+        found = self.arrow["found"].combine_chunks().value_counts().to_pylist()
+        counted = {entry["values"]: entry["counts"] for entry in found}
+        return {word: counted[word] for word in WORDS if word in counted}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            "name": self.sweep.name,
+            "asked": self.key.answer,
+            "unit": self.key.field.unit,
+            "tolerance": self.key.tolerance,
+            "margin": self.least_margin,
+            "simulated": self.simulated,
+            "found": self.counts(),
+            "rows": self.arrow.to_pylist(),
+        }
+
+    def write(self, path: str | Path) -> Path:
+        """Write the answers to a Parquet file.
+
+        Raises
+        ------
+        QuestionError
+            The name has another ending, its folder does not exist, or it cannot be written.
+        """
+        from boulder_sweep.answers.tables import write_parquet
+
+        return write_parquet(self.arrow, path)
+
+    def plot(self, path: str | Path) -> None:
+        """Draw a design chart: the answer over the size of the boulder, a curve for each soil.
+
+        Raises
+        ------
+        PictureError
+            It cannot be drawn.
+        """
+        draw("design_chart", "draw_design_chart", self, path)
+
+
+def need(
+    sweep: Sweep,
+    least: str | None = None,
+    *,
+    most: str | None = None,
+    margin: str | float = 0.0,
+    between: Ends = None,
+    tolerance: str | float | None = None,
+    both_readings: bool = True,
+    jobs: int | None = None,
+    told: Told | None = None,
+) -> Need:
+    """Find the least value of an input that passes, for every combination of the others.
+
+    Parameters
+    ----------
+    sweep
+        The sweep. Where the input asked for is an axis of its grid, the axis is the range that is searched.
+    least, most
+        The input of which the smallest, or the largest, passing value is wanted; one of the two.
+        ``embedment_depth`` by default.
+    margin
+        Least margin to the limits, ``0.25`` or ``"25 %"``.
+    between
+        Range to be searched, in place of the axis or of what is usual.
+    tolerance
+        Distance of the values that are tried; 1 mm for lengths.
+    both_readings
+        Whether the question is answered for the other readings of the paper, too.
+    jobs
+        Threads; all cores by default. The answers do not depend on it.
+    told
+        Told how far it is.
+
+    Returns
+    -------
+    Need
+        One row a combination.
+
+    Raises
+    ------
+    QuestionError
+        The question makes no sense.
+    """
+    if least and most:
+        raise QuestionError("ask for the least of one input or for the most of one, not for both")
+    key = key_of(most or least or "embedment_depth", most=bool(most), tolerance=tolerance)
+    least_margin = share(margin, "--margin")
+    if not 0.0 <= least_margin < 1.0:
+        raise QuestionError(f"--margin {margin}: must be 0 or more and less than 100 %")
+    sweeps = [sweep, other_readings(sweep)] if both_readings else [sweep]
+    asked = [
+        LightestQuestion(one, key, judges_of(one, least_margin))
+        if key.name == BOULDER_MASS.name
+        else Question(one, key, between, judges_of(one, least_margin))
+        for one in sweeps
+    ]
+    asked[0].judges.own.warm_up()
+    pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
+    tables, simulated, done = [], 0, 0
+    parallel = joblib.Parallel(n_jobs=jobs or -1, backend="threading", return_as="generator")
+    for table, count in parallel(joblib.delayed(_table_of)(asked, start, stop) for start, stop in pieces):
+        tables.append(table)
+        simulated += count
+        done += len(table)
+        if told is not None:
+            told(done, asked[0].count)
+    from boulder_sweep.answers.tables import joined_tables
+
+    table = joined_tables(tables, _metadata(asked[0], least_margin))
+    return Need(sweep, key, least_margin, table, simulated)
+
+
+def other_readings(sweep: Sweep) -> Sweep:
+    """Return the sweep with the other preset of readings: as printed where it is corrected, else corrected."""
+    preset = "as_printed" if sweep.model.preset == "corrected" else "corrected"
+    return replace(sweep, model=Model(ReadingChoice.of_preset(preset), sweep.model.soil_elements))
+
+
+def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: int) -> tuple[pa.Table, int]:
+    """Answer some rows for all readings asked about; the table and the designs simulated."""
+    from boulder_sweep.answers.tables import answer_table
+
+    answers = [question.answered(start, stop) for question in asked]
+    names = [question.sweep.model.preset for question in asked]
+    return answer_table(asked[0].key, start, answers, names), sum(answer.simulated for answer in answers)
+
+
+def _metadata(asked: Question | LightestQuestion, least_margin: float) -> dict[bytes, bytes]:
+    """Return the metadata of a file of answers."""
+    from boulder_sweep.store.provenance import file_metadata, identity
+
+    own = asked.judges.own
+    accuracy = asked.judges.accuracy.to_dict()
+    found = identity(asked.sweep.resolved(), own.readings._asdict(), own.control._asdict(), accuracy)
+    question = {"asked": asked.key.answer, "tolerance": asked.key.tolerance, "margin": least_margin}
+    return file_metadata(found | {"question": question}, "boulder_sweep.need")

@@ -1,0 +1,166 @@
+"""One question put to one sweep: values tried, brackets certified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.answers.keys import Ends, Key, range_of
+from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search, search
+from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
+
+if TYPE_CHECKING:
+    from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.judge.judged import Judged
+    from boulder_sweep.settings import Sweep
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """Answers of n rows.
+
+    Attributes
+    ----------
+    block : DesignBlock
+        The designs with the answer filled in, or with the value tried last where there is none.
+    judged : Judged
+        What these designs come to.
+    kind : ndarray of int8, shape (n,)
+        How they were found, codes of `boulder_sweep.answers.search.WORDS`.
+    fails, passes : ndarray, shape (n,)
+        The bracket in the unit of the table; NaN where there is no such value.
+    stretches : list of str or None, of length n
+        All that passes, for rows that are not monotone.
+    simulated : int
+        Designs simulated on the way.
+    """
+
+    block: DesignBlock
+    judged: Judged
+    kind: np.ndarray
+    fails: np.ndarray
+    passes: np.ndarray
+    stretches: list[str | None]
+    simulated: int
+
+
+class Question:
+    """The least, or the most, of one input that passes.
+
+    Parameters
+    ----------
+    sweep
+        The sweep asked about.
+    key
+        The input.
+    between
+        Ends of the range given by the user.
+    judges
+        How designs are judged.
+
+    Raises
+    ------
+    QuestionError
+        The range makes no sense.
+    """
+
+    rows_at_once = 2048
+    """Rows of a block: short enough for an interruption to wait for."""
+
+    def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges) -> None:
+        self.sweep, self.key, self.between, self.judges = sweep, key, between, judges
+        self.open = Open(sweep, (key.name,))
+        range_of(sweep, key, self.open.rows(0, 0), between)  # a wrong range is said before anything is computed
+
+    @property
+    def count(self) -> int:
+        """Number of combinations of the other inputs."""
+        return self.open.count
+
+    def answered(self, start: int, stop: int) -> Answers:
+        """Answer the rows ``[start, stop)``."""
+        rows = self.open.rows(start, stop)
+        low, high = range_of(self.sweep, self.key, rows, self.between)
+        first, last = self.key.ends(low, high)
+        if self.key.most:
+            first, last = last, first
+        trial = _Trial(self.key, self.judges, rows)
+        found = search(trial.quick, first, last)
+        wrong = np.flatnonzero(~trial.certified(found))
+        if len(wrong):
+            part = search(lambda index, places: trial.own(wrong[index], places), first[wrong], last[wrong])
+            found = replaced(found, wrong, part)
+        block, judged = trial.judged(np.arange(stop - start), found.shown)
+        return Answers(
+            block,
+            judged,
+            found.kind,
+            np.where(found.has_fails, self.key.values(found.fails), np.nan),
+            np.where(found.has_holds, self.key.values(found.holds), np.nan),
+            [_stretches(self.key, found.changes.get(row), first[row], last[row]) for row in range(stop - start)],
+            trial.simulated,
+        )
+
+
+class _Trial:
+    """Tries values of the input in some rows, and counts."""
+
+    def __init__(self, key: Key, judges: Judges, rows: Rows) -> None:
+        self.key, self.judges, self.rows = key, judges, rows
+        self.simulated = 0
+
+    def quick(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Predicate of the search, without estimate of the numerical error."""
+        return self._codes(index, places, quick=True)
+
+    def own(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Predicate of the search as the sweep judges."""
+        return self._codes(index, places, quick=False)
+
+    def judged(self, index: np.ndarray, places: np.ndarray, *, quick: bool = False) -> tuple[DesignBlock, Judged]:
+        """Return the designs with these values, and how they are judged."""
+        block = taken(self.rows, index, **{self.key.name: self.key.values(places)})
+        self.simulated += len(index)
+        return block, (self.judges.quick if quick else self.judges.own)(block)
+
+    def certified(self, found: Search) -> np.ndarray:
+        """Whether the sweep's own accuracy says the same at both ends of the brackets, bool, shape (n,)."""
+        agrees = np.ones(len(found.kind), dtype=bool)
+        for has, places, holds in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
+            rows = np.flatnonzero(has)
+            agrees[rows] = (self.own(rows, places[rows]) == HOLDS) == holds
+        return agrees
+
+    def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
+        block, judged = self.judged(index, places, quick=quick)
+        codes = np.where(self.judges.holds(judged), HOLDS, FAILS)
+        return np.where(beyond_reach(block, judged), BEYOND, codes)
+
+
+def replaced(found: Search, rows: np.ndarray, part: Search) -> Search:
+    """Return a search with some of its rows taken from another."""
+    arrays = {}
+    for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
+        arrays[name] = getattr(found, name).copy()
+        arrays[name][rows] = getattr(part, name)
+    again = set(rows.tolist())
+    changes = {row: edges for row, edges in found.changes.items() if row not in again}
+    changes |= {int(rows[row]): edges for row, edges in part.changes.items()}
+    return Search(**arrays, changes=changes)
+
+
+def _stretches(key: Key, changes: list[tuple[int, int, bool]] | None, first: int, last: int) -> str | None:
+    """Stretches that pass of a row that is not monotone: ``1.21 to 1.45, 1.9 to 2.3``; None of all others."""
+    if changes is None:
+        return None
+    # What holds before the first change begins at the beginning; what holds behind the last one ends at the end.
+    starts = [] if changes and changes[0][2] else [first]
+    stops: list[int] = []
+    for before, behind, holds in changes:
+        (starts if holds else stops).append(behind if holds else before)
+    if len(stops) < len(starts):
+        stops.append(last)
+    pairs = (sorted(pair) for pair in zip(starts, stops, strict=True))
+    return ", ".join(" to ".join(f"{value:.10g}" for value in key.values(np.array(pair))) for pair in pairs)

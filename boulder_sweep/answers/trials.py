@@ -1,0 +1,124 @@
+"""Designs of a sweep with some of their inputs left open, filled in as an answer is searched for."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.designs import DesignBlock, block_of
+from boulder_sweep.judge.accuracy import Accuracy, steps_of
+from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
+from boulder_sweep.judge.judged import PASS, Judged
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.settings import fields
+from boulder_sweep.settings.sweep import DesignList
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+OUT_OF_REACH = ("no_contact", "override")
+"""Reasons of designs that the truck passes over: at such a value there is nothing to search for."""
+PLACEHOLDER = 0.5
+
+Rows = dict[str, np.ndarray]
+"""Inputs of n designs by column name (or ``embedment_ratio``), each of shape (n,), as a file gives them."""
+
+
+class Open:
+    """A sweep with some inputs left open.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    names
+        Inputs to leave open. The two ways of giving the embedment stand for each other.
+    """
+
+    def __init__(self, sweep: Sweep, names: tuple[str, ...]) -> None:
+        self.names = names
+        self._left_out = set(names) | (set(fields.EMBEDMENT) if set(names) & set(fields.EMBEDMENT) else set())
+        constants = {name: value for name, value in sweep.constants.items() if name not in self._left_out}
+        constants |= dict.fromkeys(names, PLACEHOLDER)
+        table = sweep.table
+        if table is not None:
+            kept = {name: values for name, values in table.columns.items() if name not in self._left_out}
+            table = DesignList(table.file, kept) if kept else None
+        axes = tuple(axis for axis in sweep.axes if axis.name not in self._left_out)
+        self.sweep = dataclasses.replace(sweep, axes=axes, constants=constants, table=table)
+
+    @property
+    def count(self) -> int:
+        """Number of combinations of the other inputs."""
+        return self.sweep.n_designs
+
+    def rows(self, start: int, stop: int) -> Rows:
+        """Return the other inputs of the combinations ``[start, stop)``."""
+        given = self.sweep.plan.given_rows(start, stop)
+        return {name: values for name, values in given.items() if name not in self._left_out}
+
+
+def taken(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> DesignBlock:
+    """Return some of the designs as a block, with open inputs filled in."""
+    return block_of({name: values[index] for name, values in rows.items()} | inputs)
+
+
+@dataclasses.dataclass(frozen=True)
+class Judges:
+    """The two ways of judging designs: quickly, to search, and as the sweep itself does, to certify.
+
+    Parameters
+    ----------
+    quick, own
+        A solution without estimate of its error; the sweep's own accuracy.
+    accuracy
+        The sweep's own accuracy.
+    least_margin
+        Margin that a design must have to be said to hold.
+    """
+
+    quick: Evaluation
+    own: Evaluation
+    accuracy: Accuracy
+    least_margin: float = 0.0
+
+    def holds(self, judged: Judged) -> np.ndarray:
+        """Whether rows pass with the margin that is asked for, bool, shape (n,)."""
+        passes = judged.verdict == PASS
+        return passes & (judged.margin >= self.least_margin) if self.least_margin > 0.0 else passes
+
+
+def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
+    """Return how the designs of a sweep are judged."""
+    accuracy = accuracy_of(sweep)
+    own = evaluation_of(sweep, accuracy)
+    quick = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False))
+    if not accuracy.error_estimate and accuracy.steps.step_s >= quick.control.h:
+        quick = own
+    return Judges(quick, own, accuracy, least_margin)
+
+
+def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:
+    """Whether the truck passes over the boulder, or the row is no design at all, bool, shape (n,)."""
+    words = [code for code, word in enumerate(judged.reasons) if word in OUT_OF_REACH]
+    return np.isin(judged.reason, words) | (np.asarray(block.reasons.codes) != 0)
+
+
+def ranges(count: int, most: int) -> Iterator[tuple[int, int]]:
+    """Yield pieces ``[start, stop)`` of about equal size, none larger than `most`."""
+    pieces = max(math.ceil(count / most), 1)
+    for piece in range(pieces):
+        start, stop = count * piece // pieces, count * (piece + 1) // pieces
+        if stop > start or count == 0:
+            yield start, stop
+
+
+def inputs_at(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> Mapping[str, np.ndarray]:
+    """Return the input columns of some designs with open inputs filled in."""
+    block = taken(rows, index, **inputs)
+    return {name: block.columns[name].to_numpy() for name in INPUT_COLUMNS}

@@ -1,0 +1,93 @@
+"""``sweep need``: the least that passes, for every combination of the other inputs."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from boulder_sweep.cli.loading import load_sweep
+from boulder_sweep.cli.options import json_option, set_option
+
+EXAMPLES = """\b
+Examples:
+  sweep need configs/site.yaml
+  sweep need configs/site.yaml --margin '25 %' -o depths.parquet --plot depths.png
+  sweep need configs/site.yaml --least friction_angle --set site.embedment_depth='2.3 m'
+  sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
+"""
+
+
+@click.command("need", short_help="The least depth (or any input) that passes.", epilog=EXAMPLES)
+@click.argument("grid", type=click.Path())
+@click.option("--least", metavar="KEY", help="Input of which the smallest passing value is wanted [embedment_depth].")
+@click.option("--most", metavar="KEY", help="Input of which the largest passing value is wanted, e.g. speed.")
+@click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
+@click.option(
+    "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
+)
+@click.option("--tolerance", metavar="T", help="Distance of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
+@click.option("--own-readings", is_flag=True, help="Leave out the answers by the other readings of the paper.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
+@click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all answers.")
+@click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Design chart (.png, .svg or .pdf).")
+@click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@set_option
+@json_option
+def need(
+    grid: str,
+    least: str | None,
+    most: str | None,
+    margin: str,
+    between: tuple[str, str] | None,
+    tolerance: str | None,
+    own_readings: bool,
+    jobs: int | None,
+    out: str | None,
+    picture: str | None,
+    quiet: bool,
+    overrides: tuple[str, ...],
+    as_json: bool,
+) -> int:
+    """Find the least KEY that passes, for every combination of the other inputs of GRID.
+
+    Where KEY is an axis of the grid, the axis is the range that is searched; else the usual range is, for depths from
+    0.35 of the height to where the truck would pass over the boulder. Every answer has its bracket: the value that
+    passes and the one next to it that does not, both judged as `sweep run` judges them.
+    """
+    from boulder_sweep.answers.need import need as find
+    from boulder_sweep.answers.tables import checked_parquet
+    from boulder_sweep.cli.console import counted, say
+    from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
+
+    sweep = load_sweep(grid, overrides, quiet)
+    if out is not None:
+        checked_parquet(out)
+    if picture is not None:
+        from boulder_sweep.views.figures import checked_kind, require_matplotlib
+
+        require_matplotlib()
+        checked_kind(picture)
+    found = find(
+        sweep,
+        least,
+        most=most,
+        margin=margin,
+        between=between,
+        tolerance=tolerance,
+        both_readings=not own_readings,
+        jobs=jobs,
+    )
+    if as_json:
+        click.echo(json.dumps(found.to_dict()))
+    else:
+        click.echo("\n".join(found.lines()))
+    if not quiet:
+        counts = ", ".join(f"{word} {count:,}" for word, count in found.counts().items())
+        say(f"{counted(len(found), 'row')}: {counts}; {counted(found.simulated, 'simulation')}")
+    if out is not None:
+        found.write(out)
+    if picture is not None:
+        found.plot(picture)
+    errors = found.arrow["verdict"].to_pylist().count("error")
+    return EXIT_SOME_ROWS_FAILED if errors else EXIT_DONE

@@ -1,0 +1,127 @@
+"""Design chart: the least that passes over the size of the boulder, a curve for each soil, a band between readings."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS
+from boulder_sweep.errors import PictureError
+from boulder_sweep.views.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, figure
+from boulder_sweep.views.slices import label, unit_of, value_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from boulder_sweep.answers.need import Need
+
+ACROSS = (
+    *("boulder_height_m", "boulder_width_m", "boulder_length_m", "impact_speed_m_s", "vehicle_mass_kg"),
+    *("friction_angle_deg", "subgrade_reaction_MN_m3"),
+)
+CURVES = ("friction_angle_deg", "subgrade_reaction_MN_m3", "boulder_width_m", "impact_speed_m_s")
+"""What is across and what tells curves apart: the first of each that varies."""
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
+"""Of as many curves as can be told apart with their bands."""
+CHARACTERS_PER_INCH = 15
+
+
+def draw_design_chart(need: Need, path: str | Path) -> None:
+    """Draw the answers to a question.
+
+    Parameters
+    ----------
+    need
+        The answers.
+    path
+        Picture to write.
+
+    Raises
+    ------
+    PictureError
+        Nothing varies, or there is no answer to draw, or the picture cannot be written.
+    """
+    frame = need.frame
+    varying = [
+        name for name in INPUT_COLUMNS if name not in (need.key.name, *need.derived) and len(frame[name].unique()) > 1
+    ]
+    across = next((name for name in ACROSS if name in varying), next(iter(varying), None))
+    if across is None:
+        raise PictureError("a design chart needs an input with several values; this question has one answer, no curve")
+    over = next((name for name in CURVES if name in varying and name != across), None)
+    held = {}
+    for name in varying:
+        if name not in (across, over):
+            levels = np.unique(frame[name].astype(float))
+            held[name] = levels[len(levels) // 2]
+            frame = frame[frame[name].astype(float) == held[name]]
+    if frame[need.key.answer].isna().all():
+        raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
+    values = [None] if over is None else sorted(frame[over].astype(float).unique())
+    if len(values) > len(COLOURS):
+        values = [values[place] for place in np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
+    with figure(path, 7.2, 4.8) as fig:
+        axes = fig.subplots()
+        for colour, value in zip(COLOURS, values, strict=False):
+            rows = frame if value is None else frame[frame[over].astype(float) == value]
+            _curve(
+                axes, need, rows.sort_values(across), across, colour, "" if value is None else value_text(over, value)
+            )
+        axes.set_xlabel(label(across))
+        axes.set_ylabel(_answer_label(need))
+        axes.legend(loc="best")
+        fig.suptitle(f"{need.sweep.name}: {_title(need)}", x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+        fig.supxlabel(
+            textwrap.fill(_caption(need, held), int(CHARACTERS_PER_INCH * 7.2)),
+            x=0.01,
+            ha="left",
+            fontsize=8.0,
+            color=GREY,
+        )
+
+
+def _curve(axes: Axes, need: Need, rows: pd.DataFrame, across: str, colour: str, words: str) -> None:
+    """Draw the answers of one soil, and the band to those by other readings."""
+    x = rows[across].to_numpy(dtype=float)
+    y = rows[need.key.answer].to_numpy(dtype=float)
+    bound = (rows["found"] == "always").to_numpy()
+    axes.plot(x, y, color=colour, label=words or need.sweep.model.preset.replace("_", " "))
+    axes.plot(x[~bound], y[~bound], "o", color=colour, markersize=4)
+    axes.plot(x[bound], y[bound], "o", color=colour, markersize=4, markerfacecolor="white")
+    for name in need.others:
+        other = rows[f"{need.key.answer}_{name}"].to_numpy(dtype=float)
+        axes.fill_between(x, y, other, color=colour, alpha=0.13, linewidth=0)
+        axes.plot(x, other, color=colour, linewidth=0.9, linestyle=":")
+
+
+def _title(need: Need) -> str:
+    word = "largest" if need.key.most else "smallest"
+    return f"{word} {_words(need)} that passes"
+
+
+def _words(need: Need) -> str:
+    name = need.key.name
+    return label(name).partition(" [")[0] if name in BY_NAME else name.rpartition("_")[0].replace("_", " ")
+
+
+def _answer_label(need: Need) -> str:
+    unit = (
+        unit_of(need.key.name) if need.key.name in BY_NAME else {"1": ""}.get(need.key.field.unit, need.key.field.unit)
+    )
+    return f"{_words(need)} [{unit}]" if unit else _words(need)
+
+
+def _caption(need: Need, held: dict[str, float]) -> str:
+    """What else holds, and how to read the signs."""
+    parts = [value_text(name, value) for name, value in held.items()]
+    if need.least_margin:
+        parts.append(f"margin {need.least_margin:.0%} or more")
+    parts.append("hollow: passes in the whole range searched; no point: nothing passes")
+    if need.others:
+        own, other = (name.replace("_", " ") for name in (need.sweep.model.preset, need.others[0]))
+        parts.append(f"solid: {own}, dotted: {other}, the band is the doubt that the readings leave")
+    return "; ".join(parts)
