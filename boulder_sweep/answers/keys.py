@@ -10,7 +10,6 @@ import numpy as np
 
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.bounds import ADMITTED, REALISTIC
 from boulder_sweep.settings.leaf import LeafError, outside, read_single
 from boulder_sweep.settings.problems import Place, did_you_mean
 from boulder_sweep.settings.tree import Scalar
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from boulder_sweep.settings import Sweep
 
-BOULDER_MASS = fields.Field("boulder", "mass", "boulder_mass_kg", "kg")
+BOULDER_MASS = fields.Field("boulder", "mass", "boulder_mass_kg", "kg", "mass of the boulder")
 """The mass of the boulder, which is no input but follows from four."""
 Ends = tuple[str | float, str | float] | None
 """Range to be searched, as given by the user."""
@@ -36,7 +35,7 @@ TOLERANCES = {
     "N*s/m": 100.0,
 }
 """Distance of the values that are tried, by unit."""
-LEAST_RATIO = REALISTIC["embedment_ratio"].low
+LEAST_RATIO = 0.35
 """Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
 may slide a metre in place of turning, and pass; buried deeper it is held at its foot and turns over."""
 
@@ -110,22 +109,24 @@ def key_of(word: str, *, most: bool = False, tolerance: str | float | None = Non
 def _field(word: str) -> fields.Field:
     if word in (BOULDER_MASS.key, BOULDER_MASS.path, BOULDER_MASS.name):
         return BOULDER_MASS
-    found = [field for field in fields.FIELDS if word in (field.path, field.name)]
-    found = found or [field for field in fields.FIELDS if word == field.key]
+    found = [field for field in fields.INPUTS if word in (field.path, field.name)]
+    found = found or [field for field in fields.INPUTS if word == field.key]
     if len(found) == 1:
         return found[0]
     if found:
         raise QuestionError(f"'{word}' may be {' or '.join(field.path for field in found)}; say which")
-    other = next((field for field in fields.FIELDS if word.lower() in field.also), None)
-    hint = f"; did you mean {other.key}?" if other else did_you_mean(word, _words())
+    near = [known for known in _words() if word.lower() in known] or [
+        field.key for field in fields.INPUTS if word.lower() in field.also
+    ]
+    hint = f"; did you mean {' or '.join(near)}?" if near else did_you_mean(word, _words())
     raise QuestionError(f"'{word}' is not an input ({', '.join(_words())}){hint}")
 
 
 def _words() -> list[str]:
     """Return the shortest word of every input, and of the mass of the boulder."""
-    every = (*fields.FIELDS, BOULDER_MASS)
+    every = (*fields.INPUTS, BOULDER_MASS)
     keys = [field.key for field in every]
-    return [BOULDER_MASS.key, *(f.path if keys.count(f.key) > 1 else f.key for f in fields.FIELDS)]
+    return [BOULDER_MASS.key, *(f.path if keys.count(f.key) > 1 else f.key for f in fields.INPUTS)]
 
 
 def quantity(text: str | float, unit: str, option: str) -> float:
@@ -161,12 +162,12 @@ def bound(text: str | float, field: fields.Field) -> float:
     """
     option = "--between"
     if not isinstance(text, str):
-        problem = outside(float(text), field.name, field.unit)
+        problem = outside(float(text), field)
         if problem:
             raise QuestionError(f"{option}: {problem}")
         return float(text)
     try:
-        return read_single(Scalar(Place(option), text), field.name, field.unit)
+        return read_single(Scalar(Place(option), text), field)
     except LeafError as problem:
         raise QuestionError(f"{option} {text}: {problem}") from None
 
@@ -217,5 +218,6 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
         return LEAST_RATIO * one, 1.0 - bumper / height
     if key.name == "impact_height_m":
         return 0.0 * one, given["hood_height_m"]
-    usual = REALISTIC.get(key.name, ADMITTED[key.name])
+    usual = key.field.usual or key.field.admitted
+    assert usual is not None
     return usual.low * one, usual.high * one

@@ -173,7 +173,10 @@ def need(
     ------
     QuestionError
         The question makes no sense.
+    SettingsError
+        An input has a distribution.
     """
+    sweep.require_values()
     if least and most:
         raise QuestionError("ask for the least of one input or for the most of one, not for both")
     key = key_of(most or least or "embedment_depth", most=bool(most), tolerance=tolerance)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search, search
+from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, NOT_MONOTONE, Search, search
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
 
 if TYPE_CHECKING:
@@ -88,7 +88,8 @@ class Question:
             first, last = last, first
         trial = _Trial(self.key, self.judges, rows)
         found = search(trial.quick, first, last)
-        wrong = np.flatnonzero(~trial.certified(found))
+        # Rows that are not monotone have more changes than one bracket, and each has to be right.
+        wrong = np.flatnonzero(~trial.certified(found) | (found.kind == NOT_MONOTONE))
         if len(wrong):
             part = search(lambda index, places: trial.own(wrong[index], places), first[wrong], last[wrong])
             found = replaced(found, wrong, part)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.designs import DesignBlock, block_of
 from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
@@ -116,9 +115,3 @@ def ranges(count: int, most: int) -> Iterator[tuple[int, int]]:
         start, stop = count * piece // pieces, count * (piece + 1) // pieces
         if stop > start or count == 0:
             yield start, stop
-
-
-def inputs_at(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> Mapping[str, np.ndarray]:
-    """Return the input columns of some designs with open inputs filled in."""
-    block = taken(rows, index, **inputs)
-    return {name: block.columns[name].to_numpy() for name in INPUT_COLUMNS}

@@ -68,9 +68,8 @@ def draw_design_chart(need: Need, path: str | Path) -> None:
         axes = fig.subplots()
         for colour, value in zip(COLOURS, values, strict=False):
             rows = frame if value is None else frame[frame[over].astype(float) == value]
-            _curve(
-                axes, need, rows.sort_values(across), across, colour, "" if value is None else value_text(over, value)
-            )
+            words = "" if over is None or value is None else value_text(over, value)
+            _curve(axes, need, rows.sort_values(across), across, colour, words)
         axes.set_xlabel(label(across))
         axes.set_ylabel(_answer_label(need))
         axes.legend(loc="best")

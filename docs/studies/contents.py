@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import energy
+from docs.studies import answers, energy
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -154,5 +154,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "settings-entries": _settings_entries,
     "settings-choices": _settings_choices,
     "result-columns": _result_columns,
+    "need-site": answers.need_of_site,
+    "need-mass": answers.lightest_of_grid,
 }
 """Function of every block by its name."""

@@ -1,0 +1,260 @@
+"""The least that passes: every bracket is judged again as a run judges it."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+import boulder_sweep
+from boulder_sweep.answers.keys import key_of
+from boulder_sweep.answers.need import Need, need
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.errors import PictureError, QuestionError
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.settings import SettingsError, Sweep
+from boulder_sweep.settings.sweep import DesignList
+from tests.answers.designs import random_designs, site
+
+DEPTH = "embedment_depth_m"
+
+
+def passes(found: Need, frame: pd.DataFrame, values: pd.Series, column: str) -> np.ndarray:
+    """Judge the designs of some answers with a value in a column, as `sweep run` judges a list of designs."""
+    listed = {name: frame[name].to_numpy(dtype=float) for name in INPUT_COLUMNS if name != "impact_height_m"}
+    listed[column] = values.to_numpy(dtype=float)
+    sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed), model=found.sweep.model)
+    return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS
+
+
+def certify(found: Need) -> int:
+    """Judge both ends of all brackets again; return how many brackets there were."""
+    frame, column = found.frame, found.key.name
+    there = frame[frame.passes_at.notna()]
+    assert passes(found, there, there.passes_at, column).all()
+    assert (there.verdict == "pass").all()
+    bracketed = frame[frame.fails_at.notna()]
+    assert not passes(found, bracketed, bracketed.fails_at, column).any()
+    both = frame[frame.passes_at.notna() & frame.fails_at.notna()]
+    assert np.allclose((both.passes_at - both.fails_at).abs(), found.key.tolerance, rtol=1e-6)
+    return len(both)
+
+
+def test_brackets_of_random_designs_are_certified() -> None:
+    found = need(random_designs(1000), "embedment_depth", both_readings=False)
+    assert certify(found) >= 300
+    counts = found.counts()
+    assert sum(counts.values()) == len(found) == 1000
+    assert set(counts) >= {"found", "always", "never"}
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "fine"])
+@pytest.mark.parametrize("readings", ["corrected", "as_printed"])
+def test_brackets_hold_for_every_accuracy_and_reading(accuracy: str, readings: str) -> None:
+    assert certify(need(site(readings=readings, accuracy=accuracy), both_readings=False)) >= 4
+
+
+@pytest.mark.parametrize(
+    ("question", "column"),
+    [
+        ({"least": "height"}, "boulder_height_m"),
+        ({"least": "friction_angle"}, "friction_angle_deg"),
+        ({"least": "soil.density"}, "soil_density_kg_m3"),
+        ({"least": "width"}, "boulder_width_m"),
+        ({"most": "speed"}, "impact_speed_m_s"),
+        ({"most": "vehicle.mass"}, "vehicle_mass_kg"),
+    ],
+)
+def test_any_input_may_be_asked_for(question: dict[str, str], column: str) -> None:
+    sweep = site(height="3 m", friction="[36, 38, 40, 42] deg", site="embedment_depth: [1.9, 2.0, 2.1, 2.2] m")
+    found = need(sweep, **question, both_readings=False)
+    sense = "most" if "most" in question else "least"
+    assert found.key.answer == f"{sense}_{column}"
+    certify(found)
+    assert len(found) == (4 if column == "friction_angle_deg" else 16)
+
+
+def test_ratio_as_key() -> None:
+    depth = need(site(), "embedment_depth", both_readings=False).frame
+    ratio = need(site(), "embedment_ratio", both_readings=False).frame
+    assert np.allclose(
+        ratio.least_embedment_ratio * ratio.boulder_height_m, depth.least_embedment_depth_m, atol=4e-3, equal_nan=True
+    )
+
+
+def test_an_axis_is_the_range() -> None:
+    found = need(site(site="embedment_ratio: [0.6, 0.62]", height="3.4 m"), both_readings=False).frame
+    assert found[DEPTH].between(0.6 * 3.4 - 1e-3, 0.62 * 3.4 + 1e-3).all()
+    assert found.found.tolist() == ["never", "always"]
+    assert found.fails_at[0] == pytest.approx(0.62 * 3.4, abs=1e-3)
+    assert math.isnan(found.fails_at[1])
+
+
+def test_margin_needs_more_depth() -> None:
+    plain = need(site(), both_readings=False).frame
+    more = need(site(), margin="25 %", both_readings=False)
+    assert (more.frame.least_embedment_depth_m > plain.least_embedment_depth_m)[more.frame.passes_at.notna()].all()
+    assert more.frame.margin[more.frame.passes_at.notna()].between(0.25, 0.27).all()
+
+
+def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
+    found = need(site(height="2.6 m", friction="36 deg"), both_readings=False).frame.iloc[0]
+    assert found.found == "blocked_by_overlap"
+    assert math.isnan(found.passes_at)
+    assert found.fails_at < 2.6 - 0.5
+    assert found.reason == "overturns"
+
+
+def test_what_is_not_monotone_is_said_with_all_that_passes() -> None:
+    """Hardly buried, a boulder may slide less than is allowed; deeper it turns over; deeper still it is held."""
+    found = need(random_designs(300), between=("0.05 m", "1.2 m"), both_readings=False)
+    frame = found.frame[found.frame.found == "not_monotone"]
+    assert len(frame) >= 10
+    rows, inside, outside = [], [], []
+    for place, text in enumerate(frame.passes_within):
+        for stretch in text.split(", "):
+            low, high = map(float, stretch.split(" to "))
+            rows += [place, place]
+            inside += [low, high]
+            outside += [low - 1e-3 if low > 0.05 else np.nan, high + 1e-3 if high < 1.2 else np.nan]
+    assert len(rows) > 2 * len(frame), "some pass twice"
+    designs = frame.iloc[rows].reset_index(drop=True)
+    assert passes(found, designs, pd.Series(inside), DEPTH).all()
+    ends = np.isfinite(outside)
+    assert not passes(found, designs[ends], pd.Series(outside)[ends], DEPTH).any()
+    assert "*" in "\n".join(found.lines())
+
+
+def test_answers_do_not_depend_on_the_threads() -> None:
+    one, two = (need(site(), jobs=jobs) for jobs in (1, 2))
+    assert one.arrow.equals(two.arrow)
+
+
+def test_rows_do_not_depend_on_their_neighbours() -> None:
+    sweep = random_designs(40)
+    whole = need(sweep, both_readings=False).frame
+    assert sweep.table is not None
+    for row in (3, 17):
+        alone = DesignList("one.csv", {name: values[row : row + 1] for name, values in sweep.table.columns.items()})
+        frame = need(Sweep("one", None, (), sweep.constants, alone), both_readings=False).frame
+        for name in ("found", "passes_at", "max_rotation_deg"):
+            pd.testing.assert_series_equal(
+                frame[name].astype(str), whole[name][row : row + 1].astype(str).reset_index(drop=True)
+            )
+
+
+def test_both_readings() -> None:
+    found = need(site())
+    printed = need(site(readings="as_printed"), both_readings=False)
+    assert found.others == ["as_printed"]
+    pd.testing.assert_series_equal(
+        found.frame.least_embedment_depth_m_as_printed, printed.frame.least_embedment_depth_m, check_names=False
+    )
+
+
+def test_the_lightest_boulder_is_lighter_than_any_of_the_grid(tmp_path: Path) -> None:
+    sweep = site(
+        width="{from: 1.4 m, to: 2.0 m, step: 0.1 m}",
+        height="{from: 2.6 m, to: 3.4 m, step: 0.1 m}",
+        site="embedment_ratio: {from: 0.55, to: 0.75, step: 0.02}",
+        friction="[38, 41] deg",
+    )
+    boulder_sweep.run(sweep, tmp_path / "grid")
+    table = boulder_sweep.read(tmp_path / "grid")
+    table = table[table.verdict == "pass"].astype({"friction_angle_deg": float})
+    mass = table.boulder_length_m.astype(float) * table.boulder_width_m.astype(float)
+    mass *= table.boulder_height_m.astype(float) * table.boulder_density_kg_m3.astype(float)
+    of_grid = mass.groupby(table.friction_angle_deg).min()
+    found = need(sweep, "mass")
+    frame = found.frame
+    assert (frame.least_boulder_mass_kg.to_numpy() <= of_grid.to_numpy()).all()
+    assert (frame.least_boulder_mass_kg.to_numpy() > 0.9 * of_grid.to_numpy()).all()
+    assert np.allclose(frame.boulder_mass_kg, frame.passes_at)
+    assert (frame.fails_at < frame.passes_at).all()
+    assert passes(found, frame, frame[DEPTH], DEPTH).all()
+    assert frame.boulder_width_m.between(1.4, 2.0).all()
+    assert (frame[DEPTH] / frame.boulder_height_m).between(0.549, 0.751).all()
+
+
+def test_one_boulder_is_scaled_with_its_proportions() -> None:
+    frame = need(site(height="3 m", site="embedment_ratio: 0.65"), "mass").frame
+    assert np.allclose(frame.boulder_height_m / frame.boulder_length_m, 3.0 / 1.65, rtol=2e-3)
+    assert np.allclose(frame[DEPTH] / frame.boulder_height_m, 0.65, rtol=2e-3)
+    assert frame.boulder_mass_kg.is_monotonic_decreasing, "a stronger soil needs a lighter boulder"
+
+
+@pytest.mark.parametrize(
+    ("question", "message"),
+    [
+        ({"least": "density"}, r"may be boulder\.density or soil\.density"),
+        ({"least": "phi"}, "did you mean friction_angle"),
+        ({"least": "depht"}, "is not an input"),
+        ({"least": "speed", "most": "speed"}, "not for both"),
+        ({"between": ("2 m", "1 m")}, "less than the second"),
+        ({"between": ("2 kg", "3 kg")}, "a length is needed"),
+        ({"between": ("1 m", "50 m")}, "admitted range"),
+        ({"margin": "120 %"}, "less than 100 %"),
+        ({"margin": "-1"}, "less than 100 %"),
+        ({"tolerance": "0 mm"}, "must be positive"),
+        ({"tolerance": "1 deg"}, "a length is needed"),
+        ({"most": "mass"}, "ask for the least"),
+    ],
+)
+def test_questions_that_make_no_sense_are_refused(question: dict, message: str) -> None:
+    with pytest.raises(QuestionError, match=message):
+        need(site(), **question)
+
+
+def test_a_list_of_designs_has_no_bounds_for_the_mass() -> None:
+    with pytest.raises(QuestionError, match="a list of designs has none"):
+        need(random_designs(3), "mass")
+
+
+def test_distributions_are_refused() -> None:
+    with pytest.raises(SettingsError, match="distribution"):
+        need(site(friction="{mean: 38 deg, sd: 3 deg}"))
+
+
+def test_tolerance_makes_the_lattice() -> None:
+    assert (
+        need(site(), tolerance="5 cm", both_readings=False).frame.passes_at.dropna().mul(20).mod(1).abs().max() < 1e-9
+    )
+    assert key_of("embedment_depth").values(np.array([1234]))[0] == 1.234
+
+
+def test_table_has_units_and_settings(tmp_path: Path) -> None:
+    found = need(site())
+    path = found.write(tmp_path / "depths.parquet")
+    schema = pq.read_schema(path)
+    assert schema.field("least_embedment_depth_m").metadata[b"unit"] == b"m"
+    assert json.loads(schema.metadata[b"boulder_sweep.question"])["asked"] == "least_embedment_depth_m"
+    assert json.loads(schema.metadata[b"boulder_sweep.settings"])["name"] == "site"
+    frame = pd.read_parquet(path)
+    pd.testing.assert_frame_equal(frame, found.frame, check_exact=True)
+    assert frame.attrs["units"]["fails_at"] == "m"
+    with pytest.raises(QuestionError, match=r"must end in \.parquet"):
+        found.write(tmp_path / "depths.csv")
+    with pytest.raises(QuestionError, match="does not exist"):
+        found.write(tmp_path / "missing" / "depths.parquet")
+
+
+def test_chart_is_drawn(tmp_path: Path) -> None:
+    need(site()).plot(tmp_path / "chart.png")
+    need(site(), "mass").plot(tmp_path / "mass.png")
+    assert (tmp_path / "chart.png").stat().st_size > 10_000
+    with pytest.raises(PictureError, match="no curve"):
+        need(site(height="3 m", friction="40 deg")).plot(tmp_path / "one.png")
+    with pytest.raises(PictureError, match="nothing passes"):
+        need(site(), margin="99 %").plot(tmp_path / "none.png")
+
+
+def test_public_name() -> None:
+    assert boulder_sweep.need is need
+    assert boulder_sweep.Need is Need

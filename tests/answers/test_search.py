@@ -1,0 +1,115 @@
+"""Scan and bisection against what is known of made-up rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boulder_sweep.answers.search import (
+    ALWAYS,
+    BEYOND,
+    BLOCKED,
+    FAILS,
+    FOUND,
+    HOLDS,
+    NEVER,
+    NOT_MONOTONE,
+    Predicate,
+    search,
+)
+
+
+def stretches(*rows: list[tuple[int, int, int]]) -> Predicate:
+    """Return a predicate that gives the code of the first stretch [from, to, code] that holds a place; FAILS else."""
+
+    def predicate(index: np.ndarray, places: np.ndarray) -> np.ndarray:
+        found = np.full(len(index), FAILS)
+        for k, (row, place) in enumerate(zip(index, places, strict=True)):
+            for low, high, code in rows[row]:
+                if low <= place <= high:
+                    found[k] = code
+                    break
+        return found
+
+    return predicate
+
+
+def one(*stretch: tuple[int, int, int], first: int = 0, last: int = 1000, cells: int = 16):
+    return search(stretches(list(stretch)), np.array([first]), np.array([last]), cells)
+
+
+@pytest.mark.parametrize("begins", [1, 2, 62, 63, 64, 500, 999, 1000])
+@pytest.mark.parametrize("cells", [1, 7, 16])
+def test_the_first_place_is_found_exactly(begins: int, cells: int) -> None:
+    found = one((begins, 1000, HOLDS), cells=cells)
+    assert (found.kind[0], found.fails[0], found.holds[0], found.shown[0]) == (FOUND, begins - 1, begins, begins)
+
+
+@pytest.mark.parametrize("ends", [0, 1, 437, 998])
+def test_downwards_the_largest_is_found(ends: int) -> None:
+    found = one((0, ends, HOLDS), first=1000, last=0)
+    assert (found.kind[0], found.fails[0], found.holds[0]) == (FOUND, ends + 1, ends)
+
+
+def test_random_rows_together_as_alone() -> None:
+    rng = np.random.default_rng(5)
+    first = rng.integers(-500, 500, 200)
+    last = first + rng.integers(0, 2000, 200)
+    begins = rng.integers(-600, 2600, 200)
+
+    def predicate(index: np.ndarray, places: np.ndarray) -> np.ndarray:
+        return np.where(places >= begins[index], HOLDS, FAILS)
+
+    found = search(predicate, first, last)
+    for row in range(200):
+        kind = ALWAYS if begins[row] <= first[row] else NEVER if begins[row] > last[row] else FOUND
+        assert found.kind[row] == kind
+        if kind == FOUND:
+            assert (found.fails[row], found.holds[row]) == (begins[row] - 1, begins[row])
+        assert found.has_fails[row] == (kind != ALWAYS)
+        assert found.has_holds[row] == (kind != NEVER)
+
+
+def test_always_and_never() -> None:
+    assert one((0, 1000, HOLDS)).kind[0] == ALWAYS
+    never = one()
+    assert (never.kind[0], never.shown[0], never.fails[0]) == (NEVER, 1000, 1000)
+
+
+def test_blocked_ends_at_the_last_place_that_can_be_tried() -> None:
+    found = one((777, 1000, BEYOND))
+    assert (found.kind[0], found.shown[0], found.has_holds[0]) == (BLOCKED, 776, False)
+
+
+def test_what_holds_in_a_narrow_stretch_before_the_end_is_found() -> None:
+    found = one((770, 776, HOLDS), (777, 1000, BEYOND))
+    assert (found.kind[0], found.fails[0], found.holds[0]) == (FOUND, 769, 770)
+
+
+def test_nothing_to_try_below_is_no_failure() -> None:
+    found = one((0, 300, BEYOND), (350, 1000, HOLDS))
+    assert (found.kind[0], found.fails[0], found.holds[0]) == (FOUND, 349, 350)
+    assert one((0, 300, BEYOND), (301, 1000, HOLDS)).holds[0] == 301
+
+
+def test_nothing_to_try_at_all() -> None:
+    found = one((0, 1000, BEYOND))
+    assert (found.kind[0], found.has_holds[0]) == (BLOCKED, False)
+
+
+def test_rows_that_are_not_monotone_tell_every_change() -> None:
+    found = one((200, 400, HOLDS), (700, 1000, HOLDS))
+    assert (found.kind[0], found.fails[0], found.holds[0]) == (NOT_MONOTONE, 199, 200)
+    assert found.changes == {0: [(199, 200, True), (400, 401, False), (699, 700, True)]}
+    first = one((0, 400, HOLDS))
+    assert (first.kind[0], first.has_fails[0], first.changes[0]) == (NOT_MONOTONE, False, [(400, 401, False)])
+
+
+def test_a_range_of_one_place() -> None:
+    assert one((5, 5, HOLDS), first=5, last=5).kind[0] == ALWAYS
+    assert one(first=5, last=5).kind[0] == NEVER
+
+
+def test_no_rows() -> None:
+    nothing = np.zeros(0, dtype=np.int64)
+    assert len(search(stretches(), nothing, nothing).kind) == 0

@@ -1,0 +1,67 @@
+"""``sweep need``: a table for a terminal, one JSON object, files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+CONFIG = Path(__file__).parents[2] / "configs" / "site.yaml"
+
+
+def test_table_fits_the_terminal(sweep):
+    for words in ([], ["--least", "mass"], ["--most", "speed"], ["--margin", "10 %"]):
+        code, out, err = sweep("need", CONFIG, *words)
+        assert code == 0
+        assert all(len(line) <= 80 for line in out.splitlines())
+        assert "simulations" in err
+
+
+def test_columns_of_the_table(sweep):
+    _, out, _ = sweep("need", CONFIG, "-q")
+    head = out.splitlines()[0].split()
+    assert head == ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "printed"]
+    assert len(out.splitlines()) >= 3 + 12
+
+
+def test_json_and_parquet_agree(sweep, tmp_path):
+    code, out, _ = sweep("need", CONFIG, "--json", "-o", tmp_path / "depths.parquet", "--plot", tmp_path / "d.png")
+    found = json.loads(out)
+    frame = pd.read_parquet(tmp_path / "depths.parquet")
+    assert code == 0
+    assert found["asked"] == "least_embedment_depth_m"
+    assert found["unit"] == "m"
+    assert len(found["rows"]) == len(frame) == 12
+    assert [row["found"] for row in found["rows"]] == frame.found.tolist()
+    assert sum(found["found"].values()) == 12
+    assert (tmp_path / "d.png").exists()
+
+
+def test_the_answer_typed_into_the_file_passes(sweep, tmp_path):
+    out = sweep("need", CONFIG, "--json", "--set", "boulder.height=3 m", "--set", "soil.friction_angle=40 deg")[1]
+    row = json.loads(out)["rows"][0]
+    for value, verdict in ((row["passes_at"], "pass"), (row["fails_at"], "fail")):
+        words = ["boulder.height=3 m", "soil.friction_angle=40 deg", f"site.embedment_depth={value} m"]
+        options = [part for word in words for part in ("--set", word)]
+        assert json.loads(sweep("simulate", CONFIG, *options, "--json")[1])["verdict"] == verdict
+
+
+def test_rows_that_cannot_be_computed_give_exit_code_3(sweep):
+    code, _, _ = sweep("need", CONFIG, "--set", "vehicle.bumper_height=[0.5, 2] m")
+    assert code == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--least", "depth"], "did you mean embedment_depth?"),
+        (["-o", "depths.csv"], "must end in .parquet"),
+        (["--plot", "chart.bmp"], "must end in"),
+    ],
+)
+def test_mistakes_are_said_before_anything_is_computed(sweep, words, message):
+    code, out, err = sweep("need", CONFIG, *words)
+    assert (code, out) == (2, "")
+    assert message in err
