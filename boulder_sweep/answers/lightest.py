@@ -182,7 +182,7 @@ class _Boulders:
             part = self.least(wrong, {side: values[wrong] for side, values in others.items()}, quick=False)
             found = replaced(found, wrong, part)
         block, judged, count = self.judged(index, found.shown, others, DEPTHS_AT_LAST, quick=False)
-        rank = np.where(self.judges.holds(judged), judged.margin, -1.0).reshape(n, count)
+        rank = np.where(self.judges.holds(judged), judged["margin"], -1.0).reshape(n, count)
         # Of depths that do not pass the last one is shown, else the one with the largest margin.
         chosen = np.where(rank.max(axis=1) < 0.0, count - 1, rank.argmax(axis=1)) + index * count
         columns = {side: block.columns[side].to_numpy()[chosen] for side in (*SIDES, DEPTH)}

@@ -89,7 +89,7 @@ class Judges:
     def holds(self, judged: Judged) -> np.ndarray:
         """Whether rows pass with the margin that is asked for, bool, shape (n,)."""
         passes = judged.verdict == PASS
-        return passes & (judged.margin >= self.least_margin) if self.least_margin > 0.0 else passes
+        return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
 
 
 def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
