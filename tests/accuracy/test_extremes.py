@@ -123,7 +123,9 @@ def test_a_limit_exactly_at_the_peak(off: float) -> None:
     assert rows.verdict[0] in (1, 2)  # fail or undecided
 
 
-@pytest.mark.parametrize("readings", [Readings(*bits) for bits in ((1, 1, 1, 1, 0), (0, 1, 0, 0, 1), (1, 0, 1, 0, 1))])
+@pytest.mark.parametrize(
+    "readings", [Readings(*map(bool, bits)) for bits in ((1, 1, 1, 1, 0), (0, 1, 0, 0, 1), (1, 0, 1, 0, 1))]
+)
 @pytest.mark.parametrize("step_s", [0.004, 0.016, 0.1, 1.0])
 def test_many_events_in_a_step(readings: Readings, step_s: float) -> None:
     """Long steps hold several events each; the answer stays that of short ones as far as such steps allow."""

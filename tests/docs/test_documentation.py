@@ -26,6 +26,7 @@ def page(name: str) -> str:
     return (DOCS / name).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_no_number_has_drifted() -> None:
     """Write them anew with ``python -m docs.studies``."""
     assert differences(ROOT, compute(ROOT)) == []
@@ -46,6 +47,7 @@ def test_numbers_in_prose_are_those_of_the_studies() -> None:
     assert f"{NOISE_MM:g} mm and {NOISE_G:g} g" in page("vehicle.md")
 
 
+@pytest.mark.slow
 def test_conclusions_in_prose_hold() -> None:
     study = readings_of_grid(ROOT)
     assert all(row.abg_verdict == "fail, overturns" for row in study.rows)

@@ -80,7 +80,7 @@ def compare(design: bk.Design, readings: bk.Readings, limit: float) -> bool:
     return True
 
 
-@pytest.mark.parametrize("case", ["ABG", "RWG"])
+@pytest.mark.parametrize("case", [pytest.param("ABG", marks=pytest.mark.slow), "RWG"])
 @pytest.mark.parametrize("name", single_switches())
 def test_crash_tests_in_every_single_reading(name: str, case: str) -> None:
     """To half a turn: ABG tips over in all of them, and is followed all the way."""
@@ -95,12 +95,12 @@ def mixed(count: int, seed: int) -> list[tuple[bk.Design, bk.Readings]]:
 
 
 def test_random_designs_in_mixed_readings() -> None:
-    excused = sum(compare(design, readings, LIMIT) for design, readings in mixed(32, seed=71))
+    excused = sum(compare(design, readings, LIMIT) for design, readings in mixed(8, seed=71))
     assert excused <= 1
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(72, 80))
+@pytest.mark.parametrize("seed", range(71, 80))
 def test_many_random_designs_in_mixed_readings(seed: int) -> None:
     excused = sum(compare(design, readings, LIMIT) for design, readings in mixed(64, seed))
     assert excused <= 2

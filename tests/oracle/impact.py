@@ -8,6 +8,7 @@ mode changes, and the integration starts anew.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +31,7 @@ _LONGEST_STEP = 2e-3  # [s]: keeps the samples within a step closer than any two
 _MOST_EVENTS = 20_000
 
 
+@cache
 def simulate(
     inputs: Inputs,
     readings: Readings,
@@ -40,7 +42,7 @@ def simulate(
     rtol: float = 1e-10,
     land_on_kinks: bool = True,
 ) -> Impact:
-    """Simulate one impact.
+    """Simulate one impact; the same one again is not simulated again.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
 
 @pytest.fixture(scope="module")
 def found() -> Tradeoff:
-    return measure(grid(), designs=120)
+    return measure(grid(), designs=60)
 
 
 def test_every_representation_step_and_reading_is_there(found: Tradeoff) -> None:
@@ -49,6 +49,7 @@ def test_errors_are_ordered_and_fall_with_the_step(found: Tradeoff) -> None:
     assert [p.rotation_rms_deg for p in sums] == sorted((p.rotation_rms_deg for p in sums), reverse=True)
 
 
+@pytest.mark.slow
 def test_errors_depend_on_the_sweep_alone() -> None:
     one, other = (measure(grid(), designs=40, seconds=60.0) for _ in range(2))
     for a, b in zip(one.points, other.points, strict=True):

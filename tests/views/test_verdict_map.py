@@ -153,6 +153,7 @@ def drawn(table, monkeypatch: pytest.MonkeyPatch, path: Path, **options: Any) ->
     with monkeypatch.context() as patch:
         patch.setattr(Axes, "pcolormesh", noted)
         patch.setattr(Axes, "scatter", noted)
+        patch.setattr("boulder_sweep.views.figures.save", lambda fig, target: None)
         return draw_verdict_map(table, path, **options), numbers
 
 
@@ -167,7 +168,7 @@ def in_pieces(table: pd.DataFrame, size: int) -> Pieces:
     return pieces
 
 
-@pytest.mark.parametrize("size", [1, 7, 100, 10_000])
+@pytest.mark.parametrize("size", [1, 7, 100])
 @pytest.mark.parametrize("cells", [True, False])
 def test_a_table_in_pieces_gives_the_same_picture(table, tmp_path, monkeypatch, size, cells):
     if not cells:
