@@ -10,12 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from boulder_sweep.judge.verdict import Facts
 
 ColumnType = Literal["int64", "float64", "dictionary"]
 Rows = Literal["computed", "standing", "overturned"]
@@ -56,14 +53,15 @@ class OutcomeColumn(ColumnSpec):
     Attributes
     ----------
     value : callable
-        From what is known of n rows to the values of the column, shape (n,): numbers in `unit`, or codes.
+        From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
+        (n,): numbers in `unit`, or codes.
     rows : {'computed', 'standing', 'overturned'}
         Which rows have a number; null elsewhere. *Standing* are those computed that did not overturn.
     words : tuple of str
         What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
     """
 
-    value: Callable[[Facts], np.ndarray]
+    value: Callable[[Any], np.ndarray]
     rows: Rows = "computed"
     words: tuple[str, ...] = ()
 

@@ -82,12 +82,6 @@ class Need:
         derived = tuple(name for name in ("embedment_depth_m", "impact_height_m") if name not in given)
         return (*derived, *SIDES, "embedment_depth_m") if self.key.name == BOULDER_MASS.name else derived
 
-    def lines(self, width: int = 80) -> list[str]:
-        """Return the answers as lines for a terminal."""
-        from boulder_sweep.answers.printing import need_lines
-
-        return need_lines(self, width)
-
     def counts(self) -> dict[str, int]:
         """Return how many rows were answered in which way."""
         found = self.arrow["found"].combine_chunks().value_counts().to_pylist()

@@ -56,6 +56,7 @@ def need(
     passes and the one next to it that does not, both judged as `sweep run` judges them.
     """
     from boulder_sweep.answers.need import need as find
+    from boulder_sweep.answers.printing import need_lines
     from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.cli.console import counted, say
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
@@ -81,7 +82,7 @@ def need(
     if as_json:
         click.echo(json.dumps(found.to_dict()))
     else:
-        click.echo("\n".join(found.lines()))
+        click.echo("\n".join(need_lines(found)))
     if not quiet:
         counts = ", ".join(f"{word} {count:,}" for word, count in found.counts().items())
         say(f"{counted(len(found), 'row')}: {counts}; {counted(found.simulated, 'simulation')}")

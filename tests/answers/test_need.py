@@ -14,6 +14,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -129,7 +130,7 @@ def test_what_is_not_monotone_is_said_with_all_that_passes() -> None:
     assert passes(found, designs, pd.Series(inside), DEPTH).all()
     ends = np.isfinite(outside)
     assert not passes(found, designs[ends], pd.Series(outside)[ends], DEPTH).any()
-    assert "*" in "\n".join(found.lines())
+    assert "*" in "\n".join(need_lines(found))
 
 
 def test_answers_do_not_depend_on_the_threads() -> None:
