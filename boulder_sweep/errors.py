@@ -59,6 +59,10 @@ class QuestionError(BoulderSweepError, ValueError):
     """A question that cannot be answered as it is put."""
 
 
+class ReportError(BoulderSweepError):
+    """A report cannot be written."""
+
+
 class Interrupted(KeyboardInterrupt):
     """A run was stopped by a signal; the finished rows are safe and the run can be resumed.
 

@@ -13,10 +13,12 @@ import click
 # `sweep --help` and `sweep check` are instant.
 from boulder_sweep.cli.check import check
 from boulder_sweep.cli.explain import explain
+from boulder_sweep.cli.explore import explore
 from boulder_sweep.cli.fit_vehicle import fit_vehicle
 from boulder_sweep.cli.need import need
 from boulder_sweep.cli.options import GROUP_EPILOG, OrderedGroup, version_option
 from boulder_sweep.cli.plot import plot
+from boulder_sweep.cli.report import report
 from boulder_sweep.cli.run import run
 from boulder_sweep.cli.simulate import simulate
 from boulder_sweep.cli.status import status
@@ -24,7 +26,7 @@ from boulder_sweep.cli.tradeoff import tradeoff
 from boulder_sweep.cli.validate import validate
 from boulder_sweep.errors import EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError, Interrupted
 
-COMMANDS = (run, check, need, simulate, status, plot, explain, tradeoff, validate, fit_vehicle)
+COMMANDS = (run, check, need, simulate, explore, status, plot, report, explain, tradeoff, validate, fit_vehicle)
 """In the order of ``sweep --help``."""
 EXIT_INTERRUPTED = 130
 REPORT = "this is a bug in boulder-sweep, not in your file; please report it with the command and the file"

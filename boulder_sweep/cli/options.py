@@ -96,6 +96,13 @@ def json_option(function: Command) -> Command:
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")(function)
 
 
+def units_option(function: Command) -> Command:
+    """Add ``--units``."""
+    return click.option(
+        "--units", type=click.Choice(["si", "us"]), default="si", show_default=True, help="Units to begin with."
+    )(function)
+
+
 def talk_options(function: Command) -> Command:
     """Add ``-q`` and ``-v``, which exclude each other."""
 

@@ -1,0 +1,47 @@
+"""``sweep report``: a result as one page that carries the simulator."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+
+import click
+
+from boulder_sweep.cli.options import units_option
+
+EXAMPLES = """\b
+Examples:
+  sweep report m30-sizing.sweep
+  sweep report m30-sizing.sweep --design 4711 --design 104960 -o site.html
+  sweep report m30-sizing.sweep --units us
+"""
+
+
+@click.command("report", short_help="Write a result as one page with the simulator inside.", epilog=EXAMPLES)
+@click.argument("out", type=click.Path())
+@click.option("-o", "--output", "page", type=click.Path(), metavar="F.html", help="The page [default: OUT.html].")
+@click.option(
+    "--design",
+    "designs",
+    type=click.IntRange(min=0),
+    multiple=True,
+    metavar="N",
+    help="Show this design in full (may be repeated) [default: the lightest and the shallowest that pass].",
+)
+@units_option
+def report(out: str, page: str | None, designs: tuple[int, ...], units: str) -> int:
+    """Write the result in OUT as one HTML file: the answer, the map, and the simulator, which runs in the page.
+
+    The file needs no network and no server: it opens from disk in any browser, and whoever gets it can change a
+    design and see the impact simulated anew.
+    """
+    from boulder_sweep.report import write_report
+
+    folder = Path(out)
+    beside = folder if folder.name else folder.resolve()
+    target = Path(page or f"{str(beside).removesuffix('.sweep')}.html")
+    command = shlex.join(["sweep", *sys.argv[1:]])
+    written = write_report(folder, target, designs=designs, units=units, command=command)
+    click.echo(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")
+    return 0

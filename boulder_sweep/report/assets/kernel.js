@@ -1,0 +1,115 @@
+// @ts-check
+"use strict";
+
+/**
+ * Names of the numbers that the kernel takes and gives, each in its order; written by Python.
+ * @typedef {{design: string[], settings: string[], outcome: string[], history: string[]}} Layout
+ */
+
+/**
+ * A design in the kernel's terms and units (SI, rad): numbers by the names of `Layout.design`.
+ * @typedef {Record<string, number>} KernelDesign
+ */
+
+/**
+ * @typedef {object} Motion
+ * @property {Float64Array} time
+ * @property {Record<string, Float64Array>} columns by the names of `Layout.history`; the samples that were reached
+ * @property {number} c_x centre of mass of boulder and soil, from the lower left corner of the boulder [m]
+ * @property {number} c_y
+ */
+
+/** The compiled kernels. Every call writes its arguments into the module's memory and reads the results there. */
+class Kernel {
+  /**
+   * @param {WebAssembly.Instance} instance
+   * @param {Layout} layout
+   */
+  constructor(instance, layout) {
+    /** @type {any} */
+    this.exports = instance.exports;
+    this.layout = layout;
+    this.exports._initialize();
+    /** Where the memory is free; the first two places are those of `call`. */
+    this.base = Math.ceil(this.exports.__heap_base.value / 8) * 8;
+  }
+
+  /**
+   * @param {string} base64 the module
+   * @param {Layout} layout
+   */
+  static async load(base64, layout) {
+    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+    return new Kernel((await WebAssembly.instantiate(bytes)).instance, layout);
+  }
+
+  /**
+   * Lay arrays one behind the other into the memory.
+   * @param {number[]} lengths
+   * @returns {{at: number[], views: Float64Array[]}} their addresses, and views of them
+   */
+  room(lengths) {
+    const memory = this.exports.memory;
+    let next = this.base;
+    const at = lengths.map((length) => {
+      const here = next;
+      next += 8 * length;
+      return here;
+    });
+    const lacking = next - memory.buffer.byteLength;
+    if (lacking > 0) memory.grow(Math.ceil(lacking / 65536));
+    return { at, views: lengths.map((length, i) => new Float64Array(memory.buffer, at[i], length)) };
+  }
+
+  /**
+   * Call an exported function. Before its own arguments, compiled Python takes the addresses of a result and of an
+   * exception; none of ours uses them, and what it returns is 0 where all went well.
+   * @param {string} name
+   * @param {number[]} values
+   */
+  call(name, values) {
+    const status = this.exports[name](this.base, this.base + 8, ...values);
+    if (status !== 0) throw new Error(`the kernel ended with status ${status}`);
+  }
+
+  /**
+   * Simulate designs up to their verdict.
+   * @param {KernelDesign[]} designs
+   * @param {number[]} settings in the order of `Layout.settings`
+   * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome`
+   */
+  outcomes(designs, settings) {
+    const { design, outcome } = this.layout;
+    const n = designs.length;
+    const { at, views } = this.room([2, design.length * n, settings.length, outcome.length * n, outcome.length * n]);
+    design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
+    views[2].set(settings);
+    this.call("outcomes", [at[1], n, at[2], at[3], at[4]]);
+    return Object.fromEntries(outcome.map((name, k) => [name, views[3].slice(k * n, (k + 1) * n)]));
+  }
+
+  /**
+   * Simulate one design over time.
+   * @param {KernelDesign} one
+   * @param {number[]} settings in the order of `Layout.settings`
+   * @param {Float64Array} times ascending [s]
+   * @returns {Motion}
+   */
+  history(one, settings, times) {
+    const { design, history } = this.layout;
+    const n = times.length;
+    const { at, views } = this.room([2, design.length, settings.length, n, 6 * n, 2 * n, 4 * n, history.length * n, 2]);
+    design.forEach((name, field) => (views[1][field] = one[name]));
+    views[2].set(settings);
+    views[3].set(times);
+    this.call("history", [at[1], at[2], n, ...at.slice(3)]);
+    const end = views[7].subarray(0, n).findIndex(Number.isNaN);
+    const reached = end < 0 ? n : end;
+    return {
+      time: times.slice(0, reached),
+      columns: Object.fromEntries(history.map((name, k) => [name, views[7].slice(k * n, k * n + reached)])),
+      c_x: views[8][0],
+      c_y: views[8][1],
+    };
+  }
+}

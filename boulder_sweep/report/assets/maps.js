@@ -1,0 +1,116 @@
+// @ts-check
+"use strict";
+
+/**
+ * Rows of a table: a code for each design of a grid (the last axis fastest) or of a list; written by Python.
+ * @typedef {object} TableRows
+ * @property {string[]} names what a code stands for
+ * @property {boolean} grid
+ * @property {Record<string, number[]>} values along each axis, or of each design of the list
+ * @property {Record<string, number>} given inputs that are the same for all
+ * @property {Record<string, string>} labels
+ * @property {Record<string, string>} units
+ * @property {string} codes
+ */
+
+/**
+ * One rectangle of a map.
+ * @typedef {{x: number, y: number, name: string, margin?: number | null, pick: () => Record<string, number>}} Cell
+ */
+
+/**
+ * Unpack what Python packed.
+ * @param {string} base64
+ */
+async function unpacked(base64) {
+  const packed = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/**
+ * The ends of the intervals around ascending values, halfway between neighbours.
+ * @param {number[]} values
+ */
+function ends(values) {
+  const inner = values.slice(1).map((value, k) => (value + values[k]) / 2);
+  const [first, last] = [values[0], values[values.length - 1]];
+  if (inner.length === 0) return [first - 0.05 * Math.abs(first) - 1e-9, last + 0.05 * Math.abs(last) + 1e-9];
+  return [2 * first - inner[0], ...inner, 2 * last - inner[inner.length - 1]];
+}
+
+/**
+ * Draw cells.
+ * @param {Plots} plots
+ * @param {string} panel
+ * @param {Cell[]} cells
+ * @param {{x: string, y: string}} labels
+ * @param {{x: string, y: string}} shownUnits units of the table
+ * @param {Units} units
+ * @param {Record<string, string>} colours by verdict
+ * @param {{x: number, y: number} | null} here the design shown elsewhere
+ */
+function drawCells(plots, panel, cells, labels, shownUnits, units, colours, here) {
+  const [sx, sy] = [units.size(shownUnits.x), units.size(shownUnits.y)];
+  /** @param {number[]} values */
+  const steps = (values) => {
+    const levels = [...new Set(values)].sort((a, b) => a - b);
+    const limits = ends(levels);
+    return new Map(levels.map((level, k) => [level, [limits[k], limits[k + 1]]]));
+  };
+  const [xs, ys] = [steps(cells.map((cell) => cell.x)), steps(cells.map((cell) => cell.y))];
+  /** @param {Map<number, number[]>} map @param {number} value @param {number} end */
+  const limit = (map, value, end) => /** @type {number[]} */ (map.get(value))[end];
+  plots.fill(`${panel}-cells`, {
+    left: cells.map((cell) => limit(xs, cell.x, 0) / sx),
+    right: cells.map((cell) => limit(xs, cell.x, 1) / sx),
+    bottom: cells.map((cell) => limit(ys, cell.y, 0) / sy),
+    top: cells.map((cell) => limit(ys, cell.y, 1) / sy),
+    colour: cells.map((cell) => colourOf(cell.name, colours)),
+    verdict: cells.map((cell) => cell.name),
+    across: cells.map((cell) => cell.x / sx),
+    up: cells.map((cell) => cell.y / sy),
+    margin: cells.map((cell) => cell.margin ?? NaN),
+  });
+  plots.fill(`${panel}-here`, here === null ? { x: [], y: [] } : { x: [here.x / sx], y: [here.y / sy] });
+  plots.title(`${panel}-map`, units.title(labels.x, shownUnits.x), units.title(labels.y, shownUnits.y));
+}
+
+/** @param {string} name verdict and reason @param {Record<string, string>} colours @returns {string} */
+function colourOf(name, colours) {
+  return colours[name] ?? colours[name.split(":")[0]] ?? colours.none;
+}
+
+/**
+ * The cells of a table over two of its inputs, the others held.
+ * @param {TableRows} rows
+ * @param {Uint8Array} codes
+ * @param {string} across
+ * @param {string} up
+ * @param {Record<string, number>} held place along every other axis
+ * @returns {Cell[]}
+ */
+function tableCells(rows, codes, across, up, held) {
+  const names = Object.keys(rows.values);
+  if (!rows.grid) {
+    return [...codes].map((code, row) => ({
+      x: rows.values[across][row],
+      y: rows.values[up][row],
+      name: rows.names[code],
+      pick: () => Object.fromEntries(names.map((name) => [name, rows.values[name][row]])),
+    }));
+  }
+  const lengths = names.map((name) => rows.values[name].length);
+  const strides = lengths.map((_, k) => lengths.slice(k + 1).reduce((a, b) => a * b, 1));
+  const [i, j] = [names.indexOf(across), names.indexOf(up)];
+  const base = names.reduce((sum, name, k) => sum + (k === i || k === j ? 0 : held[name] * strides[k]), 0);
+  return rows.values[across].flatMap((x, a) =>
+    rows.values[up].map((y, b) => ({
+      x,
+      y,
+      name: rows.names[codes[base + a * strides[i] + (j === i ? 0 : b * strides[j])]],
+      pick: () =>
+        Object.fromEntries(names.map((name) => [name, name === across ? x : name === up ? y : rows.values[name][held[name]]])),
+    })),
+  );
+}

@@ -1,0 +1,449 @@
+// @ts-check
+"use strict";
+
+const SAMPLES = 400;
+const AROUND = 40;
+const SPREAD = 0.25;
+/** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
+const BEFORE_THE_END = 1 - 1e-14;
+
+/** The whole page: what the reader does, and what is simulated and shown for it. */
+class Page {
+  /** @param {any} data @param {Kernel} kernel @param {Plots} plots @param {Uint8Array} codes */
+  constructor(data, kernel, plots, codes) {
+    this.data = data;
+    this.kernel = kernel;
+    this.plots = plots;
+    this.codes = codes;
+    this.units = new Units(data.unit, data.units);
+    /** @type {Input[]} */
+    this.inputs = data.inputs;
+    this.controls = new Controls(data.inputs, this.units, data.face);
+    /** @type {Record<string, number>} the design in the simulator */
+    this.design = { ...data.start };
+    /** @type {Record<string, number>[]} */
+    this.list = [];
+    /** @type {Record<string, number>} */
+    this.held = {};
+    /** @type {Record<string, {scene: Scene, motion: Motion}>} */
+    this.motions = {};
+    const horizon = data.settings[data.layout.settings.indexOf("horizon")];
+    this.times = Float64Array.from({ length: SAMPLES + 1 }, (_, k) => ((horizon * k) / SAMPLES) * BEFORE_THE_END);
+    this.waiting = 0;
+    /** @type {Record<string, Cell[]>} */
+    this.cells = {};
+  }
+
+  /** @param {boolean} stop whether at the limit of rotation @returns {number[]} settings of the kernel */
+  settings(stop) {
+    const settings = [...this.data.settings];
+    settings[this.data.layout.settings.indexOf("stop_at_limit")] = stop ? 1 : 0;
+    return settings;
+  }
+
+  /**
+   * A design in the kernel's terms.
+   * @param {Record<string, number>} inputs by the columns of the table
+   * @returns {KernelDesign}
+   */
+  kernelDesign(inputs) {
+    const { layout } = this.data;
+    return Object.fromEntries(
+      layout.design.map((/** @type {string} */ field) => {
+        const value = inputs[layout.columns[field]];
+        return [field, field === "phi" ? value / DEGREES : value];
+      }),
+    );
+  }
+
+  /**
+   * Fill in what follows from the other inputs, and say what cannot be.
+   * @param {Record<string, number>} inputs
+   * @returns {{inputs: Record<string, number>, refusal: string}}
+   */
+  completed(inputs) {
+    const exposed = inputs.boulder_height_m - inputs.embedment_depth_m;
+    const [bumper, hood] = [inputs.bumper_height_m, inputs.hood_height_m];
+    const impact = this.data.face ? 0.5 * (Math.min(exposed, hood) + bumper) : inputs.impact_height_m;
+    let refused = 0;
+    if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
+    if (hood < bumper) refused = 2;
+    if (exposed <= 0) refused = 1;
+    return { inputs: { ...inputs, impact_height_m: impact }, refusal: this.data.refusals[refused] };
+  }
+
+  /**
+   * Simulate and judge designs.
+   * @param {Record<string, number>[]} designs
+   * @param {boolean} stop
+   * @returns {Judged[]}
+   */
+  judged(designs, stop) {
+    const complete = designs.map((design) => this.completed(design));
+    const outcomes = this.kernel.outcomes(complete.map((one) => this.kernelDesign(one.inputs)), this.settings(stop));
+    return complete.map(({ inputs, refusal }, row) => {
+      const found = judge(outcomes, row, inputs.boulder_length_m, inputs.bed_offset_m, this.data.rules);
+      if (refusal === "") return found;
+      const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
+      return { ...nothing, verdict: "error", reason: refusal, rating: null };
+    });
+  }
+
+  /**
+   * Show a design: verdict, numbers, side view, curves.
+   * @param {string} panel
+   * @param {Record<string, number>} design
+   */
+  show(panel, design) {
+    const { inputs, refusal } = this.completed(design);
+    const [found] = this.judged([design], false);
+    const motion = this.kernel.history(this.kernelDesign(inputs), this.settings(false), refusal === "" ? this.times : new Float64Array(0));
+    this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found);
+    const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
+    table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
+    this.plots.draw(panel, motion, this.units, this.data.parts, this.data.rules.rotation);
+    this.motions[panel] = { scene: this.scene(inputs), motion };
+    const slider = byId(`${panel}-time`);
+    slider.max = Math.max(motion.time.length - 1, 0);
+    slider.value = this.telling(motion);
+    this.showScene(panel);
+  }
+
+  /** @param {Motion} motion @returns {number} the sample that tells most: the limit reached, or the largest rotation */
+  telling(motion) {
+    const theta = (motion.columns.theta_b ?? new Float64Array(0)).map(Math.abs);
+    const over = theta.findIndex((value) => value >= this.data.rules.rotation);
+    return over >= 0 ? over : theta.indexOf(Math.max(...theta, 0));
+  }
+
+  /** @param {Record<string, number>} one @returns {Scene} */
+  scene(one) {
+    return {
+      length: one.boulder_length_m, height: one.boulder_height_m, depth: one.embedment_depth_m,
+      blow: one.impact_height_m, friction: one.friction_angle_deg / DEGREES, mass: one.vehicle_mass_kg,
+      speed: one.impact_speed_m_s, spring: one.vehicle_spring_N_m, damper: one.vehicle_damper_N_s_m,
+      bumper: one.bumper_height_m, hood: one.hood_height_m, bed: one.bed_offset_m,
+      line: one.boulder_length_m + this.data.rules.penetration, rating: this.data.rules.rating,
+    };
+  }
+
+  /** @param {string} panel */
+  showScene(panel) {
+    const { scene, motion } = this.motions[panel];
+    const sample = Math.max(Number(byId(`${panel}-time`).value), 0);
+    new SideView(byId(`${panel}-scene`)).draw(scene, motion, sample);
+    const words = motion.time.length === 0 ? "no impact" : [
+      `${(1000 * motion.time[sample]).toFixed(0)} ms`,
+      `rotation ${number(motion.columns.theta_b[sample] * DEGREES)}°`,
+      `vehicle ${this.units.text(motion.columns.x_v[sample], "m")}`,
+    ].join(" · ");
+    byId(`${panel}-caption`).textContent = words;
+  }
+
+  /** @param {HTMLElement} place @param {Judged} found */
+  showVerdict(place, found) {
+    place.className = `verdict ${found.verdict}`;
+    const sign = { pass: "✔", fail: "✘", undecided: "?", error: "!" }[found.verdict];
+    const limit = number(this.data.rules.rotation * DEGREES);
+    const words = [];
+    if (found.reason !== "") words.push(this.data.words[found.reason] ?? found.reason);
+    if (found.margin !== null) words.push(`margin ${percent(found.margin)}`);
+    if (found.max_rotation_deg !== null) words.push(`turns ${number(found.max_rotation_deg)}°, limit ${limit}°`);
+    place.replaceChildren(element("b", `${sign} ${found.verdict}`), element("span", words.length > 0 ? `: ${words.join("; ")}` : ""));
+  }
+
+  /** @param {string} label @param {number | string | null} value @param {string} unit */
+  row(label, value, unit) {
+    const line = document.createElement("tr");
+    const head = element("th", label);
+    head.setAttribute("scope", "row");
+    line.append(head, element("td", this.units.text(value, unit)));
+    return line;
+  }
+
+  /** Simulate the design of the controls, at once; the designs around it, as soon as the reader pauses. */
+  update() {
+    this.show("live", this.design);
+    this.controls.show(this.completed(this.design).inputs);
+    byId("yaml").value = yamlOf(this.data, this.design);
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => this.showAround(), 150);
+  }
+
+  /** Simulate designs over two inputs around the one of the controls. */
+  showAround() {
+    const [across, up] = [byId("live-across").value, byId("live-up").value];
+    /** @param {string} name */
+    const line = (name) => {
+      const input = /** @type {Input} */ (this.inputs.find((one) => one.name === name));
+      const here = this.design[name];
+      const [low, high] = [Math.max(here * (1 - SPREAD), input.low), Math.min(here * (1 + SPREAD), input.high)];
+      return Array.from({ length: AROUND }, (_, k) => low + ((high - low) * k) / (AROUND - 1));
+    };
+    const places = line(across).flatMap((x) => line(up).map((y) => ({ x, y })));
+    const designs = places.map(({ x, y }) => ({ ...this.design, [across]: x, [up]: y }));
+    const found = this.judged(designs, true);
+    const cells = places.map(({ x, y }, k) => ({
+      x, y, margin: found[k].margin, pick: () => ({ [across]: x, [up]: y }),
+      name: found[k].reason === "" ? found[k].verdict : `${found[k].verdict}: ${found[k].reason}`,
+    }));
+    this.cells = { ...this.cells, live: cells };
+    const of = (/** @type {string} */ name) => /** @type {Input} */ (this.inputs.find((one) => one.name === name));
+    drawCells(this.plots, "live", cells, { x: of(across).label, y: of(up).label }, { x: of(across).unit, y: of(up).unit },
+      this.units, this.data.colours, { x: this.design[across], y: this.design[up] });
+    this.legend("live", cells);
+    const passing = found.filter((one) => one.verdict === "pass").length;
+    byId("live-words").textContent =
+      `Of ${AROUND} × ${AROUND} designs within a quarter of this one, ${passing.toLocaleString("en-US")} pass.`;
+  }
+
+  /** Draw the map of the table. */
+  showTable() {
+    const { rows } = this.data;
+    const [across, up] = [byId("across").value, byId("up").value];
+    for (const control of byId("held").children) control.hidden = [across, up].includes(control.dataset.name);
+    const cells = tableCells(rows, this.codes, across, up, this.held);
+    this.cells = { ...this.cells, sweep: cells };
+    drawCells(this.plots, "sweep", cells, { x: rows.labels[across], y: rows.labels[up] },
+      { x: rows.units[across], y: rows.units[up] }, this.units, this.data.colours, null);
+    this.legend("sweep", cells);
+    const passing = cells.filter((cell) => cell.name === "pass").length;
+    byId("sweep-words").textContent = `${passing.toLocaleString("en-US")} of the ${cells.length.toLocaleString("en-US")} designs shown pass.`;
+  }
+
+  /** @param {string} panel @param {Cell[]} cells */
+  legend(panel, cells) {
+    /** @type {Map<string, number>} */
+    const counts = new Map();
+    for (const cell of cells) counts.set(cell.name, (counts.get(cell.name) ?? 0) + 1);
+    byId(`${panel}-legend`).replaceChildren(
+      ...[...counts].sort().map(([name, count]) => {
+        const item = element("li", "");
+        const box = document.createElement("i");
+        box.style.background = colourOf(name, this.data.colours);
+        item.append(box, `${name.replaceAll("_", " ")} (${count.toLocaleString("en-US")})`);
+        return item;
+      }),
+    );
+  }
+
+  showList() {
+    const columns = [...this.inputs.map((input) => ({ ...input, kind: "input" })), ...this.data.outcomes];
+    byId("list").hidden = this.list.length === 0;
+    byId("list-head").replaceChildren(...["verdict", ...columns.map((one) => this.units.title(one.label, one.unit))].map((words) => element("th", words)));
+    const found = this.judged(this.list, false);
+    byId("list-rows").replaceChildren(
+      ...this.list.map((design, k) => {
+        const line = document.createElement("tr");
+        const values = columns.map((one) => this.units.text(found[k][one.name] ?? this.completed(design).inputs[one.name] ?? null, one.unit));
+        line.append(...[`${found[k].verdict} ${found[k].reason}`, ...values].map((words) => element("td", words)));
+        return line;
+      }),
+    );
+  }
+
+  /** @returns {string} the list with the names and units of the table */
+  csv() {
+    const found = this.judged(this.list, false);
+    const names = [...this.inputs.map((input) => input.name), ...Object.keys(found[0] ?? {})];
+    return csvOf(names, this.list.map((design, k) => ({ ...this.completed(design).inputs, ...found[k] })));
+  }
+
+  /** Show everything anew, in other units or colours. */
+  refresh() {
+    this.plots.recolour();
+    for (const place of document.querySelectorAll(".quantity")) {
+      const { value, unit } = /** @type {HTMLElement} */ (place).dataset;
+      place.textContent = this.units.text(Number(value), String(unit));
+    }
+    this.data.chosen.forEach((/** @type {any} */ one, /** @type {number} */ k) => {
+      this.show(`chosen${k}`, one.inputs);
+      byId(`chosen${k}-inputs`).replaceChildren(
+        ...this.inputs.map((input) => this.row(input.label, one.inputs[input.name], input.unit)),
+      );
+    });
+    if (this.data.rows !== null) {
+      this.showHeld();
+      this.showTable();
+    }
+    this.update();
+    this.showList();
+  }
+
+  /** Controls for the inputs that the map of the table holds. */
+  showHeld() {
+    const { rows } = this.data;
+    const names = Object.keys(rows.values).filter((name) => rows.grid && rows.values[name].length > 1);
+    byId("held").replaceChildren(
+      ...names.map((name) => {
+        const values = rows.values[name];
+        this.held[name] ??= Math.floor(values.length / 2);
+        const label = element("label", "");
+        label.dataset.name = name;
+        const words = element("span", "");
+        const slider = document.createElement("input");
+        Object.assign(slider, { type: "range", min: "0", max: String(values.length - 1), value: String(this.held[name]) });
+        const tell = () => {
+          words.textContent = `${rows.labels[name]}: ${this.units.text(values[this.held[name]], rows.units[name])}`;
+          slider.setAttribute("aria-valuetext", words.textContent);
+        };
+        slider.addEventListener("input", () => {
+          this.held[name] = Number(slider.value);
+          tell();
+          this.showTable();
+        });
+        tell();
+        label.append(words, slider);
+        return label;
+      }),
+    );
+    for (const name of Object.keys(rows.values)) this.held[name] ??= 0;
+  }
+
+  /** @param {Record<string, number>} given inputs, embedment_ratio among them perhaps */
+  take(given) {
+    const { embedment_ratio: ratio, ...inputs } = given;
+    Object.assign(this.design, inputs);
+    if (ratio !== undefined) this.design.embedment_depth_m = ratio * this.design.boulder_height_m;
+    this.update();
+  }
+
+  /** Let the reader do what there is to do. */
+  listen() {
+    const { data } = this;
+    this.controls.listen((name, value) => {
+      this.design[name] = value;
+      this.update();
+    });
+    for (const panel of ["live", ...data.chosen.map((/** @type {any} */ _, /** @type {number} */ k) => `chosen${k}`)]) {
+      byId(`${panel}-time`).addEventListener("input", () => this.showScene(panel));
+      byId(`${panel}-play`).addEventListener("click", () => this.play(panel));
+    }
+    for (const name of ["live-across", "live-up"]) byId(name).addEventListener("change", () => this.showAround());
+    for (const name of ["across", "up"]) byId(name)?.addEventListener("change", () => this.showTable());
+    for (const panel of ["live", ...(data.rows === null ? [] : ["sweep"])]) {
+      const source = this.plots.find(`${panel}-cells`);
+      source.selected.properties.indices.change.connect(() => {
+        const [picked] = source.selected.indices;
+        if (picked === undefined) return;
+        const cell = this.cells[panel][picked];
+        source.selected.indices = [];
+        const held = panel === "sweep" ? data.rows.given : {};
+        this.take({ ...held, ...cell.pick() });
+      });
+    }
+    byId("reset").addEventListener("click", () => this.take(data.start));
+    byId("add").addEventListener("click", () => {
+      this.list.push({ ...this.design });
+      this.showList();
+    });
+    byId("clear").addEventListener("click", () => {
+      this.list = [];
+      this.showList();
+    });
+    byId("csv").addEventListener("click", () => download(this.csv(), "designs.csv"));
+    byId("copy").addEventListener("click", () => this.copy());
+    byId("print").addEventListener("click", () => window.print());
+    byId("units").addEventListener("change", () => {
+      this.units.system = byId("units").value;
+      this.refresh();
+    });
+    byId("theme").addEventListener("change", () => this.paint());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.paint());
+    /** @type {HTMLDetailsElement[]} */
+    let opened = [];
+    window.addEventListener("beforeprint", () => {
+      opened = [...document.querySelectorAll("details")].filter((one) => !one.open);
+      for (const one of opened) one.open = true;
+      this.paint(false);
+    });
+    window.addEventListener("afterprint", () => {
+      for (const one of opened) one.open = false;
+      this.paint();
+    });
+    for (const button of document.querySelectorAll(".load")) {
+      button.addEventListener("click", () => {
+        this.take(data.chosen[Number(/** @type {HTMLElement} */ (button).dataset.chosen)].inputs);
+        byId("live").scrollIntoView();
+      });
+    }
+  }
+
+  /** @param {boolean} [dark] by default as the reader or the system wants it */
+  paint(dark = byId("theme").value === "dark" || (byId("theme").value === "" && matchMedia("(prefers-color-scheme: dark)").matches)) {
+    document.documentElement.toggleAttribute("data-dark", dark);
+    this.plots.recolour();
+  }
+
+  async copy() {
+    try {
+      await navigator.clipboard.writeText(yamlOf(this.data, this.design));
+      byId("copy").textContent = "Copied";
+    } catch {
+      byId("yaml").closest("details").open = true;
+      byId("yaml").select();
+      byId("copy").textContent = "Select and copy";
+    }
+    setTimeout(() => (byId("copy").textContent = "Copy as YAML"), 2000);
+  }
+
+  /** @param {string} panel */
+  play(panel) {
+    const slider = byId(`${panel}-time`);
+    const last = Number(slider.max);
+    const begun = performance.now();
+    /** @param {number} now */
+    const tick = (now) => {
+      // Five times as slow as it is.
+      const sample = Math.min(Math.floor(((now - begun) / 5000) * (last / this.times[last])), last);
+      slider.value = String(Math.max(sample, 0));
+      this.showScene(panel);
+      if (sample < last) requestAnimationFrame(tick);
+    };
+    if (last > 0) requestAnimationFrame(tick);
+  }
+
+  /** Fill the lists that axes are chosen from. */
+  offer() {
+    const { rows } = this.data;
+    /** @param {string} id @param {[string, string][]} options @param {string} first */
+    const fill = (id, options, first) => {
+      byId(id).replaceChildren(...options.map(([value, words]) => Object.assign(element("option", words), { value })));
+      byId(id).value = first;
+    };
+    const inputs = this.inputs.filter((input) => input.name !== "impact_height_m");
+    const all = /** @type {[string, string][]} */ (inputs.map((input) => [input.name, input.label]));
+    fill("live-across", all, "embedment_depth_m");
+    fill("live-up", all, "friction_angle_deg");
+    byId("units").value = this.units.system;
+    if (rows === null) return;
+    const varying = Object.keys(rows.values).filter((name) => new Set(rows.values[name]).size > 1);
+    const names = varying.length > 0 ? varying : Object.keys(rows.values);
+    const options = /** @type {[string, string][]} */ (names.map((name) => [name, rows.labels[name]]));
+    const first = names.find((name) => name.startsWith("embedment")) ?? names[0];
+    const second = names.find((name) => name === "boulder_height_m" && name !== first) ?? names.find((name) => name !== first) ?? first;
+    fill("across", options, first);
+    fill("up", options, second);
+  }
+}
+
+async function main() {
+  const data = JSON.parse(byId("data").textContent);
+  const [kernel, plots, codes] = await Promise.all([
+    Kernel.load(data.kernel, data.layout),
+    Plots.load(data.bokeh),
+    data.rows === null ? new Uint8Array(0) : unpacked(data.rows.codes),
+  ]);
+  const page = new Page(data, kernel, plots, codes);
+  page.offer();
+  page.listen();
+  page.paint();
+  page.refresh();
+  Object.assign(window, { page });
+  document.documentElement.dataset.ready = "yes";
+}
+
+main().catch((problem) => {
+  byId("failure").hidden = false;
+  byId("failure").textContent = `The simulator could not start: ${problem}. It needs a browser with WebAssembly, not older than 2023.`;
+});

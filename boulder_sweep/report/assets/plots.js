@@ -1,0 +1,93 @@
+// @ts-check
+"use strict";
+
+/** Bokeh's figures of the page, found by their names. */
+class Plots {
+  /** @param {{docs: any, items: any}} made what Python made */
+  static async load(made) {
+    Bokeh.set_log_level("error");
+    const views = await Bokeh.embed.embed_items(made.docs, made.items);
+    void views;
+    return new Plots(Bokeh.documents.at(-1));
+  }
+
+  /** @param {any} document_ of Bokeh */
+  constructor(document_) {
+    this.document = document_;
+  }
+
+  /** @param {string} name @returns {any} a model of Bokeh */
+  find(name) {
+    return this.document.get_model_by_name(name);
+  }
+
+  /**
+   * Fill a source.
+   * @param {string} name
+   * @param {Record<string, any>} data columns
+   */
+  fill(name, data) {
+    this.find(name).data = data;
+  }
+
+  /**
+   * Name the axes of a figure.
+   * @param {string} figure
+   * @param {string} x
+   * @param {string} y
+   */
+  title(figure, x, y) {
+    this.find(`${figure}-x`).axis_label = x;
+    this.find(`${figure}-y`).axis_label = y;
+  }
+
+  /** Give text, axes and grids the colours of the page. */
+  recolour() {
+    const style = getComputedStyle(document.documentElement);
+    const [text, line] = ["--text", "--line"].map((name) => style.getPropertyValue(name).trim());
+    for (const figure of this.document.roots()) {
+      for (const axis of [...figure.left, ...figure.below]) {
+        axis.axis_label_text_color = axis.major_label_text_color = text;
+        axis.axis_line_color = axis.major_tick_line_color = axis.minor_tick_line_color = line;
+      }
+      for (const part of figure.center) if (part.type === "Grid") part.grid_line_color = line;
+      for (const part of figure.right) {
+        if (part.type !== "Legend") continue;
+        part.label_text_color = text;
+        part.background_fill_color = part.border_line_color = null;
+      }
+    }
+  }
+
+  /**
+   * Draw the motion of one design.
+   * @param {string} panel
+   * @param {Motion} motion
+   * @param {Units} units
+   * @param {string[]} parts of the energy
+   * @param {number} limit of the rotation [rad]
+   */
+  draw(panel, motion, units, parts, limit) {
+    const { columns } = motion;
+    /** @param {string} name @param {string} unit */
+    const shown = (name, unit) => columns[name].map((value) => value / units.size(unit));
+    this.fill(`${panel}-motion`, {
+      time: motion.time.map((t) => Number(t.toPrecision(12))),
+      rotation: columns.theta_b.map((value) => value * DEGREES),
+      limit: columns.theta_b.map(() => limit * DEGREES),
+      boulder: shown("x_b", "m"),
+      vehicle: shown("x_v", "m"),
+      force: shown("F_v", "N"),
+      ...Object.fromEntries(parts.map((part) => [part, shown(part, "J")])),
+    });
+    const over = columns.theta_b.findIndex((value) => Math.abs(value) >= limit);
+    for (const kind of ["rotation", "displacement", "force", "energy"]) {
+      const beyond = this.find(`${panel}-${kind}-beyond`);
+      [beyond.left, beyond.right] = over < 0 ? [0, 0] : [motion.time[over], motion.time.at(-1)];
+    }
+    this.title(`${panel}-rotation`, "time [s]", "rotation [°]");
+    this.title(`${panel}-displacement`, "time [s]", units.title("displacement", "m"));
+    this.title(`${panel}-force`, "time [s]", units.title("contact force", "N"));
+    this.title(`${panel}-energy`, "time [s]", units.title("energy", "J"));
+  }
+}

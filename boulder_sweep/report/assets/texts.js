@@ -1,0 +1,44 @@
+// @ts-check
+"use strict";
+
+/**
+ * A design as a file of settings.
+ * @param {any} data of the page
+ * @param {Record<string, number>} design
+ * @returns {string}
+ */
+function yamlOf(data, design) {
+  /** @type {Record<string, string[]>} */
+  const sections = {};
+  for (const { name, section, key, unit } of /** @type {Input[]} */ (data.inputs)) {
+    if (name === "impact_height_m" && data.face) continue;
+    const words = unit === "1" ? "" : ` ${unit}`;
+    (sections[section] ??= []).push(`${key}: ${design[name]}${words}`);
+  }
+  return [
+    `name: ${JSON.stringify(data.title)}`,
+    ...Object.entries(sections).map(([section, entries]) => `${section}: {${entries.join(", ")}}`),
+    ...data.yaml,
+    "",
+  ].join("\n");
+}
+
+/**
+ * Rows as comma-separated values, every field in quotes.
+ * @param {string[]} names
+ * @param {Record<string, any>[]} rows
+ * @returns {string}
+ */
+function csvOf(names, rows) {
+  const quoted = (/** @type {any} */ value) => `"${String(value ?? "").replaceAll('"', '""')}"`;
+  return [names.join(","), ...rows.map((row) => names.map((name) => quoted(row[name])).join(",")), ""].join("\n");
+}
+
+/** @param {string} text @param {string} name of the file */
+function download(text, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+  link.download = name;
+  link.click();
+  URL.revokeObjectURL(link.href);
+}

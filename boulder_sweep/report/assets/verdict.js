@@ -1,0 +1,70 @@
+// @ts-check
+"use strict";
+
+/**
+ * What a design must keep to, and the words of every verdict; written by Python.
+ * @typedef {object} Rules
+ * @property {number} rotation largest rotation [rad]
+ * @property {number} penetration largest penetration of the required rating [m]
+ * @property {[string, number][]} ratings every rating and its largest penetration [m], the best first
+ * @property {Record<string, number>} status how a simulation can end, by name
+ * @property {Record<string, string>} why the reason of each status that leaves a design without a result
+ */
+
+/**
+ * The outcome columns of one row, by the names of the table; null for no value.
+ * @typedef {{verdict: string, reason: string, rating: string | null} & Record<string, any>} Judged
+ */
+
+const DEGREES = 180 / Math.PI;
+
+/**
+ * Give the verdict on one design: the rules of `boulder_sweep.judge.verdict` for a row, held against them by a test.
+ * @param {Record<string, Float64Array>} outcomes what the kernel computed
+ * @param {number} row which design
+ * @param {number} length of the boulder [m]
+ * @param {number} bedOffset front bumper to cargo bed [m]
+ * @param {Rules} rules
+ * @returns {Judged}
+ */
+function judge(outcomes, row, length, bedOffset, rules) {
+  /** @param {string} name */
+  const of = (name) => outcomes[name][row];
+  const { status } = rules;
+  const ended = of("status");
+  const [theta, x_b, x_v, F_v, end] = ["theta_max", "x_b_max", "x_v_max", "F_v_max", "t_end"].map(of);
+  const simulated = [status.LIMIT, status.SETTLED, status.HORIZON, status.OUTWARD].includes(ended);
+  const valid = simulated && [theta, x_b, x_v, F_v, end].every(Number.isFinite);
+  const overturned = valid && (ended === status.LIMIT || theta >= rules.rotation);
+  const standing = valid && !overturned;
+  const penetration = x_v - bedOffset - length;
+
+  let [verdict, reason] = ["pass", ""];
+  if (ended === status.NO_CONTACT) [verdict, reason] = ["fail", "no_contact"];
+  else if (!valid) [verdict, reason] = ["error", rules.why[ended] ?? "the computed result is not a finite number"];
+  else if (overturned) [verdict, reason] = ["fail", "overturns"];
+  else if (penetration > rules.penetration) [verdict, reason] = ["fail", "penetration"];
+  else if (ended === status.OUTWARD) [verdict, reason] = ["undecided", "horizon"];
+  else if (rules.rotation - theta < of("theta_error") || rules.penetration - penetration < of("x_error"))
+    [verdict, reason] = ["undecided", "error"];
+
+  const margin = Math.min((rules.rotation - theta) / rules.rotation, (rules.penetration - penetration) / rules.penetration);
+  const rating = rules.ratings.find(([, most]) => penetration <= most)?.[0] ?? null;
+  /** @param {number} value @param {boolean} known */
+  const kept = (value, known = valid) => (known && !Number.isNaN(value) ? value : null);
+  return {
+    verdict,
+    reason,
+    margin: kept(margin, standing),
+    max_rotation_deg: kept(theta * DEGREES),
+    max_displacement_m: kept(x_b),
+    max_vehicle_displacement_m: kept(x_v),
+    peak_force_kN: kept(F_v / 1000),
+    penetration_m: kept(penetration),
+    rating: standing ? rating : null,
+    time_to_limit_s: kept(of("t_limit"), overturned),
+    end_time_s: kept(end),
+    rotation_error_deg: kept(of("theta_error") * DEGREES),
+    displacement_error_m: kept(of("x_error")),
+  };
+}

@@ -1,0 +1,172 @@
+"""What the script of the page is given: plain data, every word and number of it from the registers of the package."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from boulder_kernels import Control, Readings, Status
+from boulder_sweep.columns import INPUTS, OUTCOMES
+from boulder_sweep.designs import REASONS
+from boulder_sweep.judge.evaluation import SOURCES
+from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M, STATUS_REASONS
+from boulder_sweep.report import entry_points
+from boulder_sweep.report.build import KERNEL
+from boulder_sweep.report.figures import COLOURS, PARTS
+from boulder_sweep.report.rows import Rows, Thinned
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
+from boulder_sweep.views.wording import REASON_WORDS
+
+OUTCOME_WORDS = {
+    "max_rotation_deg": "largest rotation",
+    "max_displacement_m": "boulder moves",
+    "max_vehicle_displacement_m": "vehicle moves",
+    "peak_force_kN": "peak force",
+    "penetration_m": "penetration",
+    "rating": "penetration rating",
+    "time_to_limit_s": "limit reached after",
+    "rotation_error_deg": "numerical error of the rotation",
+}
+"""Outcomes that the page shows of a design."""
+
+
+def page_data(
+    *,
+    title: str,
+    settings: Mapping[str, Any],
+    control: Control,
+    readings: Readings,
+    start: Mapping[str, float],
+    chosen: Sequence[Mapping[str, Any]],
+    units: str,
+) -> dict[str, Any]:
+    """Return what every page is given; see `boulder_sweep.report.page.assembled`."""
+    return {
+        "title": title,
+        "units": units,
+        "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
+        "layout": _layout(),
+        "settings": [float(value) for value in (*readings, *control._replace(elements=0))],
+        "rules": _rules(control.theta_limit, settings["criterion"]["rating"]),
+        "inputs": [_input(spec.name, start, settings) for spec in INPUTS],
+        "outcomes": [
+            {"name": spec.name, "unit": spec.unit, "label": OUTCOME_WORDS[spec.name]}
+            for spec in OUTCOMES
+            if spec.name in OUTCOME_WORDS
+        ],
+        "start": dict(start),
+        "face": isinstance(settings["inputs"]["impact_height_m"], str),
+        "refusals": REASONS,
+        "words": REASON_WORDS,
+        "parts": list(PARTS),
+        "colours": COLOURS,
+        "yaml": _yaml(settings),
+        "chosen": [dict(one) for one in chosen],
+        "kernel": base64.b64encode(KERNEL.read_bytes()).decode(),
+    }
+
+
+def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
+    """Return what the map of a table is made of: codes of the designs kept, values along the axes or of the list."""
+    codes = rows.codes.reshape(rows.shape)[np.ix_(*kept.places)].ravel()
+    if rows.axes:
+        lines = zip(rows.axes.items(), kept.places, strict=True)
+        values = {name: along[places].tolist() for (name, along), places in lines}
+    else:
+        listed = {name: column for name, column in rows.inputs.items() if column.shape == rows.codes.shape}
+        values = {name: column[kept.places[0]].tolist() for name, column in listed.items()}
+    return {
+        "names": rows.names,
+        "grid": bool(rows.axes),
+        "values": values,
+        "given": {name: float(value) for name, value in rows.inputs.items() if value.shape == ()},
+        "labels": {name: _label(name) for name in values},
+        "units": {name: BY_NAME[name].unit for name in values},
+        "codes": base64.b64encode(gzip.compress(codes.tobytes(), 6, mtime=0)).decode(),
+    }
+
+
+def reading_words(settings: Mapping[str, Any]) -> str:
+    """Return which formulas are read as printed, in words."""
+    model = settings["model"]
+    if model["preset"] != "mixed":
+        return str(model["preset"]).replace("_", " ")
+    return ", ".join(f"{name}: {value}" for name, value in model["readings"].items())
+
+
+def _layout() -> dict[str, Any]:
+    """Order of the kernel's numbers, and the column of the table that each input comes from."""
+    return {
+        "design": entry_points.DESIGN,
+        "settings": entry_points.SETTINGS,
+        "outcome": entry_points.OUTCOME,
+        "history": entry_points.HISTORY,
+        "columns": SOURCES,
+    }
+
+
+def _rules(rotation: float, rating: str) -> dict[str, Any]:
+    """What a design must keep to, and the words of every verdict."""
+    return {
+        "rotation": rotation,
+        "rating": rating,
+        "penetration": PENETRATION_LIMITS_M[rating],
+        "ratings": list(PENETRATION_LIMITS_M.items()),
+        "status": {status.name: status.value for status in Status},
+        "why": {str(status.value): words for status, words in STATUS_REASONS.items()},
+    }
+
+
+def _units() -> list[str]:
+    return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES)} | {"J", "N"})
+
+
+def _label(name: str) -> str:
+    """Name of an input in words, without its unit."""
+    return BY_NAME[name].path.replace(".", " ").replace("_", " ").removeprefix("site ")
+
+
+def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page needs to know of an input: words, unit, the range of its slider, what is admitted and usual."""
+    field, here, axis = BY_NAME[name], start[name], settings["inputs"].get(name)
+    assert field.admitted is not None  # as of every input
+    ends = [here, *(axis if isinstance(axis, list) else [])]
+    if field.usual is not None:
+        ends += [field.usual.low, field.usual.high]
+    elif name == "embedment_depth_m":
+        ends += [0.3 * start["boulder_height_m"], 0.8 * start["boulder_height_m"]]
+    else:
+        ends += [0.5 * here, 1.5 * here]
+    return {
+        "name": name,
+        "section": field.section,
+        "key": field.key,
+        "label": _label(name),
+        "unit": field.unit,
+        "low": field.admitted.low,
+        "high": field.admitted.high,
+        "from": min(ends),
+        "to": max(ends),
+        "usual": field.usual,
+    }
+
+
+def _yaml(settings: Mapping[str, Any]) -> list[str]:
+    """The lines of a file of settings behind the design: criterion, model, solver."""
+    criterion, model, solver = (settings[name] for name in ("criterion", "model", "solver"))
+    soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
+    readings = model["preset"]
+    if readings == "mixed":
+        readings = "{" + ", ".join(f"{name}: {value}" for name, value in model["readings"].items()) + "}"
+    asked = solver["accuracy"] or (f"{solver['accuracy_deg']} deg" if solver["accuracy_deg"] is not None else None)
+    accuracy = f"step: {solver['step_s']} s" if asked is None else f"accuracy: {asked}"
+    return [
+        f"criterion: {{max_rotation: {criterion['max_rotation_deg']} deg, rating: {criterion['rating']}}}",
+        f"model: {{readings: {readings}, soil: {soil}}}",
+        f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",
+    ]

@@ -1,0 +1,202 @@
+"""What the page calls: the kernels behind two functions over pointers to doubles.
+
+WebAssembly knows no NamedTuple, so designs and settings come as plain numbers in a fixed order, and this module alone
+knows it. `outcomes` does the work of ``sweep run``, one design after the other in place of lanes, and `history` that of
+``sweep simulate``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import carray, types
+
+from boulder_kernels import (
+    Constants,
+    Control,
+    Design,
+    DesignTable,
+    OutcomeTable,
+    Readings,
+    Record,
+    constants_of,
+    simulate_design,
+)
+from boulder_kernels._jit import inlined, kernel
+from boulder_kernels.design import design_at
+from boulder_kernels.dynamics import State, acceleration
+from boulder_kernels.energy import stored_energies
+from boulder_kernels.modes import Modes, switches_of
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors, write_outcome
+
+DESIGN = Design._fields
+"""Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
+SETTINGS = (*Readings._fields, *Control._fields)
+"""How it is simulated, in this order; a truth is 0 or 1."""
+OUTCOME = OutcomeTable._fields
+"""Results of a design, in this order; SI, rad."""
+HISTORY = (
+    *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
+    *("touching", "F_v"),
+    *("vehicle_kinetic", "boulder_linear", "boulder_angular", "soil_elastic", "crush_spring"),
+    *("gravity", "soil_drag", "crush_damper", "pull"),
+)
+"""Columns of a time history, in this order; m, rad, N, J. The parts of the energy as in `EnergyLedger`."""
+ENERGY = HISTORY.index("vehicle_kinetic")
+"""Place of the first part of the energy."""
+_DOUBLES = types.CPointer(types.float64)
+EXPORTS = {
+    "outcomes": (_DOUBLES, types.int32, _DOUBLES, _DOUBLES, _DOUBLES),
+    "history": (_DOUBLES, _DOUBLES, types.int32, *(_DOUBLES,) * 6),
+}
+"""The functions that the page calls, and the types of their arguments."""
+
+
+@inlined
+def readings_from(s: np.ndarray) -> Readings:
+    """Return the readings, which stand first among the settings."""
+    return Readings(s[0] > 0.0, s[1] > 0.0, s[2] > 0.0, s[3] > 0.0, s[4] > 0.0)
+
+
+@inlined
+def control_from(s: np.ndarray, halved: bool) -> Control:
+    """Return the control, which stands behind them, its step halved or not."""
+    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved)
+
+
+@inlined
+def table_from(t: np.ndarray) -> DesignTable:
+    """Return the rows of an array as the columns of a table."""
+    return DesignTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9], t[10], t[11], t[12], t[13], t[14])
+
+
+@inlined
+def outcomes_from(t: np.ndarray) -> OutcomeTable:
+    """Return the rows of an array as the columns of a table."""
+    return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8])
+
+
+@kernel
+def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at: Any) -> None:
+    """Simulate n designs, and estimate their errors where the settings say so.
+
+    Parameters
+    ----------
+    designs_at
+        Inputs, shape (len(DESIGN), n).
+    n
+        Number of designs.
+    settings_at
+        Settings, shape (len(SETTINGS),).
+    fine_at
+        Where the results go, shape (len(OUTCOME), n).
+    coarse_at
+        Room for as many again, the coarser solution.
+    """
+    s = carray(settings_at, (13,))
+    readings, estimated = readings_from(s), s[9] > 0.0
+    table = table_from(carray(designs_at, (15, n)))
+    fine, coarse = outcomes_from(carray(fine_at, (9, n))), outcomes_from(carray(coarse_at, (9, n)))
+    nothing = carray(coarse_at, (0,))
+    record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)))
+    for row in range(n):
+        design = design_at(table, row)
+        fine.theta_error[row] = fine.x_error[row] = np.nan
+        write_outcome(fine, row, simulate_design(design, readings, control_from(s, estimated), record))
+        if estimated:
+            write_outcome(coarse, row, simulate_design(design, readings, control_from(s, False), record))
+    if not estimated:
+        return
+    estimate_errors(coarse, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)
+    for row in range(n):
+        # A simulation that goes on beyond the limit does not tell by its status that it got there.
+        if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
+            fine.theta_error[row] = fine.x_error[row] = np.inf
+
+
+@inlined
+def modes_of(y: State, turning: float, touching: float, c: Constants) -> Modes:
+    """Return the modes of a sample; the signs of Eq 37 follow from the rotation itself."""
+    corner = math.copysign(1.0, c.theta_corner - y.theta_b)
+    arm = math.copysign(1.0, c.C_cos * math.cos(y.theta_b) + c.C_sin * math.sin(y.theta_b))
+    return Modes(int(turning), touching > 0.0, corner, arm, 0, 0)
+
+
+@kernel
+def history(
+    design_from: Any,
+    settings_at: Any,
+    n: int,
+    times_at: Any,
+    states_at: Any,
+    modes_at: Any,
+    exchanged_at: Any,
+    history_at: Any,
+    centre_at: Any,
+) -> None:
+    """Simulate one design, and evaluate its motion, force and energies at n times.
+
+    Parameters
+    ----------
+    design_from
+        Inputs, shape (len(DESIGN),).
+    settings_at
+        Settings, shape (len(SETTINGS),).
+    n
+        Number of samples.
+    times_at
+        Their times, ascending [s], shape (n,).
+    states_at, modes_at, exchanged_at
+        Room for the record, shapes (n, 6), (2, n) and (n, 4).
+    history_at
+        Where the results go, shape (len(HISTORY), n); NaN where the simulation does not get.
+    centre_at
+        Where c_x and c_y go, the common centre of mass of boulder and soil (Eqs 3, 4).
+    """
+    s = carray(settings_at, (13,))
+    readings, control = readings_from(s), control_from(s, s[9] > 0.0)
+    design = design_at(table_from(carray(design_from, (15, 1))), 0)
+    out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
+    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], carray(exchanged_at, (n, 4)))
+    out[:] = np.nan
+    record.states[:] = np.nan
+    simulate_design(design, readings, control, record)
+    c = constants_of(design, readings, control.elements)
+    centre = carray(centre_at, (2,))
+    centre[0], centre[1] = c.c_x, c.c_y
+    for i in range(n):
+        y = State(
+            record.states[i, 0],
+            record.states[i, 1],
+            record.states[i, 2],
+            record.states[i, 3],
+            record.states[i, 4],
+            record.states[i, 5],
+        )
+        if np.isnan(y.x_b):
+            break
+        mode = modes_of(y, record.turning[i], record.touching[i], c)
+        rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(mode, readings, c), c)
+        # Printed separation: the spring goes on pulling the truck after release, so it holds energy all along.
+        pulls = mode.touching or not readings.separation_released
+        stored = stored_energies(y, design.m_v, pulls, readings.restoring_gravity, c)
+        drag, damper, restoring, pull = (
+            record.exchanged[i, 0],
+            record.exchanged[i, 1],
+            record.exchanged[i, 2],
+            record.exchanged[i, 3],
+        )
+        out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = y
+        out[6, i] = record.touching[i]
+        out[7, i] = -design.m_v * rate.a_v if mode.touching else 0.0
+        out[8, i], out[9, i], out[10, i], out[11, i] = (
+            stored.truck_kinetic,
+            stored.boulder_kinetic,
+            stored.boulder_rotational,
+            stored.soil_elastic,
+        )
+        out[12, i] = stored.crush_elastic
+        out[13, i] = stored.gravity if readings.restoring_gravity else restoring
+        out[14, i], out[15, i], out[16, i] = drag, damper, -pull

@@ -1,0 +1,126 @@
+"""The plots of the page, made by Bokeh: empty figures with names, which the page fills by what it simulates.
+
+Nothing here runs code of its own in the browser (Bokeh's CustomJS would need a page that admits text as code): the
+page's script finds figures and sources by their names and sets their data.
+"""
+
+from __future__ import annotations
+
+from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
+from bokeh.models.annotations import BoxAnnotation
+from bokeh.plotting import figure
+
+COLOURS = {
+    "pass": "#0072B2",
+    "fail": "#E69F00",
+    "fail: no_contact": "#F7DC9C",
+    "undecided": "#CC79A7",
+    "error": "#666666",
+    "none": "#BBBBBB",
+}
+"""Of verdicts, and of those reasons that have one of their own; told apart without red or green, and in grey."""
+LINES = ("#1E88C9", "#D55E00", "#009E73")
+PARTS = {
+    "vehicle_kinetic": ("vehicle, moving", "#0072B2"),
+    "crush_damper": ("vehicle, crushed for good", "#56B4E9"),
+    "crush_spring": ("vehicle, sprung", "#B3DDF5"),
+    "boulder_linear": ("boulder, moving", "#D55E00"),
+    "boulder_angular": ("boulder, turning", "#E69F00"),
+    "gravity": ("boulder, lifted", "#F0E442"),
+    "soil_elastic": ("soil, pressed", "#009E73"),
+    "soil_drag": ("soil, dragged", "#7FCFB5"),
+}
+"""Parts of the energy, as they are stacked: word and colour."""
+
+
+def curves(panel: str) -> list[figure]:
+    """Return the figures of one simulated design.
+
+    Parameters
+    ----------
+    panel
+        Name of the part of the page; the names of figures and sources begin with it.
+    """
+    motion = ColumnDataSource(
+        {name: [0.0, 1.0] for name in ("time", "rotation", "limit", "boulder", "vehicle", "force", *PARTS)},
+        name=f"{panel}-motion",
+    )
+    rotation = _plot(panel, "rotation", [("time", "@time{0.000} s"), ("rotation", "@rotation{0.00}")])
+    rotation.line("time", "rotation", source=motion, line_width=2, color=LINES[0])
+    rotation.line("time", "limit", source=motion, line_width=2, color=LINES[1], line_dash="dashed")
+    displacement = _plot(
+        panel,
+        "displacement",
+        [("time", "@time{0.000} s"), ("vehicle", "@vehicle{0.000}"), ("boulder", "@boulder{0.000}")],
+    )
+    displacement.line("time", "vehicle", source=motion, line_width=2, color=LINES[0], legend_label="vehicle")
+    displacement.line(
+        *("time", "boulder"), source=motion, line_width=2, color=LINES[1], line_dash="dashed", legend_label="boulder"
+    )
+    force = _plot(panel, "force", [("time", "@time{0.000} s"), ("force", "@force{0.0}")])
+    force.line("time", "force", source=motion, line_width=2, color=LINES[0])
+    energy = _plot(panel, "energy", [])
+    energy.varea_stack(
+        list(PARTS),
+        x="time",
+        source=motion,
+        color=[colour for _, colour in PARTS.values()],
+        legend_label=[word for word, _ in PARTS.values()],
+    )
+    for plot in (displacement, energy):
+        plot.add_layout(plot.legend[0], "right")
+    figures = [rotation, displacement, force, energy]
+    for plot in figures:
+        plot.x_range = DataRange1d(range_padding=0)
+        beyond = BoxAnnotation(left=0, right=0, fill_color="#888888", fill_alpha=0.25, level="overlay")
+        beyond.name = f"{plot.name}-beyond"
+        plot.add_layout(beyond)
+    return figures
+
+
+def verdict_map(panel: str) -> figure:
+    """Return a map of verdicts: rectangles over two inputs, which can be chosen."""
+    cells = ColumnDataSource(
+        {"left": [0.0], "right": [0.0], "bottom": [0.0], "top": [0.0], "colour": ["white"]}, name=f"{panel}-cells"
+    )
+    plot = _plot(panel, "map", [("", "@verdict"), ("across", "@across{0.000a}"), ("up", "@up{0.000a}")], height=420)
+    drawn = plot.quad(
+        left="left",
+        right="right",
+        bottom="bottom",
+        top="top",
+        source=cells,
+        fill_color="colour",
+        line_color="colour",
+        line_width=0.5,
+        nonselection_fill_alpha=1.0,
+        nonselection_line_alpha=1.0,
+        selection_line_color="black",
+    )
+    plot.add_tools(TapTool(renderers=[drawn]))
+    here = ColumnDataSource({"x": [0.0], "y": [0.0]}, name=f"{panel}-here")
+    plot.scatter("x", "y", source=here, marker="cross", size=18, line_width=3, line_color="white", level="overlay")
+    plot.scatter("x", "y", source=here, marker="cross", size=16, line_width=1.5, line_color="black", level="overlay")
+    plot.grid.visible = False
+    return plot
+
+
+def _plot(panel: str, kind: str, tooltips: list[tuple[str, str]], height: int = 240) -> figure:
+    """Return an empty figure in the style of the page."""
+    plot = figure(
+        name=f"{panel}-{kind}",
+        height=height,
+        sizing_mode="stretch_width",
+        toolbar_location=None,
+        tools=[],
+        background_fill_color=None,
+        border_fill_color=None,
+        outline_line_color=None,
+    )
+    if tooltips:
+        plot.add_tools(HoverTool(tooltips=tooltips, mode="mouse" if kind == "map" else "vline"))
+    plot.xaxis.name, plot.yaxis.name = f"{panel}-{kind}-x", f"{panel}-{kind}-y"
+    for axis in (plot.xaxis, plot.yaxis):
+        axis.axis_label_text_font_style = "normal"
+        axis.axis_label_text_font_size = axis.major_label_text_font_size = "13px"
+    return plot

@@ -1,0 +1,150 @@
+"""The page: one file with the plots' library, the kernel, the script and the data, which needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from boulder_kernels import Control, Readings
+from boulder_sweep.report.contents import page_data, reading_words, table_data
+from boulder_sweep.report.figures import curves, verdict_map
+
+if TYPE_CHECKING:
+    from boulder_sweep.report.answers import Sentence
+    from boulder_sweep.report.rows import Rows, Thinned
+
+ASSETS = Path(__file__).with_name("assets")
+SCRIPTS = ("kernel", "verdict", "units", "plots", "scene", "maps", "controls", "texts", "page")
+"""Our own script, in this order."""
+MAIN = (
+    "embedment_depth_m",
+    "friction_angle_deg",
+    "subgrade_reaction_MN_m3",
+    "impact_speed_m_s",
+    "vehicle_mass_kg",
+    "boulder_length_m",
+    "boulder_width_m",
+    "boulder_height_m",
+)
+"""Inputs that are in sight; the others are a click away."""
+
+
+def assembled(
+    *,
+    title: str,
+    settings: Mapping[str, Any],
+    control: Control,
+    readings: Readings,
+    start: Mapping[str, float],
+    sentences: Sequence[Sentence] = (),
+    rows: Rows | None = None,
+    kept: Thinned | None = None,
+    chosen: Sequence[Mapping[str, Any]] = (),
+    facts: Sequence[tuple[str, str]] = (),
+    notes: Sequence[str] = (),
+    units: str = "si",
+) -> str:
+    """Put the page together.
+
+    Parameters
+    ----------
+    title
+        What the page is about.
+    settings
+        Resolved settings of the sweep.
+    control, readings
+        How its designs are simulated.
+    start
+        The design that the simulator begins with, by the input columns of the table.
+    sentences
+        The answer in words.
+    rows, kept
+        Rows of a result and what of them goes into the page; None for a single design.
+    chosen
+        Designs that are shown in full: ``title``, ``number`` and ``inputs`` of each.
+    facts
+        Names and values that say where the results come from.
+    notes
+        What the reader must know of these very results.
+    units
+        ``si`` or ``us``: what the page begins with.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    import jinja2
+    from bokeh.document import Document
+    from bokeh.embed.util import standalone_docs_json_and_render_items
+    from bokeh.resources import INLINE
+
+    panels = ["live", *(f"chosen{place}" for place in range(len(chosen)))]
+    document = Document()
+    for plot in [*(plot for panel in panels for plot in curves(panel)), verdict_map("live")]:
+        document.add_root(plot)
+    if rows is not None:
+        document.add_root(verdict_map("sweep"))
+    docs, items = standalone_docs_json_and_render_items(list(document.roots))
+    places = {plot.id: f"figure-{plot.name}" for plot in document.roots}
+    data = page_data(
+        title=title,
+        settings=settings,
+        control=control,
+        readings=readings,
+        start=start,
+        chosen=chosen,
+        units=units,
+    )
+    data["rows"] = None if rows is None or kept is None else table_data(rows, kept)
+    data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": places} for item in items]}
+    script = "\n".join((ASSETS / f"{name}.js").read_text() for name in SCRIPTS)
+    library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(ASSETS),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    return environment.get_template("page.html").render(
+        title=title,
+        sentences=sentences,
+        panels=panels,
+        inputs=data["inputs"],
+        main=MAIN,
+        chosen=data["chosen"],
+        thinned=kept.words if kept is not None else None,
+        facts=facts,
+        notes=notes,
+        settings=settings,
+        readings=reading_words(settings),
+        data=_for_script(data),
+        style=(ASSETS / "page.css").read_text(),
+        script=script,
+        library=library,
+        policy=_policy(library, script),
+    )
+
+
+def _policy(*scripts: str) -> str:
+    """Content-Security-Policy of the page: its own scripts, and no connection whatever."""
+    hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
+    return (
+        f"default-src 'none'; script-src {hashes} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; "
+        "img-src data: blob:; font-src data:; connect-src 'none'; form-action 'none'; base-uri 'none'"
+    )
+
+
+def _sha256(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def _for_script(data: Any) -> str:
+    """JSON that stays data wherever in a page it stands."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

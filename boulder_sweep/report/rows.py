@@ -1,0 +1,206 @@
+"""What the page shows of a table of any size: one small number for each design, and the designs worth naming.
+
+The table is read part by part, and only the verdicts of all of it are kept: a byte a row. Where the designs come from
+axes, their inputs follow from the settings and are not read at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boulder_sweep.store.finished import FinishedRows
+
+RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
+SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
+SOIL = ("soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3", "strain_rate_factor")
+NOT_YET = "not computed yet"
+MOST_CELLS = 1_500_000
+"""Designs of a grid whose verdicts go into the page; of more, some values of the longest axes are left out."""
+MOST_POINTS = 20_000
+"""The same of a list of designs, each of which brings its inputs along."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The rows of a result.
+
+    Attributes
+    ----------
+    finished
+        Where they come from.
+    names : tuple of str
+        What a code stands for: verdict and reason, ``fail: overturns``; the last is for rows not computed yet.
+    codes : ndarray of uint8, shape (rows,)
+        Place of every row among the names.
+    axes : dict of str to ndarray
+        Values along each axis of the grid, the last fastest; empty for a list of designs.
+    inputs : dict of str to ndarray
+        What is given for every design: single values, axes in their places, or one value a row. They broadcast
+        against each other, and for a grid against its shape.
+    """
+
+    finished: FinishedRows
+    names: tuple[str, ...]
+    codes: np.ndarray
+    axes: dict[str, np.ndarray]
+    inputs: dict[str, np.ndarray]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values along each axis; the number of rows for a list of designs."""
+        return tuple(len(values) for values in self.axes.values()) or self.codes.shape
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The resolved settings of the sweep."""
+        return self.finished.identity["settings"]
+
+    def having(self, verdict: str) -> np.ndarray:
+        """Which rows have a verdict, in the shape of the grid."""
+        places = [place for place, name in enumerate(self.names) if name.partition(":")[0] == verdict]
+        return np.isin(self.codes, places).reshape(self.shape)
+
+    def counts(self) -> dict[str, int]:
+        """Return how many rows there are of each name."""
+        found = np.bincount(self.codes, minlength=len(self.names))
+        return {name: int(n) for name, n in zip(self.names, found, strict=True) if n}
+
+    def depth(self) -> np.ndarray:
+        """Embedment depth [m] of every design, in a shape that broadcasts against that of the grid."""
+        if DEPTH in self.inputs:
+            return self.inputs[DEPTH]
+        return self.inputs[RATIO] * self.inputs["boulder_height_m"]
+
+    def mass(self) -> np.ndarray:
+        """Mass of the boulder [kg] of every design, in such a shape."""
+        length, width, height, density = (self.inputs[name] for name in SIZES)
+        return length * width * height * density
+
+    def margins(self, numbers: np.ndarray) -> np.ndarray:
+        """Return the margin of some rows, given in ascending order; NaN for none."""
+        found = np.full(len(numbers), np.nan)
+        for table in self.finished.tables(["design_id", "margin"], verify=False):
+            ids = table.column("design_id").to_numpy()
+            here = np.flatnonzero((numbers >= ids.min(initial=0)) & (numbers <= ids.max(initial=-1)))
+            found[here] = table.column("margin").to_numpy()[np.searchsorted(ids, numbers[here])]
+        return found
+
+    def row(self, number: int) -> dict[str, Any]:
+        """Return one row of the table, None for null."""
+        found = self.finished.row(number)
+        if found is None:
+            raise IndexError(f"design {number} has not been computed yet")
+        return found.to_pylist()[0]
+
+
+def read_rows(folder: Path) -> Rows:
+    """Read what the page needs of a result.
+
+    Raises
+    ------
+    StoreError
+        There is no result in the folder, or it is damaged.
+    """
+    finished = FinishedRows(folder)
+    settings = finished.identity["settings"]
+    order, given = settings["order"], settings["inputs"]
+    listed = order == "table"
+    # Very long axes and the columns of a list are in the table only.
+    varying = [name for name, value in given.items() if isinstance(value, list | dict) and name not in order]
+    unlisted = [name for name in order if isinstance(given[name], dict)] if not listed else []
+    wanted = [*(varying if listed else unlisted)]
+    stored = list(dict.fromkeys(own for name in wanted for own in _stored(name)))
+    codes = np.full(finished.rows, 255, np.uint8)
+    columns = {name: np.full(finished.rows, np.nan) for name in stored}
+    names: list[str] = []
+    for table in finished.tables(["design_id", "verdict", "reason", *stored]):
+        rows = table.column("design_id").to_numpy()
+        codes[rows] = _codes(table, names)
+        for name in stored:
+            columns[name][rows] = table.column(name).to_numpy()
+    codes[codes == 255] = len(names)
+    inputs = {name: np.array(float(value)) for name, value in given.items() if isinstance(value, float | int)}
+    if listed:
+        return Rows(finished, (*names, NOT_YET), codes, {}, inputs | {name: _column(columns, name) for name in varying})
+    axes = dict(_axes(order, given, columns))
+    for place, (name, values) in enumerate(axes.items()):
+        inputs[name] = values.reshape([-1 if k == place else 1 for k in range(len(axes))])
+    return Rows(finished, (*names, NOT_YET), codes, axes, inputs)
+
+
+def _stored(name: str) -> tuple[str, ...]:
+    """Columns that a quantity follows from."""
+    return (DEPTH, "boulder_height_m") if name == RATIO else (name,)
+
+
+def _column(columns: dict[str, np.ndarray], name: str) -> np.ndarray:
+    return columns[DEPTH] / columns["boulder_height_m"] if name == RATIO else columns[name]
+
+
+def _axes(order: list[str], given: dict[str, Any], columns: dict[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the axes with their values."""
+    lengths = [given[name]["count"] if isinstance(given[name], dict) else len(given[name]) for name in order]
+    for place, name in enumerate(order):
+        if isinstance(given[name], list):
+            yield name, np.array(given[name])
+            continue
+        step = int(np.prod(lengths[place + 1 :], dtype=np.int64))
+        yield name, _column(columns, name)[: step * lengths[place] : step]
+
+
+def _codes(table: Any, names: list[str]) -> np.ndarray:
+    """Code of every row of a part; new verdicts and reasons are added to the names."""
+    verdicts, reasons = (table.column(name).combine_chunks() for name in ("verdict", "reason"))
+    whys = reasons.dictionary.to_pylist()
+    pairs = verdicts.indices.to_numpy().astype(np.int64) * max(len(whys), 1) + reasons.indices.to_numpy()
+    place = np.zeros(int(pairs.max(initial=0)) + 1, np.uint8)
+    for pair in np.unique(pairs):
+        verdict, why = verdicts.dictionary[int(pair) // len(whys)].as_py(), whys[int(pair) % len(whys)]
+        name = f"{verdict}: {why}" if why else verdict
+        if name not in names:
+            names.append(name)
+        place[pair] = names.index(name)
+    return place[pairs]
+
+
+@dataclass(frozen=True, eq=False)
+class Thinned:
+    """The part of a grid, or of a list, that goes into the page.
+
+    Attributes
+    ----------
+    places : tuple of ndarray
+        Places kept along each axis; of a list, the rows.
+    words : str
+        What is left out; empty where nothing is.
+    """
+
+    places: tuple[np.ndarray, ...]
+    words: str
+
+
+def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
+    """Choose what of the rows goes into the page: all of them, or values spread evenly along the longest axes."""
+    if not rows.axes:
+        n, kept = len(rows.codes), min(len(rows.codes), most_points)
+        words = f"{kept:,} of the {n:,} designs of the list, spread evenly" if kept < n else ""
+        return Thinned((np.round(np.linspace(0, n - 1, kept)).astype(np.int64),), words)
+    lengths = list(rows.shape)
+    while np.prod(lengths, dtype=float) > most_cells:
+        longest = int(np.argmax(lengths))
+        lengths[longest] = -(-lengths[longest] // 2)
+    places = tuple(
+        np.round(np.linspace(0, whole - 1, kept)).astype(np.int64)
+        for whole, kept in zip(rows.shape, lengths, strict=True)
+    )
+    left = [
+        f"{kept:,} of {whole:,} values of {name}"
+        for name, whole, kept in zip(rows.axes, rows.shape, lengths, strict=True)
+        if kept < whole
+    ]
+    return Thinned(places, f"{', '.join(left)}, spread evenly" if left else "")

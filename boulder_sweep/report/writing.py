@@ -1,0 +1,183 @@
+"""From a result, or a file of settings, to the page on the disk."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from boulder_kernels import Control, Readings
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.errors import ReportError
+from boulder_sweep.judge.evaluation import control_of, readings_of
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.report.answers import Named, answer_of
+from boulder_sweep.report.rows import read_rows, thinned
+from boulder_sweep.settings import Sweep
+from boulder_sweep.settings.model import SolverSettings
+from boulder_sweep.store.files import put_file
+from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
+
+PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
+
+
+def write_report(
+    out: str | Path, page: str | Path, *, designs: Sequence[int] = (), units: str = "si", command: str = ""
+) -> Path:
+    """Write the report of a result: one HTML file that needs no network.
+
+    Parameters
+    ----------
+    out
+        Folder that a sweep wrote; a run may still be writing into it.
+    page
+        The file; replaced where it exists.
+    designs
+        Rows to be shown in full; by default those that the answer speaks of.
+    units
+        ``si`` or ``us``: what the page begins with; the reader can switch.
+    command
+        What the reader types to have the page again.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ReportError
+        There is nothing to report, a design does not exist, or the extra ``report`` is not installed.
+    StoreError
+        There is no result in the folder, or it is damaged.
+    """
+    assembled = _page_maker()
+    rows = read_rows(Path(out))
+    if rows.finished.rows_done == 0:
+        raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` says how far it is")
+    answer = answer_of(rows)
+    named = [Named(f"Design {number}", number) for number in designs] or list(answer.named) or [Named("Design 0", 0)]
+    try:
+        chosen = [_chosen(one.title, one.number, rows.row(one.number)) for one in named]
+    except IndexError as missing:
+        raise ReportError(str(missing)) from missing
+    identity, kept = rows.finished.identity, thinned(rows)
+    control, readings = Control(**identity["control"]), Readings(**identity["readings"])
+    notes = []
+    if identity["kernels_sha256"] != kernels_sha256():
+        notes.append(
+            "The table was computed by another version of the kernels than the one in this page, "
+            "so what is simulated here may differ from it."
+        )
+    text = assembled(
+        title=str(identity["settings"]["name"]),
+        settings=identity["settings"],
+        control=control,
+        readings=readings,
+        start=chosen[0]["inputs"],
+        sentences=answer.sentences,
+        rows=rows,
+        kept=kept,
+        chosen=chosen,
+        facts=_facts(identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)),
+        notes=[*notes, *_general_notes(control)],
+        units=units,
+    )
+    return _written(Path(page), text)
+
+
+def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = "si", command: str = "") -> Path:
+    """Write the page for one design of a file of settings.
+
+    Parameters
+    ----------
+    sweep
+        The checked file.
+    number
+        Which of its designs.
+    page, units, command
+        As of `write_report`.
+
+    Raises
+    ------
+    ReportError
+        The design cannot be computed, or the extra ``report`` is not installed.
+    """
+    assembled = _page_maker()
+    block = sweep.block(number, number + 1)
+    if block.reasons[0]:
+        raise ReportError(f"design {number} cannot be computed: {block.reasons[0]}")
+    inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
+    settings, control = sweep.resolved(), control_of(sweep, accuracy_of(sweep))
+    text = assembled(
+        title=sweep.name,
+        settings=settings,
+        control=control,
+        readings=readings_of(sweep),
+        start=inputs,
+        facts=_facts(versions(), sha256_of(settings), kernels_sha256(), command, None),
+        notes=_general_notes(control),
+        units=units,
+    )
+    return _written(Path(page), text)
+
+
+def example() -> Sweep:
+    """Return a sweep of one design to begin with: the paper's second crash test, a boulder that stopped its truck."""
+    test = crash_test("rwg")
+    return dataclasses.replace(test, solver=SolverSettings())
+
+
+def _page_maker() -> Callable[..., str]:
+    """Return what makes the page; the libraries that it needs are an extra.
+
+    Raises
+    ------
+    ReportError
+        One of them is not installed.
+    """
+    try:
+        from boulder_sweep.report.page import assembled
+    except ImportError as lacking:
+        raise ReportError(f"reports need {lacking.name}: pip install 'boulder-sweep[report]'") from lacking
+    return assembled
+
+
+def _chosen(title: str, number: int, row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row as the page shows it."""
+    inputs = {name: row[name] for name in INPUT_COLUMNS}
+    if None in inputs.values():
+        raise ReportError(f"design {number} cannot be shown: {row['reason']}")
+    return {"title": title, "number": number, "inputs": inputs}
+
+
+def _general_notes(control: Control) -> list[str]:
+    """What the reader must know of how these designs are simulated."""
+    notes = []
+    if not control.error_estimate:
+        notes.append("No numerical error was estimated: verdicts near a limit are unguarded.")
+    if control.elements:
+        notes.append(
+            f"The table was computed with {control.elements:,} soil elements; what is simulated in this page uses the "
+            "closed form, the limit of ever more elements."
+        )
+    return notes
+
+
+def _facts(
+    versions_: Mapping[str, str], settings_sha256: str, kernels_sha256_: str, command: str, out: str | None
+) -> list[tuple[str, str]]:
+    """Return where the results come from, and how to have them again."""
+    found = [(f"version of {name}", versions_[name]) for name in PACKAGES if name in versions_]
+    found += [("hash of the settings", settings_sha256), ("hash of the kernels", kernels_sha256_)]
+    if out is not None:
+        found.append(("table", out))
+    return [*found, ("command", command)] if command else found
+
+
+def _written(page: Path, text: str) -> Path:
+    """Write a file as a whole or not at all."""
+    put_file(page.parent, page.name, text.encode())
+    return page

@@ -1,0 +1,92 @@
+"""A result, its report, and a browser that opens pages from disk with every way to the network closed."""
+
+import shutil
+
+import pytest
+
+import boulder_sweep
+from boulder_sweep.report import write_report
+
+GRID = """\
+name: sizing
+boulder: {length: 1.65 m, width: [1.5, 1.9] m, height: {from: 2.0 m, to: 3.6 m, count: 9}, density: 2600 kg/m^3}
+site: {embedment_ratio: {from: 0.45, to: 0.75, count: 7}}
+soil: {density: 1860 kg/m^3, friction_angle: [36, 40] deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+NO_NETWORK = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+@pytest.fixture(scope="session")
+def result(tmp_path_factory):
+    """Folder of a finished run of 252 designs, some of which pass."""
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "grid.yaml").write_text(GRID)
+    out = folder / "sizing.sweep"
+    boulder_sweep.run(boulder_sweep.load(folder / "grid.yaml"), out)
+    return out
+
+
+@pytest.fixture(scope="session")
+def report(result):
+    """Return the report of that run."""
+    return write_report(result, result.with_name("report.html"), command="sweep report sizing.sweep")
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """Return a headless browser for all tests."""
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.fail("these tests open pages in Chromium, which is not installed: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=NO_NETWORK)
+        yield browser
+        browser.close()
+
+
+class Opened:
+    """A page that was opened from disk, and what it said and asked for meanwhile."""
+
+    def __init__(self, browser, file, **options):
+        self.context = browser.new_context(accept_downloads=True, **options)
+        self.tab = self.context.new_page()
+        self.complaints, self.requests, self.dialogs = [], [], []
+        self.tab.on("console", lambda message: self._heard(message))
+        self.tab.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.tab.on("request", lambda request: self.requests.append(request.url))
+        self.tab.on("dialog", lambda dialog: (self.dialogs.append(dialog.message), dialog.dismiss()))
+        self.tab.goto(file.resolve().as_uri())
+        self.tab.wait_for_selector("html[data-ready]", state="attached", timeout=60_000)
+
+    def _heard(self, message):
+        if message.type in ("error", "warning"):
+            self.complaints.append(message.text)
+
+    def __getattr__(self, name):
+        return getattr(self.tab, name)
+
+
+@pytest.fixture
+def opened(chromium):
+    """Return a function that opens a page."""
+    pages = []
+
+    def opened(file, **options):
+        pages.append(Opened(chromium, file, **options))
+        return pages[-1]
+
+    yield opened
+    for page in pages:
+        page.context.close()

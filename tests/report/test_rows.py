@@ -1,0 +1,98 @@
+"""What a page takes from a table: every verdict, the designs worth naming, and what is left out of large ones."""
+
+import numpy as np
+import pytest
+
+import boulder_sweep
+from boulder_sweep.report.answers import Quantity, answer_of
+from boulder_sweep.report.rows import NOT_YET, read_rows, thinned
+
+
+@pytest.fixture(scope="module")
+def rows(result):
+    return read_rows(result)
+
+
+@pytest.fixture(scope="module")
+def table(result):
+    return boulder_sweep.read(result)
+
+
+def test_every_row_has_its_verdict(rows, table):
+    names = np.where(table.reason == "", table.verdict, table.verdict.astype(str) + ": " + table.reason.astype(str))
+    assert [rows.names[code] for code in rows.codes] == list(names)
+    assert rows.having("pass").ravel().tolist() == (table.verdict == "pass").tolist()
+    assert rows.counts() == {name: int((names == name).sum()) for name in set(names)}
+
+
+def test_mass_and_depth_follow_from_the_axes(rows, table):
+    mass = table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")
+    np.testing.assert_allclose(np.broadcast_to(rows.mass(), rows.shape).ravel(), mass)
+    np.testing.assert_allclose(np.broadcast_to(rows.depth(), rows.shape).ravel(), table.embedment_depth_m)
+
+
+def test_the_answer_names_the_least_boulder_that_passes_in_every_soil(rows, table):
+    table = table.assign(
+        mass=table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")
+    )
+    boulder = ["boulder_width_m", "boulder_height_m", "embedment_depth_m"]
+    everywhere = table.groupby(boulder).verdict.transform(lambda verdicts: (verdicts == "pass").all())
+    lightest = table[everywhere].sort_values(["mass", "embedment_depth_m", "margin"]).iloc[0]
+    answer = answer_of(rows)
+    assert answer.named[0].number == lightest.design_id
+    sentence = next(sentence for sentence in answer.sentences if "lightest" in str(sentence[0]))
+    quantities = [part for part in sentence if isinstance(part, Quantity)]
+    assert [part.value for part in quantities] == pytest.approx([lightest.mass, lightest.embedment_depth_m])
+    assert f"margin {lightest.margin:.1%}" in sentence[-1]
+    shallowest = table[everywhere].embedment_depth_m.min()
+    assert table.embedment_depth_m[answer.named[1].number] == pytest.approx(shallowest)
+
+
+def test_the_numbers_of_the_answer_add_up(rows, table):
+    first = answer_of(rows).sentences[0][0]
+    assert (
+        first
+        == f"{(table.verdict == 'pass').sum()} of {len(table)} designs pass ({(table.verdict == 'pass').mean():.1%})."
+    )
+
+
+def test_of_a_large_grid_the_longest_axes_are_thinned_and_it_says_so(rows):
+    whole = thinned(rows)
+    assert whole.words == ""
+    assert [len(places) for places in whole.places] == [2, 9, 7, 2]
+    part = thinned(rows, most_cells=100)
+    assert [len(places) for places in part.places] == [2, 5, 4, 2]
+    assert part.words == "5 of 9 values of boulder_height_m, 4 of 7 values of embedment_ratio, spread evenly"
+    for places, length in zip(part.places, rows.shape, strict=True):
+        assert (places[0], places[-1]) == (0, length - 1)
+        assert (np.diff(places) > 0).all()
+
+
+def test_a_list_of_designs_keeps_its_inputs(tmp_path, result):
+    table = boulder_sweep.read(result)
+    inputs = table[["boulder_height_m", "embedment_depth_m", "friction_angle_deg"]]
+    inputs.iloc[::7].to_csv(tmp_path / "designs.csv", index=False)
+    (tmp_path / "list.yaml").write_text(
+        "name: list\ntable: designs.csv\nboulder: {length: 1.65 m, width: 1.5 m, density: 2600 kg/m^3}\n"
+        "soil: {density: 1860 kg/m^3, subgrade_reaction: 60 MN/m^3}\n"
+        "vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}\n"
+    )
+    boulder_sweep.run(boulder_sweep.load(tmp_path / "list.yaml"), tmp_path / "list.sweep")
+    rows = read_rows(tmp_path / "list.sweep")
+    assert rows.axes == {}
+    np.testing.assert_array_equal(rows.inputs["friction_angle_deg"], inputs.iloc[::7].friction_angle_deg)
+    answer = answer_of(rows)
+    assert rows.row(answer.named[0].number)["verdict"] == "pass"
+    part = thinned(rows, most_points=10)
+    assert part.words == "10 of the 36 designs of the list, spread evenly"
+    assert part.places[0].tolist()[:2] == [0, 4]
+
+
+def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path):
+    """As after an interruption: the manifest knows fewer rows than the sweep has."""
+    rows = read_rows(result)
+    codes = rows.codes.copy()
+    codes[100:] = len(rows.names) - 1
+    unfinished = type(rows)(rows.finished, rows.names, codes, rows.axes, rows.inputs)
+    assert unfinished.counts()[NOT_YET] == 152
+    assert any("152 designs are not computed yet" in str(sentence[0]) for sentence in answer_of(unfinished).sentences)
