@@ -118,4 +118,4 @@ def test_the_wheel_holds_the_two_packages_and_nothing_else() -> None:
         if file.is_file() and "__pycache__" not in file.parts
     }
     assert files == wanted
-    assert {file.suffix for file in files} <= {".py", ".typed", ".html"}
+    assert {file.suffix for file in files} <= {".py", ".typed", ".html", ".css", ".js", ".wasm"}

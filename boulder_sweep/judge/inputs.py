@@ -12,7 +12,7 @@ from boulder_kernels import DesignTable
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
 
-_SOURCES = {
+SOURCES = {
     "L": "boulder_length_m",
     "W": "boulder_width_m",
     "H": "boulder_height_m",
@@ -61,7 +61,7 @@ def designs_of(block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
     rows
         Which of them (bool, shape (n,)); all by default.
     """
-    columns = {field: _values(block, source, rows) for field, source in _SOURCES.items()}
+    columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
     return Designs(DesignTable(**columns), _values(block, "bed_offset_m", rows))
 

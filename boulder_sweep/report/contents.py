@@ -12,7 +12,7 @@ import numpy as np
 from boulder_kernels import Control, Readings, Status
 from boulder_sweep.columns import INPUTS, OUTCOMES
 from boulder_sweep.designs import REASONS
-from boulder_sweep.judge.evaluation import SOURCES
+from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL

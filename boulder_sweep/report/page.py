@@ -9,6 +9,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import jinja2
+from bokeh.document import Document
+from bokeh.embed.util import standalone_docs_json_and_render_items
+from bokeh.resources import INLINE
+
 from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import page_data, reading_words, table_data
 from boulder_sweep.report.figures import curves, verdict_map
@@ -78,11 +83,6 @@ def assembled(
     str
         HTML.
     """
-    import jinja2
-    from bokeh.document import Document
-    from bokeh.embed.util import standalone_docs_json_and_render_items
-    from bokeh.resources import INLINE
-
     panels = ["live", *(f"chosen{place}" for place in range(len(chosen)))]
     document = Document()
     for plot in [*(plot for panel in panels for plot in curves(panel)), verdict_map("live")]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.store.finished import FinishedRows
+from boulder_sweep.store.reader import read_row
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
@@ -31,8 +32,10 @@ class Rows:
 
     Attributes
     ----------
-    finished
-        Where they come from.
+    folder : Path
+        Where they are.
+    finished : FinishedRows
+        Those that were there when they were read.
     names : tuple of str
         What a code stands for: verdict and reason, ``fail: overturns``; the last is for rows not computed yet.
     codes : ndarray of uint8, shape (rows,)
@@ -44,6 +47,7 @@ class Rows:
         against each other, and for a grid against its shape.
     """
 
+    folder: Path
     finished: FinishedRows
     names: tuple[str, ...]
     codes: np.ndarray
@@ -91,11 +95,14 @@ class Rows:
         return found
 
     def row(self, number: int) -> dict[str, Any]:
-        """Return one row of the table, None for null."""
-        found = self.finished.row(number)
-        if found is None:
-            raise IndexError(f"design {number} has not been computed yet")
-        return found.to_pylist()[0]
+        """Return one row of the table, None for null.
+
+        Raises
+        ------
+        IndexError
+            The table has no such row, or not yet.
+        """
+        return read_row(self.folder, number).to_pylist()[0]
 
 
 def read_rows(folder: Path) -> Rows:
@@ -126,11 +133,13 @@ def read_rows(folder: Path) -> Rows:
     codes[codes == 255] = len(names)
     inputs = {name: np.array(float(value)) for name, value in given.items() if isinstance(value, float | int)}
     if listed:
-        return Rows(finished, (*names, NOT_YET), codes, {}, inputs | {name: _column(columns, name) for name in varying})
+        return Rows(
+            folder, finished, (*names, NOT_YET), codes, {}, inputs | {name: _column(columns, name) for name in varying}
+        )
     axes = dict(_axes(order, given, columns))
     for place, (name, values) in enumerate(axes.items()):
         inputs[name] = values.reshape([-1 if k == place else 1 for k in range(len(axes))])
-    return Rows(finished, (*names, NOT_YET), codes, axes, inputs)
+    return Rows(folder, finished, (*names, NOT_YET), codes, axes, inputs)
 
 
 def _stored(name: str) -> tuple[str, ...]:

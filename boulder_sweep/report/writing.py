@@ -60,7 +60,7 @@ def write_report(
     answer = answer_of(rows)
     named = [Named(f"Design {number}", number) for number in designs] or list(answer.named) or [Named("Design 0", 0)]
     try:
-        chosen = [_chosen(one.title, one.number, rows.row(one.number)) for one in named]
+        chosen = [_shown(one, rows.row(one.number)) for one in named]
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
     identity, kept = rows.finished.identity, thinned(rows)
@@ -145,12 +145,9 @@ def _page_maker() -> Callable[..., str]:
     return assembled
 
 
-def _chosen(title: str, number: int, row: Mapping[str, Any]) -> dict[str, Any]:
+def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
-    inputs = {name: row[name] for name in INPUT_COLUMNS}
-    if None in inputs.values():
-        raise ReportError(f"design {number} cannot be shown: {row['reason']}")
-    return {"title": title, "number": number, "inputs": inputs}
+    return {"title": one.title, "number": one.number, "inputs": {name: row[name] for name in INPUT_COLUMNS}}
 
 
 def _general_notes(control: Control) -> list[str]:

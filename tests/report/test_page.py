@@ -9,6 +9,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.report import example, write_explorer, write_report
+from tests.report.conftest import GRID
 
 DESIGNS = 200
 SLIDERS = {
@@ -254,6 +255,15 @@ def test_print_has_every_section_and_no_switches(report, opened):
     assert not page.is_visible("#reset")
     assert page.is_visible("#chosen0-outcomes")
     assert page.pdf(format="A4").startswith(b"%PDF")
+
+
+def test_a_design_that_cannot_be_computed_says_why(tmp_path, opened):
+    (tmp_path / "grid.yaml").write_text(GRID.replace("{from: 0.45, to: 0.75, count: 7}", "[0.6, 1.0]"))
+    boulder_sweep.run(boulder_sweep.load(tmp_path / "grid.yaml"), tmp_path / "out")
+    page = opened(write_report(tmp_path / "out", tmp_path / "out.html", designs=[2]))
+    assert page.inner_text("#chosen0-verdict") == "! error: embedment depth is not less than the boulder's height"
+    assert page.inner_text("#chosen0-caption") == "no impact"
+    assert page.complaints == []
 
 
 def test_chosen_designs_are_those_asked_for(result, tmp_path, opened):

@@ -93,6 +93,6 @@ def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path)
     rows = read_rows(result)
     codes = rows.codes.copy()
     codes[100:] = len(rows.names) - 1
-    unfinished = type(rows)(rows.finished, rows.names, codes, rows.axes, rows.inputs)
+    unfinished = type(rows)(rows.folder, rows.finished, rows.names, codes, rows.axes, rows.inputs)
     assert unfinished.counts()[NOT_YET] == 152
     assert any("152 designs are not computed yet" in str(sentence[0]) for sentence in answer_of(unfinished).sentences)

@@ -345,6 +345,7 @@ class Page {
     byId("copy").addEventListener("click", () => this.copy());
     byId("print").addEventListener("click", () => window.print());
     byId("units").addEventListener("change", () => {
+      byId("units").focus(); // a box that is being typed into keeps its text, but not its unit
       this.units.system = byId("units").value;
       this.refresh();
     });

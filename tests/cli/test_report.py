@@ -1,0 +1,78 @@
+"""`sweep report` and `sweep explore` from the command line: what they write, what they open, what they refuse."""
+
+import webbrowser
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Return what a browser was asked to open; none is started."""
+    addresses = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: addresses.append(address) or True)
+    return addresses
+
+
+def test_a_result_becomes_one_file_beside_it(sweep, possible_grid):
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    code, out, err = sweep("report", "small-grid.sweep", "--units", "us")
+    assert (code, err) == (0, "")
+    assert out.startswith("small-grid.html: ")
+    assert "needs no network" in out
+    page = Path("small-grid.html").read_text()
+    assert "<h1>small grid</h1>" in page
+    assert '"units":"us"' in page
+
+
+def test_a_design_that_does_not_exist_is_refused(sweep, grid):
+    sweep("run", grid, "-q")
+    code, _, err = sweep("report", "small-grid.sweep", "--design", 18)
+    assert (code, err) == (2, "error: small-grid.sweep has 18 designs, numbered from 0; there is no 18\n")
+    assert not Path("small-grid.html").exists()
+
+
+def test_what_is_no_result_is_refused(sweep, grid):
+    code, _, err = sweep("report", ".")
+    assert code == 2
+    assert "is not the result of a sweep" in err
+
+
+def test_one_design_is_written_and_opened(sweep, possible_grid, opened):
+    code, out, _ = sweep("explore", possible_grid, "--design", 3)
+    assert code == 0
+    assert out.startswith("small-grid.html: ")
+    assert opened == [Path("small-grid.html").resolve().as_uri()]
+
+
+def test_without_a_file_it_begins_with_the_second_crash_test(sweep, grid, opened):
+    assert sweep("explore", "--no-open", "-o", "first.html")[0] == 0
+    assert "<h1>rwg</h1>" in Path("first.html").read_text()
+    assert opened == []
+
+
+def test_wrong_use_is_told(sweep, grid, opened):
+    assert sweep("explore", "--set", "soil.friction_angle=40")[0] == 2
+    code, _, err = sweep("explore", grid, "--design", 18)
+    assert code == 2
+    assert "holds 18 designs, numbered from 0; there is no 18" in err
+    code, _, err = sweep("explore", grid, "--design", 2)
+    assert (code, opened) == (2, [])
+    assert "design 2 cannot be computed: embedment depth" in err
+
+
+def test_a_machine_without_a_browser_says_so(sweep, possible_grid, monkeypatch):
+    monkeypatch.setattr(webbrowser, "open", lambda address: False)
+    code, _, err = sweep("explore", possible_grid, "--design", 3)
+    assert code == 0
+    assert "no browser" in err
+
+
+def test_without_the_extra_it_says_what_to_install(sweep, grid, monkeypatch):
+    import sys
+
+    sweep("run", grid, "-q")
+    monkeypatch.delitem(sys.modules, "boulder_sweep.report.page", raising=False)
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    code, _, err = sweep("report", "small-grid.sweep")
+    assert (code, err) == (2, "error: reports need jinja2: pip install 'boulder-sweep[report]'\n")
