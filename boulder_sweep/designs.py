@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -70,6 +70,30 @@ class Reasons:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Label:
+    """Text that belongs to the designs and decides nothing: an ID, or the name of a soil.
+
+    Attributes
+    ----------
+    codes : ndarray of int32, shape (n,)
+        Row i has ``words[codes[i]]``. In a `DesignPlan` n is the length of the axis `axis`, in a block its rows.
+    words : tuple of str
+        The texts.
+    axis : int
+        Position of the axis it goes along; of no meaning in a block.
+    """
+
+    codes: np.ndarray
+    words: tuple[str, ...]
+    axis: int = 0
+
+    def at(self, places: np.ndarray) -> Label:
+        """Return the label of some places along its axis, with no more words than these need."""
+        used, codes = np.unique(self.codes[places], return_inverse=True)
+        return Label(codes.astype(np.int32), tuple(self.words[code] for code in used))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class DesignBlock:
     """Rows ``[start, stop)`` of a sweep.
 
@@ -81,12 +105,15 @@ class DesignBlock:
         Every input column of the table but ``design_id``, in the order of the table.
     reasons : Reasons
         Why single rows cannot be computed.
+    labels : dict of str to Label
+        Text columns that are carried along.
     """
 
     start: int
     stop: int
     columns: dict[str, Column]
     reasons: Reasons
+    labels: dict[str, Label] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -183,9 +210,14 @@ class DesignPlan:
     given : dict of str to Source
         By column name; ``embedment_ratio`` in place of ``embedment_depth_m`` and a missing
         ``impact_height_m`` are computed here.
+    labels : mapping of str to Label
+        Text columns to carry along.
     """
 
-    def __init__(self, lengths: Sequence[int], given: dict[str, Source]) -> None:
+    def __init__(
+        self, lengths: Sequence[int], given: dict[str, Source], labels: Mapping[str, Label] | None = None
+    ) -> None:
+        self.labels = dict(labels or {})
         self.lengths = tuple(int(length) for length in lengths)
         self.n_designs = math.prod(self.lengths)
         self.strides = tuple(math.prod(self.lengths[k + 1 :]) for k in range(len(self.lengths)))
@@ -234,7 +266,8 @@ class DesignPlan:
         rows = self._rows(start, stop)
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
         codes = rows.values(self.refusals)
-        return DesignBlock(start, stop, columns, Reasons(codes, REASONS))
+        labels = {name: label.at(rows.place((label.axis,))) for name, label in self.labels.items()}
+        return DesignBlock(start, stop, columns, Reasons(codes, REASONS), labels)
 
     def given_rows(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Return what is given of the designs ``[start, stop)``, one value a row; what follows from it is left out.

@@ -86,6 +86,9 @@ def grid_lines(sweep: Sweep) -> list[str]:
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
         unit = BY_NAME[axis.name].unit if axis.name in BY_NAME else "1"
+        if axis.labels:
+            lines.append(f"  {axis.name:<26}{len(axis):>9,} sets    {', '.join(axis.labels)}")
+            continue
         ends = f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis) > 1 else f"{axis.values[0]:g}"
         lines.append(f"  {axis.name:<26}{len(axis):>9,} values  {ends}{'' if unit == '1' else ' ' + unit}")
     return lines

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import read_setting
 from boulder_sweep.settings.distribution_reader import read_input
-from boulder_sweep.settings.leaf import Leaf, LeafError
+from boulder_sweep.settings.leaf import Leaf, LeafError, read_single
 from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
-from boulder_sweep.settings.tree import Entry, Mapping, Scalar
+from boulder_sweep.settings.tree import Entry, Mapping, Scalar, Sequence
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import DesignList
 
+NAMED_SETS = ("soil", "vehicle")
+"""Blocks that may be a list of named sets."""
+NAME = re.compile(r"\w[\w .+-]{0,79}")
+"""Names of sweeps and of named sets."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table")
 
 
@@ -31,6 +38,8 @@ class Entries:
         Dotted keys that stand in the file, right or wrong.
     misspelled : set of str
         Dotted keys that are missing, while an unknown key beside them looks like them.
+    sets : dict of str to tuple of str
+        Names of the named sets of a block that is a list of them.
     table : DesignList or None
         The table named in the file.
     """
@@ -43,6 +52,7 @@ class Entries:
         self.settings: dict[str, Any] = {}
         self.given: set[str] = set()
         self.misspelled: set[str] = set()
+        self.sets: dict[str, tuple[str, ...]] = {}
         self.table: DesignList | None = None
 
     def read(self) -> None:
@@ -76,6 +86,9 @@ class Entries:
         if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
             return  # a block of which every line is commented out
         known = {field.key: field for field in fields.fields_of(section)}
+        if section in NAMED_SETS and isinstance(node, Sequence):
+            self._read_sets(section, node, known)
+            return
         if not isinstance(node, Mapping) or node.unit is not None:
             self.problems.add(node.place, section, f"must be a block of keys: {', '.join(known)}")
             return
@@ -93,6 +106,56 @@ class Entries:
             except LeafError as error:
                 for mistake in error.mistakes:
                     self.problems.add(mistake.place, field.path, mistake.message)
+
+    def _read_sets(self, section: str, node: Sequence, known: dict[str, fields.Field]) -> None:
+        """Read a list of named sets: ``[{name: loose, density: 1700 kg/m^3, ...}, ...]``."""
+        before = len(self.problems.problems)
+        names: list[str] = []
+        columns: dict[str, list[float]] = {}
+        items = node.items or [Scalar(node.place, "")]
+        for item in items:
+            if not isinstance(item, Mapping):
+                message = "must be a list of blocks, each with a name and one value per key"
+                self.problems.add(item.place, section, message)
+                continue
+            names.append(self._read_set_name(section, item, names))
+            for inner in item:
+                field = known.get(inner.key)
+                if inner.key == "name":
+                    continue
+                if field is None or field not in fields.INPUTS:
+                    self._unknown(inner, section, ("name", *(key for key in known if known[key] in fields.INPUTS)))
+                    continue
+                self.given.add(field.path)
+                try:
+                    columns.setdefault(field.name, []).append(read_single(inner.value, field))
+                except LeafError as error:
+                    for mistake in error.mistakes:
+                        self.problems.add(mistake.place, field.path, mistake.message)
+            if len(self.problems.problems) == before:
+                ragged = [name for name, values in columns.items() if len(values) != len(names)]
+                for name in ragged:
+                    message = "must be given in every named set, or in none"
+                    self.problems.add(item.place, fields.BY_NAME[name].path, message)
+        if len(self.problems.problems) == before:
+            self.sets[section] = tuple(names)
+            self.leaves |= {name: Leaf(np.array(values), True, node.place) for name, values in columns.items()}
+
+    def _read_set_name(self, section: str, item: Mapping, taken: list[str]) -> str:
+        """Return the name of a named set."""
+        node = item.get("name")
+        name = node.text.strip() if isinstance(node, Scalar) else ""
+        if not NAME.fullmatch(name):
+            place = item.place if node is None else node.place
+            message = "every named set needs a name of at most 80 letters, digits, spaces and - _ . +"
+            self.problems.add(place, f"{section}.name", message)
+        elif name in taken:
+            self.problems.add(item.place, f"{section}.name", f"'{name}' is given twice")
+        return name
+
+    def inputs_of_sets(self, section: str) -> list[fields.Field]:
+        """Return the inputs that the named sets of a block give."""
+        return [field for field in fields.fields_of(section) if field.name in self.leaves]
 
     def _unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
         """Report an unknown key, with the nearest known one."""

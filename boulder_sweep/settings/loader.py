@@ -13,7 +13,7 @@ import numpy as np
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
-from boulder_sweep.settings.entries import Entries
+from boulder_sweep.settings.entries import NAME, Entries
 from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
 from boulder_sweep.settings.problems import ProblemList
@@ -28,7 +28,6 @@ MAX_DESIGNS = 2**63 - 1
 """Most designs of a sweep: ``design_id`` is a 64-bit number."""
 
 Part = TypeVar("Part", Criterion, Model, SolverSettings)
-NAME = re.compile(r"\w[\w .+-]{0,79}")
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
@@ -137,6 +136,11 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
     axes: list[Axis] = []
     count = 1
     for section in entries.root:
+        if section.key in entries.sets:
+            labels = entries.sets[section.key]
+            columns = {field.name: entries.leaves[field.name].values for field in entries.inputs_of_sets(section.key)}
+            axes.append(Axis(section.key, np.arange(float(len(labels))), columns, labels))
+            count *= len(labels)
         if not isinstance(section.value, Mapping):
             continue
         for entry in section.value:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.fields import BY_NAME, Field
 from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.problems import Place, Problem
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 # Constant of horizontal subgrade reaction [MN/m^3] over friction angle [deg] of the two families in use.
 _API_ANGLES, _API = np.array([30.0, 43.0]), np.array([10.5, 110.0])
 _TERZAGHI_ANGLES, _TERZAGHI = np.array([30.0, 35.0, 40.0]), np.array([2.2, 6.6, 17.6])
+
+FAMILY_FACTOR = 2.0
+"""How far a pair of soil constants may be off the nearer family of data."""
 
 
 def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
@@ -30,56 +33,101 @@ def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
         Where each quantity stands in the file.
     """
     values = {name: np.array([value]) for name, value in sweep.constants.items()}
-    values |= {axis.name: axis.values for axis in sweep.axes}
-    if sweep.table is not None:
-        values |= sweep.table.columns
+    groups = [axis.columns for axis in sweep.axes] + ([] if sweep.table is None else [sweep.table.columns])
+    for group in groups:
+        values |= group
     for name, found in values.items():
-        message = _unrealistic(name, found)
+        message = _unusual(name, found)
         if message:
             yield _note(places[name], BY_NAME[name].path, message)
     for axis in sweep.axes:
-        if len(np.unique(axis.values)) < len(axis.values):
+        if len(set(axis.values.tolist())) < len(axis.values):
             yield _note(places[axis.name], BY_NAME[axis.name].path, "contains a value more than once")
+    if "embedment_depth_m" in values:
+        depth, height = _pairs(values, groups, "embedment_depth_m", "boulder_height_m")
+        ratio = np.minimum(depth / height, 1.0)
+        off = _without_partner(_outside(ratio, BY_NAME["embedment_ratio"]))
+        if off.any():
+            message = _unusual("embedment_ratio", ratio[off])
+            yield _note(places["embedment_depth_m"], "site.embedment_depth", f"depth over height: {message}")
     limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
     if usual is not None and limit > usual.high:
-        remark = usual.remark
-        yield _note(Place(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {remark}")
+        yield _note(Place(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}")
     if sweep.partial_factor != 1.0:
         angles = values["friction_angle_deg"]
         ends = f"{angles.min():.4g}" if angles.min() == angles.max() else f"{angles.min():.4g} to {angles.max():.4g}"
         message = f"tan(friction angle) is divided by {sweep.partial_factor:g}: simulated and listed as {ends} deg"
         yield _note(Place(str(sweep.path)), "partial_factor.friction_angle", message)
-    message = _mixed_families(sweep, values["friction_angle_deg"], values["subgrade_reaction_MN_m3"])
+    angle, reaction = _pairs(values, groups, "friction_angle_deg", "subgrade_reaction_MN_m3")
+    message = _off_families(angle, reaction) or _mixed_families(angle, reaction)
     if message:
         yield _note(places["subgrade_reaction_MN_m3"], "soil.subgrade_reaction", message)
+
+
+def _pairs(
+    values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], one: str, other: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pairs of two inputs that occur, shape (n,) where they are listed together, (n, m) where crossed."""
+    for group in groups:
+        if one in group and other in group:
+            return group[one], group[other]
+    ones, others = np.meshgrid(_thinned(values[one]), _thinned(values[other]))
+    return ones, others
+
+
+def _without_partner(off: np.ndarray) -> np.ndarray:
+    """Return which pairs are off; of crossed axes, which make pairs nobody means, those with a value always off."""
+    return off if off.ndim == 1 else off & (off.all(axis=0, keepdims=True) | off.all(axis=1, keepdims=True))
 
 
 def _note(place: Place, key: str, message: str) -> Problem:
     return Problem(place.file, place.line, place.column, key, message)
 
 
-def _unrealistic(name: str, values: np.ndarray) -> str:
+def _outside(values: np.ndarray, field: Field) -> np.ndarray:
+    """Return which values lie outside the range met in practice, bool."""
+    if field.usual is None:
+        return np.zeros(values.shape, dtype=bool)
+    slack = 1e-9 * field.usual.high
+    return (values < field.usual.low - slack) | (values > field.usual.high + slack)
+
+
+def _unusual(name: str, values: np.ndarray) -> str:
     """Return a note if a value lies outside the range met in practice."""
     usual, unit = BY_NAME[name].usual, BY_NAME[name].unit
-    if usual is None:
+    if usual is None or not _outside(values, BY_NAME[name]).any():
         return ""
     low, high = float(values.min()), float(values.max())
-    slack = 1e-9 * usual.high
-    if low >= usual.low - slack and high <= usual.high + slack:
-        return ""
     found = describe(low, unit) if low == high else f"{low:.6g} to {describe(high, unit)}"
     ends = f"{usual.low:g} to {describe(usual.high, unit)}"
     return f"{found} is outside the usual range of {ends} ({usual.remark}); computed as given"
 
 
-def _mixed_families(sweep: Sweep, angle: np.ndarray, reaction: np.ndarray) -> str:
+def off_families(angle: np.ndarray, reaction: np.ndarray) -> np.ndarray:
+    """Return which pairs of soil constants belong to neither family of data, bool.
+
+    Parameters
+    ----------
+    angle, reaction : ndarray
+        Friction angles [deg] and constants of horizontal subgrade reaction [MN/m^3].
+    """
+    return (reaction > FAMILY_FACTOR * api_curve(angle)) | (reaction < terzaghi_curve(angle) / FAMILY_FACTOR)
+
+
+def _off_families(angle: np.ndarray, reaction: np.ndarray) -> str:
+    """Return a note if some soil constants belong to neither family of data."""
+    off = _without_partner(off_families(angle, reaction))
+    if not off.any():
+        return ""
+    phi, beta = angle[off][0], reaction[off][0]
+    curves = f"Terzaghi's values give {terzaghi_curve(phi):.2g}, the API curve {api_curve(phi):.2g}"
+    return f"{beta:g} MN/m^3 does not go with {phi:g} deg: {curves} MN/m^3; take both soil constants from one source"
+
+
+def _mixed_families(angle: np.ndarray, reaction: np.ndarray) -> str:
     """Return a note if some soils follow Terzaghi's values and others the API curve."""
-    if sweep.table is not None and len(angle) > 1 and len(reaction) > 1:
-        pairs = angle, reaction
-    else:
-        angles, reactions = np.meshgrid(_thinned(angle), _thinned(reaction))
-        pairs = angles.ravel(), reactions.ravel()
-    near_api = np.abs(np.log(pairs[1] / _api(pairs[0]))) < np.abs(np.log(pairs[1] / _terzaghi(pairs[0])))
+    pairs = angle.ravel(), reaction.ravel()
+    near_api = np.abs(np.log(pairs[1] / api_curve(pairs[0]))) < np.abs(np.log(pairs[1] / terzaghi_curve(pairs[0])))
     if near_api.all() or not near_api.any():
         return ""
     one, other = np.flatnonzero(near_api)[-1], np.flatnonzero(~near_api)[0]
@@ -96,11 +144,13 @@ def _thinned(values: np.ndarray) -> np.ndarray:
     return values if len(values) <= 200 else values[np.linspace(0, len(values) - 1, 200).astype(int)]
 
 
-def _api(angle: np.ndarray) -> np.ndarray:
+def api_curve(angle: np.ndarray) -> np.ndarray:
+    """Constant of horizontal subgrade reaction [MN/m^3] by the API curve, over the friction angle [deg]."""
     return _log_line(angle, _API_ANGLES, _API)
 
 
-def _terzaghi(angle: np.ndarray) -> np.ndarray:
+def terzaghi_curve(angle: np.ndarray) -> np.ndarray:
+    """The same by Terzaghi's values."""
     return _log_line(angle, _TERZAGHI_ANGLES, _TERZAGHI)
 
 

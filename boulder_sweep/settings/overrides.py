@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
+from boulder_sweep.settings.tree import Sequence as List
 from boulder_sweep.settings.yaml_reader import parse_node
 
 _ALTERNATIVES = {
@@ -87,6 +88,11 @@ def _put(root: Mapping, path: list[str], value: Node, place: Place) -> None:
     block = root
     for depth, key in enumerate(path[:-1]):
         inner = block.get(key)
+        if isinstance(inner, List) and all(isinstance(item, Mapping) for item in inner.items):
+            for item in inner.items:  # named sets: the entry holds for all of them
+                assert isinstance(item, Mapping)
+                _put(item, path[depth + 1 :], value, place)
+            return
         if not isinstance(inner, Mapping):
             opened = Mapping(place)
             if path[: depth + 1] == ["model", "readings"] and isinstance(inner, Scalar):

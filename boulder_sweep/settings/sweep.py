@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from boulder_sweep.designs import DesignBlock, DesignPlan, Source
+from boulder_sweep.designs import DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.settings.distributions import Distribution
 from boulder_sweep.settings.fields import BY_NAME, INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
@@ -23,21 +23,32 @@ IMPACT_HEIGHT_RULE = "Eq 9: (min(boulder_height - embedment_depth, hood_height) 
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One axis of the grid.
+    """One axis of the grid: the values of one input, or named sets of several.
 
     Attributes
     ----------
     name : str
-        Column of the table, or ``embedment_ratio``.
+        Column of the table, or ``embedment_ratio``; ``soil`` or ``vehicle`` for named sets.
     values : ndarray of float64
-        Values in the unit of the column, in the order of the file.
+        Values in the unit of the column, in the order of the file; for named sets their numbers from 0.
+    sets : dict of str to ndarray of float64
+        Values by column name, of named sets only.
+    labels : tuple of str
+        Names of the named sets.
     """
 
     name: str
     values: np.ndarray
+    sets: dict[str, np.ndarray] = field(default_factory=dict)
+    labels: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values)
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Values by column name."""
+        return self.sets or {self.name: self.values}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +61,13 @@ class DesignList:
         Name of the file, without its folder.
     columns : dict of str to ndarray of float64, shape (n,)
         Values by column name.
+    labels : dict of str to Label
+        Text columns that are carried into the result.
     """
 
     file: str
     columns: dict[str, np.ndarray]
+    labels: dict[str, Label] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -109,11 +123,16 @@ class Sweep:
     def __post_init__(self) -> None:
         lengths = [len(axis) for axis in self.axes]
         given = {name: Source(np.array([value])) for name, value in self.constants.items()}
-        given |= {axis.name: Source(axis.values, (k,)) for k, axis in enumerate(self.axes)}
+        labels: dict[str, Label] = {}
+        for k, axis in enumerate(self.axes):
+            given |= {name: Source(values, (k,)) for name, values in axis.columns.items()}
+            if axis.labels:
+                labels[axis.name] = Label(np.arange(len(axis), dtype=np.int32), axis.labels, k)
         if self.table is not None:
             lengths = [len(self.table)]
             given |= {name: Source(values, (0,)) for name, values in self.table.columns.items()}
-        object.__setattr__(self, "plan", DesignPlan(lengths, given))
+            labels = self.table.labels
+        object.__setattr__(self, "plan", DesignPlan(lengths, given, labels))
 
     @property
     def n_designs(self) -> int:
@@ -150,7 +169,7 @@ class Sweep:
         Very long axes and tables are represented by a SHA-256 of their values.
         """
         inputs: dict[str, Any] = {}
-        varying = {axis.name: axis.values for axis in self.axes}
+        varying = {name: values for axis in self.axes for name, values in axis.columns.items()}
         if self.table is not None:
             varying |= self.table.columns
         for name in (entry.name for entry in INPUTS):
@@ -160,18 +179,20 @@ class Sweep:
                 inputs[name] = self.constants[name]
         inputs.setdefault("impact_height_m", IMPACT_HEIGHT_RULE)
         accuracy = self.solver.accuracy
-        doubt: dict[str, Any] = {}
+        more: dict[str, Any] = {}
         if self.distributions:
             spreads = {name: spread.to_dict() for name, spread in self.distributions.items()}
-            doubt = {"distributions": spreads, "correlation": self.correlation}
+            more = {"distributions": spreads, "correlation": self.correlation}
+        if self.plan.labels:
+            more["labels"] = {name: _texts_listed(label) for name, label in self.plan.labels.items()}
         if self.partial_factor != 1.0:
-            doubt["partial_factor"] = {"friction_angle": self.partial_factor}
+            more["partial_factor"] = {"friction_angle": self.partial_factor}
         return {
             "name": self.name,
             "n_designs": self.n_designs,
             "order": "table" if self.table is not None else [axis.name for axis in self.axes],
             "inputs": inputs,
-            **doubt,
+            **more,
             "criterion": {
                 "max_rotation_deg": self.criterion.max_rotation_deg,
                 "rating": self.criterion.rating,
@@ -196,3 +217,12 @@ def _listed(values: np.ndarray) -> Any:
         return [float(value) for value in values]
     digest = hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()
     return {"count": len(values), "first": float(values[0]), "last": float(values[-1]), "sha256": digest}
+
+
+def _texts_listed(label: Label) -> Any:
+    """Return the texts of a label as a list, or their number and hash where there are very many."""
+    texts = [label.words[code] for code in label.codes]
+    if len(texts) <= MAX_LISTED:
+        return texts
+    digest = hashlib.sha256("\x00".join(texts).encode(errors="surrogatepass")).hexdigest()
+    return {"count": len(texts), "first": texts[0], "last": texts[-1], "sha256": digest}

@@ -9,9 +9,9 @@ from typing import Any
 
 from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.distribution_reader import NEEDED
+from boulder_sweep.settings.entries import NAME
 from boulder_sweep.settings.fields import EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
 from boulder_sweep.settings.leaf import MAX_AXIS
-from boulder_sweep.settings.loader import NAME
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,

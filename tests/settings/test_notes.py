@@ -32,6 +32,8 @@ def test_usual_values_have_no_remarks(load_with, load_it, minimal):
         ("vehicle.hood_height=1.7", "medium-duty trucks"),
         ("criterion.max_rotation=45", "the model no longer holds"),
         ("site.embedment_ratio=0.9", "usual embedments"),
+        ("site.embedment_depth=3.2 m", "depth over height: 0.930233 is outside the usual range of 0.35 to 0.75"),
+        ("site.embedment_depth=[1, 2] m", "depth over height: 0.290698 is outside"),
         ("boulder.width=[1, 1.5, 1]", "a value more than once"),
     ],
 )
@@ -58,3 +60,19 @@ def test_a_remark_has_its_place(load_it, minimal):
 def test_soil_data_of_two_families(load_with, angle, reaction, mixed):
     notes = _notes(load_with(f"soil.friction_angle={angle}", f"soil.subgrade_reaction={reaction}"))
     assert any("two families of data" in note for note in notes) == mixed
+
+
+@pytest.mark.parametrize(
+    ("angle", "reaction", "words"),
+    [
+        ("28", "110", "110 MN/m^3 does not go with 28 deg"),
+        ("42", "3", "3 MN/m^3 does not go with 42 deg"),
+        ("[28, 43]", "110", "110 MN/m^3 does not go with 28 deg"),
+        ("[36, 42]", "[45, 108]", ""),
+        ("43.2", "95", ""),
+    ],
+)
+def test_soil_constants_off_both_families(load_with, angle, reaction, words):
+    notes = _notes(load_with(f"soil.friction_angle={angle}", f"soil.subgrade_reaction={reaction}"))
+    found = [note for note in notes if "does not go with" in note]
+    assert (words in found[0]) if words else not found
