@@ -118,13 +118,13 @@ def shorten(text: str, limit: int = 60) -> str:
     return flat if len(flat) <= limit else flat[: limit - 3] + "..."
 
 
-def nearest(word: str, known: Iterable[str]) -> str | None:
-    """Return the known word nearest to `word`, None if there is none near."""
+def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
+    """Return the known word nearest to `word`, None if none is as similar as `cutoff` (1 for the same word)."""
     # difflib takes a few milliseconds to import and is needed for mistakes only.
     from difflib import get_close_matches
 
     candidates = {name.lower(): name for name in known}
-    near = get_close_matches(word.lower()[:80], candidates, n=1, cutoff=0.6)
+    near = get_close_matches(word.lower()[:80], candidates, n=1, cutoff=cutoff)
     return candidates[near[0]] if near else None
 
 

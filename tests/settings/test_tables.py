@@ -1,11 +1,14 @@
 """Explicit lists of designs from CSV and Parquet files."""
 
+import re
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from boulder_sweep.settings import SettingsError, load
+from boulder_sweep.settings.fields import INPUTS
 
 HEADER = "boulder_length_m,boulder_width_m,boulder_height_m,embedment_depth_m\n"
 ROWS = "0.762,1.016,2.2,1.2\n1.65,1.68,3.44,2.03\n"
@@ -97,8 +100,8 @@ def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
         "designs.csv:3:15: embedment_depth_m: is empty",
         "designs.csv:4:6: boulder_width_m: -1 m is outside the admitted range of 0.01 to 20 m",
         "designs.csv:5:1: has 2 cells; the first line has 4",
-        "designs.csv:6: boulder_height_m: '3,44' is not a plain number",
-        "designs.csv:6: boulder_length_m: '1.65 m' has a unit; the column is in m by its name",
+        "designs.csv:6: '3,44' has a decimal comma; save the file with decimal points",
+        "designs.csv:6: boulder_length_m: '1.65 m' has a unit; units belong in the column's name",
         "designs.csv:7:1: boulder_length_m: '1_0' is not a plain number",
         "designs.csv:7:9: embedment_depth_m: '010' begins with a zero",
     ]
@@ -117,15 +120,100 @@ def test_the_header_is_checked(messages_of):
         "designs.csv:1:60:",
         "designs.csv:1:103:",
     ]
-    assert "numbered by their order" in messages[0]
+    assert "numbered in their order" in messages[0]
     assert "did you mean boulder_length_m?" in messages[1]
-    assert "second column of this name" in messages[2]
+    assert "appears twice" in messages[2]
     assert "outcome of a run" in messages[3]
 
 
-def test_semicolons_with_decimal_commas_are_told(messages_of):
-    (message, *_) = messages_of((HEADER + ROWS).replace(",", ";").replace(".", ","))
-    assert message.startswith("designs.csv:2:1: boulder_length_m: '0,762' is not a plain number; use a decimal point")
+def test_decimal_commas_are_one_mistake(messages_of):
+    (message,) = messages_of((HEADER + 100 * ROWS).replace(",", ";").replace(".", ","))
+    assert message == "designs.csv:2:1: '0,762' has a decimal comma; save the file with decimal points"
+    (*lines, rest) = messages_of(HEADER + 100 * ROWS.replace(".", ","))
+    assert len(lines) == 5
+    assert "has 8 cells; the first line has 4 (numbers need a decimal point" in lines[0]
+    assert rest == "designs.csv:201: and 195 more lines like these"
+
+
+def test_mistakes_of_one_kind_are_counted(messages_of):
+    (*cells, rest) = messages_of(HEADER + "x,1,2,1\n" * 50)
+    assert len(cells) == 5
+    assert rest == "designs.csv:51: boulder_length_m: and 45 more cells like these"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "column", "expected"),
+    [
+        ("boulder_length_ft", "5.5", "boulder_length_m", 1.6764),
+        ("boulder_length_in", "66", "boulder_length_m", 1.6764),
+        ("boulder_length_cm", "165", "boulder_length_m", 1.65),
+        ("boulder_density_pcf", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
+        ("boulder_density_lb_ft3", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
+        ("soil_density_kN_m3", "18.2", "soil_density_kg_m3", 18200 / 9.80665),
+        ("soil_density_t_m3", "1.86", "soil_density_kg_m3", 1860.0),
+        ("friction_angle_rad", "0.7", "friction_angle_deg", np.degrees(0.7)),
+        ("subgrade_reaction_pci", "350", "subgrade_reaction_MN_m3", 350 * 4.4482216152605 / 0.0254**3 / 1e6),
+        ("subgrade_reaction_kN_m3", "95000", "subgrade_reaction_MN_m3", 95.0),
+        ("vehicle_mass_lb", "15000", "vehicle_mass_kg", 15000 * 0.45359237),
+        ("vehicle_mass_short_ton", "7.5", "vehicle_mass_kg", 15000 * 0.45359237),
+        ("impact_speed_mph", "30", "impact_speed_m_s", 13.4112),
+        ("impact_speed_km_h", "48", "impact_speed_m_s", 48 / 3.6),
+        ("vehicle_spring_kN_m", "3103.3", "vehicle_spring_N_m", 3103300.0),
+        ("vehicle_spring_lb_in", "17720", "vehicle_spring_N_m", 17720 * 4.4482216152605 / 0.0254),
+        ("vehicle_damper_kN_s_m", "138.91", "vehicle_damper_N_s_m", 138910.0),
+        ("embedment_ratio_percent", "55", "embedment_depth_m", 0.55 * 3.0),
+    ],
+)
+def test_a_column_may_be_in_any_unit_that_fits(load_table, name, value, column, expected):
+    given = {"boulder_length_m": "1.5", "boulder_width_m": "1.5", "boulder_height_m": "3", "embedment_depth_m": "1.5"}
+    given.pop(column, None)
+    given[name] = value
+    grid = GRID
+    section, _, key = next(f.path.partition(".") for f in INPUTS if f.name == column)
+    if section != "site":
+        grid = re.sub(rf"({section}: .*?)(, |{{{{){key}: [^,}}]*,? ?", r"\1\2", grid)
+    sweep = load_table(f"{','.join(given)}\n{','.join(given.values())}\n", grid=grid)
+    assert _column(sweep, column) == pytest.approx([expected], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("boulder_lenght_ft", "did you mean boulder_length_ft?"),
+        ("boulder_lenght_m", "did you mean boulder_length_m?"),
+        ("impact_spede_mph", "did you mean impact_speed_mph?"),
+        ("boulder_length", "the unit is missing at the end of the name, such as boulder_length_m"),
+        ("boulder_length_kg", "did you mean boulder_length, with its unit at the end?"),
+        ("beta", "did you mean subgrade_reaction, with its unit at the end?"),
+        ("bumper_hieght_ft", "did you mean bumper_height_ft?"),
+        ("price", "is not an input (inputs: boulder_length, boulder_width"),
+        ("<script>", "may hold letters, digits"),
+        ("\x1b[31m", "may hold letters, digits"),
+    ],
+)
+def test_unknown_columns_of_numbers(messages_of, name, words):
+    messages = messages_of(HEADER.replace("\n", f",{name}\n") + "1,1,2,1,7\n")
+    assert words in messages[0]
+    assert not any(" _m?" in message for message in messages)
+
+
+def test_the_same_input_in_two_units(messages_of):
+    (message,) = messages_of(HEADER.replace("\n", ",boulder_length_ft\n") + "1,1,2,1,3\n")
+    assert "gives the same as column boulder_length_m" in message
+
+
+def test_text_is_carried_along(load_table):
+    header = "boulder_id,Block name," + HEADER.replace("\n", ",remark\n")
+    sweep = load_table(header + "7,Ada \x1b[31m,1,1,2,1,first\n8,,1,1,2.5,1,\n9,Ada \x1b[31m,1,1,3,1,first\n")
+    block = sweep.block(1, 3)
+    labels = {name: [label.words[code] for code in label.codes] for name, label in block.labels.items()}
+    assert labels == {"boulder_id": ["8", "9"], "Block name": ["", "Ada ?[31m"], "remark": ["", "first"]}
+    assert sweep.resolved()["labels"]["boulder_id"] == ["7", "8", "9"]
+
+
+def test_a_table_of_text_alone_is_no_table(messages_of):
+    (message,) = messages_of("boulder_id,remark\na,b\n", grid=GRID)[:1]
+    assert "has no column that is an input" in message
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,127 @@
+"""The column names of a table of designs: inputs in any unit that fits, and text that is carried along."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+
+from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
+from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.settings.fields import INPUTS, Field
+from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
+from boulder_sweep.settings.units import UnitError, factor
+
+_ID = re.compile(r"(.*_)?(id|no|nr|number|name|label|comment|note)", re.IGNORECASE)
+"""Names of unknown columns that may hold numbers: those of others could be a misspelled input."""
+_LABEL = re.compile(r"\w[\w .+/()#-]{0,79}")
+
+
+@dataclass(frozen=True, slots=True)
+class TableColumn:
+    """One column that can be used.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the file.
+    field : Field or None
+        The input it gives; None for a text column.
+    factor : Fraction
+        From its numbers to the unit of the input.
+    """
+
+    name: str
+    field: Field | None
+    factor: Fraction = Fraction(1)
+
+
+def _suffix(unit: str) -> str:
+    return "" if unit == "1" else "_" + unit.replace("^", "").replace("/", "_").replace("*", "_")
+
+
+_STEMS: dict[str, Field] = {field.name.removesuffix(_suffix(field.unit)): field for field in INPUTS}
+"""Inputs by the name of the column without its unit."""
+
+
+def read_header(names: list[str], places: list[Place], problems: ProblemList) -> list[TableColumn | None]:
+    """Return what every column is, None for those that cannot be used; mistakes go to `problems`."""
+    columns: list[TableColumn | None] = []
+    for name, place in zip(names, places, strict=True):
+        found = _column(name)
+        if isinstance(found, TableColumn):
+            same = [other for other in columns if other is not None and _key(other) == _key(found)]
+            if same:
+                found = f"gives the same as column {same[0].name}" if same[0].name != name else "appears twice"
+        if isinstance(found, str):
+            problems.add(place, shorten(name) or "(empty)", found)
+        columns.append(found if isinstance(found, TableColumn) else None)
+    return columns
+
+
+def _key(column: TableColumn) -> str:
+    return column.name if column.field is None else column.field.name
+
+
+def _column(name: str) -> TableColumn | str:
+    """Return a column, or what is wrong with its name."""
+    if name == "design_id":
+        return "designs are numbered in their order; rename or remove this column"
+    if name in OUTCOME_COLUMNS:
+        return f"is an outcome of a run ({TABLE_COLUMNS[name].meaning}), not an input; remove this column"
+    for stem, field in _STEMS.items():
+        if name == field.name:
+            return TableColumn(name, field)
+        if name.startswith(f"{stem}_"):
+            ratio = _factor(name.removeprefix(f"{stem}_"), field.unit)
+            if ratio is not None:
+                return TableColumn(name, field, ratio)
+    if name in _STEMS:
+        return f"the unit is missing at the end of the name, such as {name}{_suffix(_STEMS[name].unit)}"
+    meant = "" if _ID.fullmatch(name) else _meant(name)
+    if meant:
+        return f"is not an input; did you mean {meant}?"
+    if not _LABEL.fullmatch(name):
+        return "the name of a text column may hold letters, digits, spaces and _ . + - / ( ) #"
+    return TableColumn(name, None)
+
+
+def check_numbers(column: TableColumn, place: Place, problems: ProblemList) -> bool:
+    """Report an unknown column that holds nothing but numbers; return whether it may be carried along."""
+    if _ID.fullmatch(column.name):
+        return True
+    message = f"is not an input (inputs: {', '.join(_STEMS)}, each with its unit at the end)"
+    message += "; a column of numbers that is to be carried along needs a name that ends in _id or _name"
+    problems.add(place, shorten(column.name), message)
+    return False
+
+
+def _factor(suffix: str, unit: str) -> Fraction | None:
+    """Return the factor of a unit at the end of a column name (``ft``, ``kN_m3``, ``lb_s_in``), None if it is none."""
+    parts = suffix.split("_")
+    products = [suffix, *("*".join(parts[:k]) + "/" + "/".join(parts[k:]) for k in range(1, len(parts)))]
+    for text in products:
+        try:
+            return factor(text, unit)
+        except UnitError:
+            continue
+    return None
+
+
+def _meant(name: str) -> str:
+    """Return the input that a misspelled name stands for, with the unit it was given; empty if there is none near."""
+    word = name.lower()
+    for cut in [i for i, sign in enumerate(name) if sign == "_"] + [len(name)]:
+        stem, suffix = name[:cut], name[cut + 1 :]
+        near = nearest(stem, _STEMS, cutoff=0.8)
+        if near is None:
+            continue
+        unit = _STEMS[near].unit
+        if suffix and _factor(suffix, unit) is not None:
+            return f"{near}_{suffix}"
+        if not suffix:
+            return f"{near}{_suffix(unit)}" if unit == "1" else f"{near}, with its unit at the end"
+    for stem, field in _STEMS.items():
+        if word in (stem, field.key, *field.also):
+            return f"{stem}, with its unit at the end" if field.unit != "1" else stem
+    return ""
