@@ -190,3 +190,8 @@ COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
 BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in COLUMNS}
+
+
+def column_spec(name: str) -> ColumnSpec:
+    """Return the register's entry of a column; any other column of a result is text from the settings file."""
+    return BY_NAME.get(name) or ColumnSpec(name, "dictionary", "", "text that the settings file gives with the design")

@@ -38,6 +38,8 @@ class FinishedRows:
         Rows of the whole table.
     rows_done : int
         Rows that are finished.
+    labels : tuple of str
+        Names of the text columns that its settings file gave.
     identity : dict
         What all rows have in common, see `provenance`.
 
@@ -52,6 +54,7 @@ class FinishedRows:
     def __init__(self, folder: Path):
         manifest = load(folder)
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
+        self.labels = manifest.labels
         self._folder = folder
         self._places = _Places(manifest)
         self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())

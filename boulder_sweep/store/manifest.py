@@ -154,6 +154,12 @@ class Manifest:
                 whole.append(names)
         return whole
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the text columns that the settings file gave."""
+        settings = self.identity.get("settings")
+        return tuple(settings.get("labels", ())) if isinstance(settings, dict) else ()
+
     def part_name(self, first: int, stop: int) -> str:
         """Return the file name of the part with the rows [first, stop); names sort as the rows do."""
         digits = max(_DIGITS, len(str(self.rows)))
@@ -192,7 +198,7 @@ def save(manifest: Manifest, folder: Path) -> None:
 
     text = json.dumps({"format": _FORMAT, **asdict(manifest)}, separators=(",", ":"))
     value = hashlib.sha256(text.encode()).hexdigest() + text
-    schema = table_schema({_KEY: value.encode()})
+    schema = table_schema({_KEY: value.encode()}, manifest.labels)
     sink = pa.BufferOutputStream()
     with pq.ParquetWriter(sink, schema):
         pass  # columns, and no rows
@@ -231,8 +237,9 @@ def load(folder: Path) -> Manifest:
     content: Any = None
     try:
         content = json.loads(text)
-        _check_columns(found.schema.names)
-        return _from_json(content)
+        manifest = _from_json(content)
+        _check_columns(found.schema.names, manifest.labels)
+        return manifest
     except ValueError as unfamiliar:
         raise OtherVersionError(path, str(unfamiliar), version_of(content)) from None
 
@@ -248,9 +255,9 @@ def _no_result(folder: Path) -> str:
     return f"{folder} is a file; the result of a sweep is a folder{inside}"
 
 
-def _check_columns(names: list[str]) -> None:
+def _check_columns(names: list[str], labels: tuple[str, ...]) -> None:
     """Raise ValueError where a table has other columns than today."""
-    expected = [spec.name for spec in COLUMNS]
+    expected = [*(spec.name for spec in COLUMNS), *labels]
     differing = sorted(set(names) ^ set(expected))
     if differing:
         raise ValueError(f"its table has other columns: {', '.join(differing)}")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.columns import BY_NAME
+from boulder_sweep.columns import column_spec
 from boulder_sweep.store.finished import FinishedRows
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool 
     # Split into blocks: consolidating columns of one type would copy the whole table once more.
     frame = table.to_pandas(split_blocks=True, self_destruct=True)
     frame.attrs = {
-        "units": {name: BY_NAME[name].unit for name in frame.columns},
-        "meanings": {name: BY_NAME[name].meaning for name in frame.columns},
+        "units": {name: column_spec(name).unit for name in frame.columns},
+        "meanings": {name: column_spec(name).meaning for name in frame.columns},
         "rows": rows,
         "complete": len(frame) == rows,
     }
@@ -84,6 +84,6 @@ def _read(folder: Path, columns: Sequence[str] | None, verify: bool) -> tuple[pa
     finished = FinishedRows(folder)
     parts = list(finished.tables(columns, verify=verify))
     if not parts:
-        empty = table_schema().empty_table()
+        empty = table_schema(labels=finished.labels).empty_table()
         return (empty if columns is None else empty.select(list(columns))), finished.rows
     return pa.concat_tables(parts), finished.rows

@@ -8,14 +8,14 @@ Every page has a checksum. Nothing here depends on time or machine load, so the 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUTS, OUTCOMES, ColumnSpec, OutcomeColumn
+from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUTS, OUTCOMES, ColumnSpec, OutcomeColumn, column_spec
 from boulder_sweep.judge.judged import Judged
 
 if TYPE_CHECKING:
@@ -31,15 +31,18 @@ _TYPES = {
 }
 
 
-def table_schema(metadata: Mapping[bytes, bytes] | None = None) -> pa.Schema:
+def table_schema(metadata: Mapping[bytes, bytes] | None = None, labels: Iterable[str] = ()) -> pa.Schema:
     """Return the schema of the table, with unit and meaning of every column in its field metadata.
 
     Parameters
     ----------
     metadata
         Goes into the metadata of the file.
+    labels
+        Names of the text columns that the settings file gives.
     """
-    return pa.schema([_field(spec, _TYPES[spec.type]) for spec in COLUMNS], metadata=_complete(metadata))
+    specs = [*COLUMNS, *(column_spec(name) for name in labels)]
+    return pa.schema([_field(spec, _TYPES[spec.type]) for spec in specs], metadata=_complete(metadata, specs))
 
 
 def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, bytes]) -> pa.Table:
@@ -57,13 +60,15 @@ def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, byte
     Returns
     -------
     pyarrow.Table
-        Columns in the order of the register; null where a value is NaN.
+        Columns in the order of the register, then the text columns; null where a value is NaN.
     """
     arrays = [_array(block.design_id())]
     arrays += [_input_array(block.columns[spec.name]) for spec in INPUTS]
     arrays += [_outcome_array(spec, judged) for spec in OUTCOMES]
-    fields = [_field(spec, array.type) for spec, array in zip(COLUMNS, arrays, strict=True)]
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata)))
+    arrays += [_word_array(label.codes, label.words) for label in block.labels.values()]
+    specs = [*COLUMNS, *(column_spec(name) for name in block.labels)]
+    fields = [_field(spec, array.type) for spec, array in zip(specs, arrays, strict=True)]
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata, specs)))
 
 
 def encode(table: pa.Table) -> memoryview:
@@ -101,11 +106,11 @@ def _field(spec: ColumnSpec, type_: pa.DataType) -> pa.Field:
     return pa.field(spec.name, type_, metadata={"unit": spec.unit, "meaning": spec.meaning})
 
 
-def _complete(metadata: Mapping[bytes, bytes] | None) -> dict[bytes, bytes]:
+def _complete(metadata: Mapping[bytes, bytes] | None, specs: Sequence[ColumnSpec]) -> dict[bytes, bytes]:
     """File metadata with the units for pandas added."""
     attributes = {
-        "units": {spec.name: spec.unit for spec in COLUMNS},
-        "meanings": {spec.name: spec.meaning for spec in COLUMNS},
+        "units": {spec.name: spec.unit for spec in specs},
+        "meanings": {spec.name: spec.meaning for spec in specs},
     }
     return {PANDAS_ATTRIBUTES: json.dumps(attributes).encode(), **(metadata or {})}
 

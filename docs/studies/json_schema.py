@@ -9,7 +9,7 @@ from typing import Any
 
 from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.distribution_reader import NEEDED
-from boulder_sweep.settings.entries import NAME
+from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
 from boulder_sweep.settings.leaf import MAX_AXIS
 from boulder_sweep.settings.model import (
@@ -19,9 +19,11 @@ from boulder_sweep.settings.model import (
     PRINTED,
     SWITCHES,
     Criterion,
+    Model,
     SolverSettings,
 )
 from boulder_sweep.settings.units import EXPECTED
+from docs.studies.settings_tables import DEFAULT_WORDS
 
 FILE = Path("docs/sweep.schema.json")
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
@@ -63,14 +65,19 @@ def text() -> str:
 
 def _block(section: str, words: str) -> Schema:
     """Return the schema of one block."""
-    defaults = {**asdict(Criterion()), **asdict(SolverSettings())}
+    defaults = {**asdict(Criterion()), **asdict(Model()), **asdict(SolverSettings())}
     entries: Schema = {}
     for field in FIELDS:
         if field.section == section:
             entry = {"description": _described(field), **_entry(field)}
-            default = defaults.get(field.name, field.default)
+            default = DEFAULT_WORDS.get(field.name, defaults.get(field.name, field.default))
             entries[field.key] = entry if default is None else {**entry, "default": default}
-    return {"type": ["object", "null"], "description": words, "additionalProperties": False, "properties": entries}
+    block: Schema = {"description": words, "additionalProperties": False, "properties": entries}
+    if section not in NAMED_SETS:
+        return {"type": ["object", "null"], **block}
+    inputs = {field.key: _ref(field.path) for field in INPUTS if field.section == section}
+    named = _object({"name": {"type": "string", "pattern": f"^({NAME.pattern})$"}, **inputs}, ("name",))
+    return {"type": ["object", "array", "null"], **block, "minItems": 1, "items": named}
 
 
 def _described(field: Field) -> str:
@@ -170,6 +177,8 @@ def _what_is_required() -> Schema:
     for field in INPUTS:
         if not field.optional:
             sections.setdefault(field.section, {"required": []})["required"].append(field.key)
+    for section in set(NAMED_SETS) & set(sections):
+        sections[section]["items"] = {"required": sections[section]["required"]}
     embedment = [field for field in INPUTS if field.name in EMBEDMENT]
     sections[embedment[0].section] = {"oneOf": [{"required": [field.key]} for field in embedment]}
     whole = {"required": list(sections), "properties": sections}

@@ -24,7 +24,7 @@ FORMS = {
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }
 """What a setting may be, where it is not a plain quantity."""
-WORDS = {"readings": "corrected", "soil_elements": CLOSED_FORM}
+DEFAULT_WORDS = {"readings": "corrected", "soil_elements": CLOSED_FORM}
 """Defaults as they are written in a file."""
 
 
@@ -46,7 +46,7 @@ def choices_table() -> Table:
     defaults = {**asdict(Criterion()), **asdict(SolverSettings()), "correlation": 0.0, "partial_factor": 1.0}
     for field in SETTINGS:
         form = FORMS.get(field.name) or f"{EXPECTED[field.unit].words} ({EXPECTED[field.unit].examples})"
-        default = WORDS.get(field.name, defaults.get(field.name))
+        default = DEFAULT_WORDS.get(field.name, defaults.get(field.name))
         shown = f"`{default}`" if isinstance(default, str) else _with_unit(default, field)
         table.add(f"`{field.path}`", form, shown, field.meaning)
     return table

@@ -4,7 +4,7 @@ import pytest
 
 GRID = """\
 name: small grid
-boulder: {length: 1.65 m, width: 1.68 m, height: [1.6, 2.6, 3.4] m, density: 2596 kg/m^3}
+boulder: {length: 1.65 m, width: 1.68 m, height: [1.6, 2.6, 3.5] m, density: 2596 kg/m^3}
 site: {embedment_depth: [0.9, 1.8, 2.6] m}
 soil: {density: 1859.9 kg/m^3, friction_angle: 43.2 deg, subgrade_reaction: [60, 95] MN/m^3}
 vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}

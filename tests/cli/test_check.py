@@ -12,7 +12,7 @@ def test_a_valid_file(sweep, grid):
         "embedment_depth_m",
         "subgrade_reaction_MN_m3",
     ]
-    assert "1.6 to 3.4 m" in lines[2]
+    assert "1.6 to 3.5 m" in lines[2]
 
 
 def test_remarks_go_to_stderr(sweep, grid):

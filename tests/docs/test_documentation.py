@@ -81,7 +81,7 @@ def test_every_page_is_in_the_index() -> None:
 
 
 def test_settings_shown_are_valid(tmp_path: Path) -> None:
-    grid, soil, listed = re.findall(r"```yaml\n(.*?)```", page("settings.md"), re.DOTALL)
+    grid, soil, named, listed = re.findall(r"```yaml\n(.*?)```", page("settings.md"), re.DOTALL)
     (tmp_path / "grid.yaml").write_text(grid, encoding="utf-8")
     sweep = load(tmp_path / "grid.yaml")
     assert (sweep.name, sweep.notes) == ("my-site", ())
@@ -94,6 +94,8 @@ def test_settings_shown_are_valid(tmp_path: Path) -> None:
     uncertain = load(tmp_path / "uncertain.yaml")
     assert set(uncertain.distributions) == {"friction_angle_deg", "subgrade_reaction_MN_m3"}
     assert uncertain.n_designs == sweep.n_designs // 2 * 3
+    (tmp_path / "named.yaml").write_text(re.sub(r"soil:.*\n", named, grid), encoding="utf-8")
+    assert load(tmp_path / "named.yaml").axes[-2].labels == ("loose sand", "dense gravel")
     vehicle = grid[grid.index("vehicle:") :].replace("[30, 40] mph", "30 mph")
     (tmp_path / "list.yaml").write_text(listed + vehicle, encoding="utf-8")
     assert load(tmp_path / "list.yaml").n_designs == 1

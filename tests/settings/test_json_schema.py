@@ -68,6 +68,10 @@ def test_the_examples_of_the_tests_are_valid(example, minimal):
         ("vehicle:", "model: {readings: {preset: as_printed, inertia: box}, soil: {elements: 500}}\nvehicle:"),
         ("vehicle:", "solver: {accuracy: 0.01 deg, horizon: 1 s}\nvehicle:"),
         ("vehicle:", "criterion:\nvehicle:"),
+        (
+            "soil:\n  density: 1859.9\n  friction_angle: 43.2\n  subgrade_reaction: 95\n",
+            "soil: [{name: a, density: 1700, friction_angle: 30 deg, subgrade_reaction: 10}]\n",
+        ),
     ],
 )
 def test_what_the_program_takes_is_valid(load_it, minimal, old, new):
@@ -92,6 +96,11 @@ def test_what_the_program_takes_is_valid(load_it, minimal, old, new):
         ("friction_angle: 43.2", "friction_angle: {distribution: uniform, low: 36}", "$.soil.friction_angle"),
         ("  subgrade_reaction: 95\n", "", "$.soil"),
         ("site:\n  embedment_depth: 2.03\n", "", "$"),
+        (
+            "soil:\n  density: 1859.9\n  friction_angle: 43.2\n  subgrade_reaction: 95\n",
+            "soil: [{name: a, density: 1700, friction_angle: 30 deg}]\n",
+            "$.soil[0]",
+        ),
         ("site:", "site:\n  embedment_ratio: 0.5", "$.site"),
         ("vehicle:", "vehicel:", "$"),
         ("vehicle:", "criterion: {rating: P4}\nvehicle:", "$.criterion.rating"),
