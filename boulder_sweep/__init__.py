@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.need import Need, need
+    from boulder_sweep.answers.uncertainty import Uncertainty, uncertainty
     from boulder_sweep.impact.simulation import Trajectory, simulate
     from boulder_sweep.runner.sweeper import Summary, run
     from boulder_sweep.settings import SettingsError, Sweep, load
@@ -27,18 +28,22 @@ __all__ = [
     "Summary",
     "Sweep",
     "Trajectory",
+    "Uncertainty",
     "__version__",
     "load",
     "need",
     "read",
     "run",
     "simulate",
+    "uncertainty",
 ]
 
 # Names are fetched at first use: the import of numba or pandas takes longer than checking a file.
 _HOME = {
     "Need": "boulder_sweep.answers.need",
     "need": "boulder_sweep.answers.need",
+    "Uncertainty": "boulder_sweep.answers.uncertainty",
+    "uncertainty": "boulder_sweep.answers.uncertainty",
     "SettingsError": "boulder_sweep.settings",
     "Sweep": "boulder_sweep.settings",
     "load": "boulder_sweep.settings",

@@ -16,9 +16,9 @@ import joblib
 
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, share
 from boulder_sweep.answers.lightest import SIDES, LightestQuestion
-from boulder_sweep.answers.questions import Question
+from boulder_sweep.answers.questions import ProbabilityQuestion, Question
 from boulder_sweep.answers.search import WORDS
-from boulder_sweep.answers.trials import judges_of, ranges
+from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings.model import Model, ReadingChoice
@@ -63,11 +63,9 @@ class Need:
     @property
     def frame(self) -> pd.DataFrame:
         """The answers as a data frame; units and meanings in ``.attrs``."""
-        frame = self.arrow.to_pandas()
-        metadata = {field.name: field.metadata or {} for field in self.arrow.schema}
-        for entry in ("unit", "meaning"):
-            frame.attrs[f"{entry}s"] = {name: own.get(entry.encode(), b"").decode() for name, own in metadata.items()}
-        return frame
+        from boulder_sweep.answers.tables import frame_of
+
+        return frame_of(self.arrow)
 
     @property
     def others(self) -> list[str]:
@@ -130,6 +128,8 @@ def need(
     *,
     most: str | None = None,
     margin: str | float = 0.0,
+    probability: str | float | None = None,
+    seed: int = 0,
     between: Ends = None,
     tolerance: str | float | None = None,
     both_readings: bool = True,
@@ -147,6 +147,10 @@ def need(
         ``embedment_depth`` by default.
     margin
         Least margin to the limits, ``0.25`` or ``"25 %"``.
+    probability
+        Chance of passing that is asked for, ``0.95`` or ``"95 %"``, where inputs have distributions.
+    seed
+        Seed of the designs drawn for it.
     between
         Range to be searched, in place of the axis or of what is usual.
     tolerance
@@ -170,7 +174,8 @@ def need(
     SettingsError
         An input has a distribution.
     """
-    sweep.require_values()
+    if probability is None:
+        sweep.require_values()
     if least and most:
         raise QuestionError("ask for the least of one input or for the most of one, not for both")
     key = key_of(most or least or "embedment_depth", most=bool(most), tolerance=tolerance)
@@ -178,12 +183,7 @@ def need(
     if not 0.0 <= least_margin < 1.0:
         raise QuestionError(f"--margin {margin}: must be 0 or more and less than 100 %")
     sweeps = [sweep, other_readings(sweep)] if both_readings else [sweep]
-    asked = [
-        LightestQuestion(one, key, judges_of(one, least_margin))
-        if key.name == BOULDER_MASS.name
-        else Question(one, key, between, judges_of(one, least_margin))
-        for one in sweeps
-    ]
+    asked = [_question(one, key, between, judges_of(one, least_margin), probability, seed) for one in sweeps]
     asked[0].judges.own.warm_up()
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
     tables, simulated, done = [], 0, 0
@@ -198,6 +198,22 @@ def need(
 
     table = joined_tables(tables, _metadata(asked[0], least_margin))
     return Need(sweep, key, least_margin, table, simulated)
+
+
+def _question(
+    sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: str | float | None, seed: int
+) -> Question | LightestQuestion:
+    """Return the question of the kind that is asked."""
+    if probability is None:
+        if key.name == BOULDER_MASS.name:
+            return LightestQuestion(sweep, key, judges)
+        return Question(sweep, key, between, judges)
+    if key.name == BOULDER_MASS.name:
+        raise QuestionError("the least mass with a probability is not searched for; ask for the height or the depth")
+    chance = share(probability, "--probability")
+    if not 0.0 < chance < 1.0:
+        raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
+    return ProbabilityQuestion(sweep, key, between, judges, chance, seed)
 
 
 def other_readings(sweep: Sweep) -> Sweep:

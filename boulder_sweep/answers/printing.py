@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import BOULDER_MASS
 from boulder_sweep.answers.lightest import SIDES
+from boulder_sweep.settings.fields import BY_NAME
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
+    from boulder_sweep.answers.uncertainty import Uncertainty
 
 WIDTH = 80
 MOST_LINES = 40
@@ -68,8 +72,7 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES) -> list[s
         Head, one line a row, and what the words in them mean.
     """
     count = len(need)
-    shown = range(count) if count <= most else [place * (count - 1) // (most - 1) for place in range(most)]
-    rows = [need.arrow.slice(place, 1).to_pylist()[0] for place in shown]
+    rows = _shown_rows(need.arrow, most)
     lines = table_lines(need_columns(need), rows, width)
     if count > most:
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
@@ -78,11 +81,72 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES) -> list[s
     return lines
 
 
+def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:
+    """Return chances as lines: what varies, the verdict at the means, the chance with its interval, what decides.
+
+    Parameters are those of `need_lines`. Sobol indices follow where there is one design.
+    """
+    count = len(found)
+    rows = _shown_rows(found.arrow, most)
+    given = found.sweep.plan.given
+    varying = [name for name in HEADS if name in given and _varies(found.arrow, name)]
+    columns = [(HEADS[name], _number(name)) for name in varying]
+    columns += [
+        (("at the", "means"), lambda row: str(row["verdict"])),
+        (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
+        (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
+        (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
+        (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
+        (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
+    ]
+    if "p_fail" in found.arrow.column_names:
+        columns.insert(
+            -2,
+            (
+                ("P(fail)", "subset simulation"),
+                lambda row: f"{row['p_fail']:.2g} ({row['p_fail_low']:.2g} to {row['p_fail_high']:.2g})",
+            ),
+        )
+    lines = table_lines(columns, rows, width)
+    if count > most:
+        lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
+    if count == 1:
+        lines += ["", *_index_lines(found, width)]
+    return lines
+
+
+def _index_lines(found: Uncertainty, width: int) -> list[str]:
+    """Lines with the Sobol indices of one design."""
+
+    def number(name: str) -> Cell:
+        def cell(row: Row) -> str:
+            if row[name] is None:
+                return "-"
+            return f"{row[name]:.2f} ({row[f'{name}_low']:.2f} to {row[f'{name}_high']:.2f})"
+
+        return cell
+
+    columns: list[Column] = [
+        (("Sobol", "index of"), lambda row: str(row["output"])),
+        (("", "input"), lambda row: BY_NAME[row["input"]].path),
+        (("first order", ""), number("first")),
+        (("total", ""), number("total")),
+    ]
+    return table_lines(columns, found.indices.to_pylist(), width)
+
+
+def _shown_rows(table: pa.Table, most: int) -> list[Row]:
+    """Rows of a table that are shown: all, or evenly spaced ones."""
+    count = len(table)
+    places = range(count) if count <= most else [place * (count - 1) // (most - 1) for place in range(most)]
+    return [table.slice(place, 1).to_pylist()[0] for place in places]
+
+
 def need_columns(need: Need) -> list[Column]:
     """Return the columns of a terminal table: what varies, the answer, what follows from it."""
     key = need.key
     open_ = (key.name, *need.derived)
-    columns = [(HEADS[name], _number(name)) for name in HEADS if name not in open_ and _varies(need, name)]
+    columns = [(HEADS[name], _number(name)) for name in HEADS if name not in open_ and _varies(need.arrow, name)]
     if key.name == BOULDER_MASS.name:
         columns.append((("mass", "kg"), _answer(key, "")))
         columns += [(HEADS[name], _size(name)) for name in (*SIDES, "embedment_depth_m")]
@@ -93,6 +157,8 @@ def need_columns(need: Need) -> list[Column]:
         columns.append((("ratio", "d/H"), _ratio))
         columns.append((("above", "m"), _above_ground))
     columns += [(("mass", "t"), _mass), (("margin", ""), _margin)]
+    if "p_pass" in need.arrow.column_names:
+        columns[-1] = (("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}")
     columns += [((SHORT[name], key.field.unit), _answer(key, f"_{name}")) for name in need.others]
     return columns
 
@@ -110,9 +176,9 @@ def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> l
     return [*lines[:2], "  ".join("─" * own for own in widths), *lines[2:]]
 
 
-def _varies(need: Need, name: str) -> bool:
+def _varies(table: pa.Table, name: str) -> bool:
     """Whether an input differs between rows."""
-    return name in need.arrow.column_names and len(need.arrow[name].unique()) > 1
+    return name in table.column_names and len(table[name].unique()) > 1
 
 
 def _number(name: str) -> Cell:

@@ -7,9 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boulder_sweep.answers.chance import SCRAMBLINGS, Chance, Points, chance
+from boulder_sweep.answers.draws import Draws, threads
 from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, NOT_MONOTONE, Search, search
+from boulder_sweep.answers.search import BEYOND, CELLS, FAILS, HOLDS, NOT_MONOTONE, Search, search
+from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
+
+DRAWN = 4096
+"""Designs drawn at each value, where a probability is asked for."""
+HALF_WIDTH = 0.005
+"""Half of the widest interval of the chance that is reported at the answer."""
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -35,6 +43,8 @@ class Answers:
         All that passes, for rows that are not monotone.
     simulated : int
         Designs simulated on the way.
+    chances : Chance or None
+        Chances of passing at the answers, where one was asked for.
     """
 
     block: DesignBlock
@@ -44,6 +54,7 @@ class Answers:
     passes: np.ndarray
     stretches: list[str | None]
     simulated: int
+    chances: Chance | None = None
 
 
 class Question:
@@ -68,6 +79,8 @@ class Question:
 
     rows_at_once = 2048
     """Rows of a block: short enough for an interruption to wait for."""
+    cells = CELLS
+    """Pieces that a range is cut into by the scan."""
 
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges) -> None:
         self.sweep, self.key, self.between, self.judges = sweep, key, between, judges
@@ -86,12 +99,13 @@ class Question:
         first, last = self.key.ends(low, high)
         if self.key.most:
             first, last = last, first
-        trial = _Trial(self.key, self.judges, rows)
-        found = search(trial.quick, first, last)
+        trial = self.trial(rows)
+        found = search(trial.quick, first, last, self.cells)
         # Rows that are not monotone have more changes than one bracket, and each has to be right.
         wrong = np.flatnonzero(~trial.certified(found) | (found.kind == NOT_MONOTONE))
         if len(wrong):
-            part = search(lambda index, places: trial.own(wrong[index], places), first[wrong], last[wrong])
+            ends = first[wrong], last[wrong]
+            part = search(lambda index, places: trial.own(wrong[index], places), *ends, self.cells)
             found = replaced(found, wrong, part)
         block, judged = trial.judged(np.arange(stop - start), found.shown)
         return Answers(
@@ -102,7 +116,44 @@ class Question:
             np.where(found.has_holds, self.key.values(found.holds), np.nan),
             [_stretches(self.key, found.changes.get(row), first[row], last[row]) for row in range(stop - start)],
             trial.simulated,
+            trial.chances(found.shown),
         )
+
+    def trial(self, rows: Rows) -> _Trial:
+        """Return what tries values in some rows."""
+        return _Trial(self.key, self.judges, rows)
+
+
+class ProbabilityQuestion(Question):
+    """The least, or the most, of one input that passes with a probability, where others are uncertain.
+
+    Parameters
+    ----------
+    sweep, key, between, judges
+        As of `Question`.
+    probability
+        The chance of passing that is asked for.
+    seed
+        Seed of the points.
+
+    Raises
+    ------
+    QuestionError
+        The range makes no sense, or no input has a distribution.
+    """
+
+    rows_at_once = 4
+    cells = 6
+
+    def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float, seed: int) -> None:
+        super().__init__(sweep, key, between, judges)
+        self.spread, self.probability, self.seed = Spread(sweep), probability, seed
+        points = Points(len(self.spread.names), seed).upto(DRAWN // SCRAMBLINGS)
+        self.points = points.reshape(DRAWN, -1)
+
+    def trial(self, rows: Rows) -> _Trial:
+        """Return what tries values in some rows."""
+        return _ProbabilityTrial(self, rows)
 
 
 class _Trial:
@@ -134,10 +185,47 @@ class _Trial:
             agrees[rows] = (self.own(rows, places[rows]) == HOLDS) == holds
         return agrees
 
+    def chances(self, places: np.ndarray) -> Chance | None:
+        """Return the chances of passing at some values, one a row; None where the question is not about chances."""
+        return None
+
     def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
         block, judged = self.judged(index, places, quick=quick)
         codes = np.where(self.judges.holds(judged), HOLDS, FAILS)
         return np.where(beyond_reach(block, judged), BEYOND, codes)
+
+
+class _ProbabilityTrial(_Trial):
+    """Tries values of the input in some rows: whether the designs drawn with them pass often enough.
+
+    All rows and all values see the same points, so the share that passes changes with the value alone.
+    """
+
+    def __init__(self, asked: ProbabilityQuestion, rows: Rows) -> None:
+        super().__init__(asked.key, asked.judges, rows)
+        self.asked = asked
+        self.draws = Draws(rows, asked.spread, asked.judges, threads(1))
+
+    def chances(self, places: np.ndarray) -> Chance:
+        """Return the chances of passing at some values, by the points of the search and by more where needed."""
+        values = self.key.values(places)
+
+        def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
+            self.simulated += len(index)
+            return self.draws.passes(index, z, **{self.key.name: values[index]})
+
+        points = Points(len(self.asked.spread.names), self.asked.seed)
+        return chance(event, len(places), points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
+
+    def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
+        block, judged = self.judged(index, places, quick=True)
+        values = self.key.values(places)
+        z = np.tile(self.asked.points, (len(index), 1))
+        drawn = {self.key.name: np.repeat(values, DRAWN)}
+        passes = self.draws.passes(np.repeat(index, DRAWN), z, **drawn)
+        self.simulated += len(z)
+        often = passes.reshape(-1, DRAWN).mean(axis=1) >= self.asked.probability
+        return np.where(beyond_reach(block, judged), BEYOND, np.where(often, HOLDS, FAILS))
 
 
 def replaced(found: Search, rows: np.ndarray, part: Search) -> Search:

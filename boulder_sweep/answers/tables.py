@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from boulder_sweep.answers.search import WORDS
+from boulder_sweep.answers.sensitivity import Indices
 from boulder_sweep.columns import DESIGN_ID, INPUTS
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.store.schema import part_table
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from boulder_sweep.answers.chance import Chance
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.questions import Answers
+    from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.judge.judged import Judged
 
 MASS = ("boulder_mass_kg", "kg", "mass of the boulder, L W H times its density")
 
@@ -74,10 +80,112 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
             ),
             (f"found_{name}", "", f"as found, by the readings {name}", _words(other.kind)),
         ]
+    if own.chances is not None:
+        columns += [
+            (
+                "p_pass",
+                "1",
+                "chance of passing at the answer, or at the value tried last",
+                pa.array(own.chances.estimate),
+            ),
+            ("p_pass_low", "1", "lower end of the interval of p_pass", pa.array(own.chances.low)),
+            ("p_pass_high", "1", "upper end of the interval of p_pass", pa.array(own.chances.high)),
+        ]
     for place, (name, own_unit, meaning, array) in enumerate(columns):
         field = pa.field(name, array.type, metadata={"unit": own_unit, "meaning": meaning})
         table = table.add_column(at + place, field, array)
     return table
+
+
+def chance_table(
+    start: int,
+    block: DesignBlock,
+    judged: Judged,
+    found: Chance,
+    driver: np.ndarray,
+    words: Sequence[str],
+    failing: Chance | None,
+) -> pa.Table:
+    """Return chances as a table: inputs, outcome at the means, chance of passing, most influential input.
+
+    Parameters
+    ----------
+    start
+        Number of the first row.
+    block, judged
+        The designs with the means of their uncertain inputs, and what these come to.
+    found
+        Chances of passing.
+    driver
+        Place of the most influential input in `words`, -1 for none.
+    words
+        The uncertain inputs.
+    failing
+        Chances of failing by subset simulation.
+    """
+    table = part_table(replace(block, start=start, stop=start + len(block)), judged, {})
+    places = pa.array(driver.astype(np.int32), mask=driver < 0)
+    columns: list[tuple[str, str, str, pa.Array]] = [
+        ("p_pass", "1", "chance that the design passes", pa.array(found.estimate)),
+        ("p_pass_low", "1", "lower end of the interval of p_pass", pa.array(found.low)),
+        ("p_pass_high", "1", "upper end of the interval of p_pass", pa.array(found.high)),
+        (
+            "p_pass_driver",
+            "",
+            "most influential of the uncertain inputs; null where they change nothing",
+            pa.DictionaryArray.from_arrays(places, pa.array(list(words))),
+        ),
+        ("p_pass_designs", "1", "designs drawn for p_pass", pa.array(found.points)),
+    ]
+    if failing is not None:
+        columns += [
+            ("p_fail", "1", "chance that the design does not pass, by subset simulation", pa.array(failing.estimate)),
+            ("p_fail_low", "1", "lower end of the interval of p_fail", pa.array(failing.low)),
+            ("p_fail_high", "1", "upper end of the interval of p_fail", pa.array(failing.high)),
+        ]
+    for name, unit, meaning, array in columns:
+        table = table.append_column(pa.field(name, array.type, metadata={"unit": unit, "meaning": meaning}), array)
+    return table
+
+
+def index_table(names: Sequence[str], found: Sequence[Indices], outputs: Sequence[str]) -> pa.Table:
+    """Return Sobol indices as a table, one row for each design, output and input."""
+    values: dict[str, list[Any]] = {"design_id": [], "output": [], "input": []}
+    numbers: dict[str, list[np.ndarray]] = {field.name: [] for field in fields(Indices)}
+    for design, own in enumerate(found):
+        for output, word in enumerate(outputs):
+            values["design_id"] += [design] * len(names)
+            values["output"] += [word] * len(names)
+            values["input"] += list(names)
+            for name, parts in numbers.items():
+                parts.append(getattr(own, name)[output])
+    columns = {
+        "design_id": pa.array(values["design_id"], pa.int64()),
+        "output": pa.array(values["output"], pa.string()).dictionary_encode(),
+        "input": pa.array(values["input"], pa.string()).dictionary_encode(),
+    }
+    columns |= {name: _numbers(np.concatenate([*parts, np.empty(0)])) for name, parts in numbers.items()}
+    return pa.table(columns)
+
+
+def sample_table(names: Sequence[str], drawn: Sequence[tuple[Mapping[str, np.ndarray], np.ndarray]]) -> pa.Table:
+    """Return drawn designs as a table: number of the design, uncertain inputs, distance to failing."""
+    counts = [len(distance) for _, distance in drawn]
+    columns = {"design_id": pa.array(np.repeat(np.arange(len(drawn)), counts))}
+    for name in names:
+        columns[name] = pa.array(np.concatenate([*(inputs[name] for inputs, _ in drawn), np.empty(0)]))
+    columns["distance"] = pa.array(np.concatenate([*(distance for _, distance in drawn), np.empty(0)]))
+    return pa.table(columns)
+
+
+def frame_of(table: pa.Table) -> pd.DataFrame:
+    """Return a table as a data frame; units and meanings in ``.attrs``."""
+    frame = table.to_pandas()
+    frame.attrs = {
+        f"{entry}s": {field.name: (field.metadata or {}).get(entry.encode(), b"").decode() for field in table.schema}
+        for entry in ("unit", "meaning")
+    }
+    return frame
 
 
 def boulder_mass(table: pa.Table) -> np.ndarray:

@@ -23,10 +23,25 @@ from boulder_sweep.cli.run import run
 from boulder_sweep.cli.simulate import simulate
 from boulder_sweep.cli.status import status
 from boulder_sweep.cli.tradeoff import tradeoff
+from boulder_sweep.cli.uncertainty import uncertainty
 from boulder_sweep.cli.validate import validate
 from boulder_sweep.errors import EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError, Interrupted
 
-COMMANDS = (run, check, need, simulate, explore, status, plot, report, explain, tradeoff, validate, fit_vehicle)
+COMMANDS = (
+    run,
+    check,
+    need,
+    uncertainty,
+    simulate,
+    explore,
+    status,
+    plot,
+    report,
+    explain,
+    tradeoff,
+    validate,
+    fit_vehicle,
+)
 """In the order of ``sweep --help``."""
 EXIT_INTERRUPTED = 130
 REPORT = "this is a bug in boulder-sweep, not in your file; please report it with the command and the file"

@@ -14,6 +14,7 @@ Examples:
   sweep need configs/site.yaml
   sweep need configs/site.yaml --margin '25 %' -o depths.parquet --plot depths.png
   sweep need configs/site.yaml --least friction_angle --set site.embedment_depth='2.3 m'
+  sweep need configs/uncertain_site.yaml --probability 0.95
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
 
@@ -23,6 +24,7 @@ Examples:
 @click.option("--least", metavar="KEY", help="Input of which the smallest passing value is wanted [embedment_depth].")
 @click.option("--most", metavar="KEY", help="Input of which the largest passing value is wanted, e.g. speed.")
 @click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
+@click.option("--probability", metavar="P", help="Chance of passing, 0.95, where inputs have distributions.")
 @click.option(
     "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
 )
@@ -39,6 +41,7 @@ def need(
     least: str | None,
     most: str | None,
     margin: str,
+    probability: str | None,
     between: tuple[str, str] | None,
     tolerance: str | None,
     own_readings: bool,
@@ -74,6 +77,7 @@ def need(
         least,
         most=most,
         margin=margin,
+        probability=probability,
         between=between,
         tolerance=tolerance,
         both_readings=not own_readings,

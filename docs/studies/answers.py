@@ -4,11 +4,33 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from boulder_sweep import load, need
-from boulder_sweep.answers.printing import need_lines
+from boulder_sweep import load, need, uncertainty
+from boulder_sweep.answers.printing import need_lines, uncertainty_lines
+from boulder_sweep.answers.published import PUBLISHED
+from boulder_sweep.crash_tests.tables import Table
 
 SITE = Path("configs/site.yaml")
 GRID = Path("configs/m30_sizing.yaml")
+UNCERTAIN = Path("configs/uncertain_site.yaml")
+SPREADS = (
+    "soil.friction_angle={{mean: {friction_angle_deg} deg, cov: 5 %}}",
+    "soil.density={{mean: {soil_density_kg_m3} kg/m^3, cov: 5 %}}",
+    "soil.subgrade_reaction={{distribution: lognormal, mean: {subgrade_reaction_MN_m3} MN/m^3, cov: 40 %}}",
+)
+"""What is uncertain of the cases."""
+LIGHTEST = {
+    "boulder.width": "1.4 m",
+    "boulder.height": "3 m",
+    "site.embedment_ratio": "0.75",
+    "soil.friction_angle": "40 deg",
+    "soil.subgrade_reaction": "63 MN/m^3",
+}
+"""The lightest boulder of the M30 grid for one of its soils."""
+CASES = {
+    "American Black Granite": (Path("configs/abg.yaml"), {}),
+    "Rockville White Granite": (Path("configs/rwg.yaml"), {}),
+    "the lightest of the M30 grid at 40°": (GRID, LIGHTEST),
+}
 ONE_STIFFNESS = ("soil.subgrade_reaction=63 MN/m^3",)
 
 
@@ -20,6 +42,42 @@ def need_of_site(root: Path) -> str:
 def lightest_of_grid(root: Path) -> str:
     """Return the lightest boulders of the M30 grid as a terminal shows them, at one stiffness of the soil."""
     return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass")))
+
+
+def uncertainty_of_site(root: Path) -> str:
+    """Return the chances of the uncertain site as a terminal shows them."""
+    return _fenced(uncertainty_lines(uncertainty(load(root / UNCERTAIN))))
+
+
+def need_with_probability(root: Path) -> str:
+    """Return the depth for a chance of 95 % as a terminal shows it."""
+    return _fenced(need_lines(need(load(root / UNCERTAIN), probability=0.95)))
+
+
+def uncertainty_of_cases(root: Path) -> str:
+    """Return the chances of the crash tests and of a boulder from the grid, their soils uncertain."""
+    table = Table(("design", "readings", "P(pass)", "interval", "decided by", "its total index of the margin"))
+    for name, (path, single) in CASES.items():
+        for readings in ("corrected", "as_printed"):
+            overrides = [f"{key}={value}" for key, value in single.items()] + [f"model.readings={readings}"]
+            values = load(root / path, overrides).constants
+            spreads = [spread.format(**values) for spread in SPREADS]
+            found = uncertainty(load(root / path, [*overrides, *spreads]), half_width=0.005)
+            row = found.arrow.to_pylist()[0]
+            indices = {(own["output"], own["input"]): own["total"] for own in found.indices.to_pylist()}
+            best = max((value, key[1]) for key, value in indices.items() if key[0] == "margin")
+            interval = f"{row['p_pass_low']:.3f} to {row['p_pass_high']:.3f}"
+            words = best[1].rpartition("_")[0].replace("_", " ")
+            table.add(name, readings.replace("_", " "), f"{row['p_pass']:.3f}", interval, words, f"{best[0]:.2f}")
+    return table.markdown()
+
+
+def published_spreads(_: Path) -> str:
+    """Return the published coefficients of variation with their sources."""
+    table = Table(("input", "coefficient of variation", "of", "source"))
+    for own in PUBLISHED:
+        table.add(f"`{own.input}`", own.cov, own.of, own.source)
+    return table.markdown()
 
 
 def _fenced(lines: list[str]) -> str:

@@ -156,5 +156,9 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "result-columns": _result_columns,
     "need-site": answers.need_of_site,
     "need-mass": answers.lightest_of_grid,
+    "uncertainty-site": answers.uncertainty_of_site,
+    "uncertainty-cases": answers.uncertainty_of_cases,
+    "need-probability": answers.need_with_probability,
+    "published-spreads": answers.published_spreads,
 }
 """Function of every block by its name."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from boulder_sweep import load, need, read, run
+from boulder_sweep import load, need, read, run, uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.fitting import fit_pulse, read_pulse
 from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.views.validation import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
 from boulder_sweep.views.verdict_map import draw_verdict_map
-from docs.studies.answers import SITE
+from docs.studies.answers import SITE, UNCERTAIN
 from docs.studies.contents import EVERY, GRID
 from docs.studies.example_pulse import example_pulse
 from docs.studies.knife_edge import draw_knife_edge
@@ -56,6 +56,7 @@ def draw_all(root: Path) -> list[Path]:
         draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, named(name))
     draw_readings(readings_study(root / GRID, EVERY), named("readings.png"))
     need(load(root / SITE)).plot(named("design_chart.png"))
+    uncertainty(load(root / UNCERTAIN)).plot(named("uncertainty.png"))
     draw_knife_edge(named("knife_edge.png"))
     with tempfile.TemporaryDirectory() as scratch:
         pulse = Path(scratch) / "pulse.csv"

@@ -1,0 +1,135 @@
+"""Which inputs decide: Sobol indices of first order and total, and a quick measure from points already tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+BASE = 2048
+"""Points of each of the two samples; the number of designs is this times the number of inputs and two more."""
+RESAMPLES = 400
+STRATA = 8
+"""Parts of the range of an input whose means are compared by `drivers`."""
+
+Outputs = Callable[[np.ndarray], np.ndarray]
+"""Standard normal numbers, shape (m, d), to outputs, shape (s, m)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Indices:
+    """Sobol indices of s outputs by d inputs, arrays of shape (s, d); NaN where an output does not vary.
+
+    Attributes
+    ----------
+    first, first_low, first_high : ndarray
+        Share of the variance that knowing the input alone would take away, and its interval.
+    total, total_low, total_high : ndarray
+        Share that would be left if all others were known, and its interval.
+    """
+
+    first: np.ndarray
+    first_low: np.ndarray
+    first_high: np.ndarray
+    total: np.ndarray
+    total_low: np.ndarray
+    total_high: np.ndarray
+
+
+def indices(
+    outputs: Outputs, dimensions: int, *, seed: int, base: int = BASE, confidence: float = 0.95, uniform: bool = False
+) -> Indices:
+    """Estimate Sobol indices of independent standard normal numbers.
+
+    Parameters
+    ----------
+    outputs
+        The outputs.
+    dimensions
+        Numbers of a point.
+    seed
+        The same seed gives the same points.
+    base
+        Points of each of the two samples, a power of two.
+    confidence
+        Share of intervals that hold the index.
+    uniform
+        Whether the outputs are of uniform numbers between 0 and 1 instead.
+
+    Returns
+    -------
+    Indices
+        By `estimators`, those of `scipy.stats.sobol_indices`; intervals from resampled points, by the same seed.
+
+    Notes
+    -----
+    The indices are those of independent numbers. Where two inputs are correlated, the one that is made of both
+    numbers has the index of what it does not share with the other.
+    """
+    rng = np.random.default_rng(seed)
+    both = qmc.Sobol(2 * dimensions, scramble=True, seed=rng).random(base)
+    points = both if uniform else ndtri(np.clip(both, 1e-12, 1.0 - 1e-12))
+    A, B = points[:, :dimensions], points[:, dimensions:]
+    mixed = np.repeat(A[None], dimensions, axis=0)
+    for place in range(dimensions):
+        mixed[place, :, place] = B[:, place]
+    values = outputs(np.concatenate([A, B, mixed.reshape(-1, dimensions)]))
+    f_A, f_B = values[:, :base], values[:, base : 2 * base]
+    f_AB = values[:, 2 * base :].reshape(len(values), dimensions, base)
+    found = {name: np.full((len(values), dimensions), np.nan) for name in Indices.__dataclass_fields__}
+    ends = [0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence]
+    again = rng.integers(0, base, (RESAMPLES, base))
+    for place, (a, b, ab) in enumerate(zip(f_A, f_B, f_AB, strict=True)):
+        if np.concatenate([a, b]).var() == 0.0:
+            continue
+        found["first"][place], found["total"][place] = estimators(a, b, ab)
+        resampled = [estimators(a[rows], b[rows], ab[:, rows]) for rows in again]
+        for order, name in enumerate(("first", "total")):
+            low, high = np.quantile([own[order] for own in resampled], ends, axis=0)
+            found[f"{name}_low"][place], found[f"{name}_high"][place] = low, high
+    return Indices(**found)
+
+
+def estimators(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return Sobol indices of first order (Saltelli 2010) and total (Jansen 1999), shape (d,) each.
+
+    Parameters
+    ----------
+    f_A, f_B
+        An output at two samples, shape (n,).
+    f_AB
+        The output at the first sample with one input after the other taken from the second, shape (d, n).
+    """
+    both = np.concatenate([f_A, f_B])
+    variance = both.var()
+    if variance == 0.0:  # a resample may hold one value only
+        return np.zeros(len(f_AB)), np.zeros(len(f_AB))
+    first = ((f_B - both.mean()) * (f_AB - f_A)).mean(axis=1) / variance
+    return first, 0.5 * ((f_A - f_AB) ** 2).mean(axis=1) / variance
+
+
+def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
+    """Return for every row the input that decides most, by the means of an output over strata of each input.
+
+    Parameters
+    ----------
+    z
+        Standard normal numbers, shape (m, d), the same for all rows.
+    output
+        An output at these points, shape (n, m).
+
+    Returns
+    -------
+    ndarray of int64, shape (n,)
+        Place of the input; -1 where the output does not vary.
+    """
+    shares = np.empty((len(output), z.shape[1]))
+    for place in range(z.shape[1]):
+        order = np.argsort(z[:, place], kind="stable")
+        strata = np.array_split(order, STRATA)
+        means = np.stack([output[:, own].mean(axis=1) for own in strata], axis=1)
+        shares[:, place] = means.var(axis=1)
+    return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)

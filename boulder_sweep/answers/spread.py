@@ -1,0 +1,117 @@
+"""Uncertain inputs: from independent standard normal numbers to values of the inputs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import betainccinv, betaincinv, ndtr, ndtri
+
+from boulder_sweep.errors import QuestionError
+from boulder_sweep.settings.fields import BY_NAME
+
+if TYPE_CHECKING:
+    from boulder_sweep.answers.trials import Rows
+    from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.distributions import Distribution
+
+PAIR = ("friction_angle_deg", "subgrade_reaction_MN_m3")
+"""The inputs that may be correlated."""
+
+
+class Spread:
+    """The uncertain inputs of a sweep.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+
+    Raises
+    ------
+    QuestionError
+        No input has a distribution.
+
+    Notes
+    -----
+    Friction angle and subgrade reaction are correlated by their standard normals (Gaussian copula): the second is
+    ``rho z_1 + sqrt(1 - rho^2) z_2``, with the numbers of the first and its own.
+    """
+
+    def __init__(self, sweep: Sweep) -> None:
+        if not sweep.distributions:
+            raise QuestionError(
+                f"{sweep.name}: no input has a distribution; write one, for example "
+                "soil: {friction_angle: {mean: 38 deg, sd: 3 deg}}"
+            )
+        self.distributions = dict(sorted(sweep.distributions.items(), key=lambda item: item[0] == PAIR[1]))
+        self.correlation = sweep.correlation if set(PAIR) <= set(self.distributions) else 0.0
+
+    @property
+    def names(self) -> list[str]:
+        """Columns (or ``embedment_ratio``) of the uncertain inputs, in the order of their numbers."""
+        return list(self.distributions)
+
+    @property
+    def words(self) -> list[str]:
+        """Dotted keys of the uncertain inputs."""
+        return [BY_NAME[name].path for name in self.names]
+
+    def filled(self, given: Rows, z: np.ndarray) -> Rows:
+        """Return designs with their uncertain inputs drawn.
+
+        Parameters
+        ----------
+        given
+            Inputs of n designs with the means of the uncertain ones.
+        z
+            Independent standard normal numbers, shape (n, number of uncertain inputs).
+        """
+        found = dict(given)
+        for place, (name, spread) in enumerate(self.distributions.items()):
+            own = z[:, place]
+            if name == PAIR[1] and self.correlation:
+                other = z[:, self.names.index(PAIR[0])]
+                own = self.correlation * other + math.sqrt(1.0 - self.correlation**2) * own
+            found[name] = values_of(spread, np.asarray(given[name], dtype=float), own)
+        return found
+
+
+def values_of(spread: Distribution, mean: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Return the values of a distribution at the fractiles of standard normal numbers.
+
+    Parameters
+    ----------
+    spread
+        The distribution.
+    mean
+        Means, before truncation where that is possible, shape (n,).
+    z
+        Standard normal numbers, shape (n,).
+    """
+    if spread.kind == "normal":
+        return _truncated(mean, spread.deviation(mean), spread.low, spread.high, z)
+    if spread.kind == "lognormal":
+        variance = np.log1p((spread.deviation(mean) / mean) ** 2)
+        low = math.log(spread.low) if spread.low > 0.0 else -math.inf
+        return np.exp(_truncated(np.log(mean) - 0.5 * variance, np.sqrt(variance), low, math.log(spread.high), z))
+    low, width = spread.low, spread.high - spread.low
+    if spread.kind == "uniform":
+        return low + width * ndtr(z)
+    if spread.kind == "triangular":
+        share = (spread.own_mode - low) / width
+        rising, falling = np.sqrt(share * ndtr(z)), 1.0 - np.sqrt((1.0 - share) * ndtr(-z))
+        return low + width * np.where(ndtr(z) < share, rising, falling)
+    at, deviation = (mean - low) / width, spread.deviation(mean) / width
+    total = at * (1.0 - at) / deviation**2 - 1.0
+    a, b = at * total, (1.0 - at) * total
+    return low + width * np.where(z < 0.0, betaincinv(a, b, ndtr(z)), betainccinv(a, b, ndtr(-z)))
+
+
+def _truncated(mean: np.ndarray, deviation: np.ndarray, low: float, high: float, z: np.ndarray) -> np.ndarray:
+    """Normal distribution, truncated; each half is counted from its own tail, so that no digits are lost."""
+    below, above = (low - mean) / deviation, (high - mean) / deviation
+    lower = ndtri(ndtr(below) + ndtr(z) * (ndtr(above) - ndtr(below)))
+    upper = -ndtri(ndtr(-above) + ndtr(-z) * (ndtr(-below) - ndtr(-above)))
+    return np.clip(mean + deviation * np.where(z < 0.0, lower, upper), low, high)

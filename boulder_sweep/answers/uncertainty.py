@@ -1,0 +1,276 @@
+"""How sure: the chance that a design passes where inputs are uncertain, and which of them decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import joblib
+import numpy as np
+
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chance, Points, chance
+from boulder_sweep.answers.draws import Draws, threads
+from boulder_sweep.answers.keys import share
+from boulder_sweep.answers.sensitivity import drivers, indices
+from boulder_sweep.answers.spread import Spread
+from boulder_sweep.answers.subset import subset_simulation
+from boulder_sweep.answers.trials import Judges, judges_of, ranges
+from boulder_sweep.designs import block_of
+from boulder_sweep.drawing import draw
+from boulder_sweep.errors import QuestionError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+    from boulder_sweep.settings import Sweep
+
+ROWS_AT_ONCE = 256
+MOST_INDEXED = 100
+"""Rows up to which Sobol indices, and rare chances, are worked out for every row."""
+SAMPLES = 4096
+"""Designs that are kept of each row, to be looked at and drawn."""
+OUTPUTS = ("passes", "margin")
+"""What the indices are of: whether a design passes, and its distance to failing."""
+
+Told = Callable[[int, int], None]
+"""Told how many rows of how many are done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Chances of the designs of a sweep. Made by `uncertainty`.
+
+    Attributes
+    ----------
+    sweep : Sweep
+        The sweep.
+    arrow : pyarrow.Table
+        One row a design: inputs with the means of the uncertain ones, the outcome at these means, the chance of passing
+        with its interval, and the most influential input.
+    indices : pyarrow.Table
+        Sobol indices, one row for each design, output and input; none where there are more than `MOST_INDEXED` designs.
+    samples : pyarrow.Table
+        Designs drawn: number of the design, uncertain inputs, distance to failing; empty likewise.
+    seed : int
+        Seed of all random numbers.
+    """
+
+    sweep: Sweep
+    arrow: pa.Table
+    indices: pa.Table
+    samples: pa.Table
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.arrow)
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """The chances as a data frame; units and meanings in ``.attrs``."""
+        from boulder_sweep.answers.tables import frame_of
+
+        return frame_of(self.arrow)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything but the samples as plain data."""
+        return {
+            "name": self.sweep.name,
+            "seed": self.seed,
+            "rows": self.arrow.to_pylist(),
+            "indices": self.indices.to_pylist(),
+        }
+
+    def write(self, path: str | Path) -> list[Path]:
+        """Write the table to a Parquet file, indices and samples beside it; return the files.
+
+        Raises
+        ------
+        QuestionError
+            A file cannot be written.
+        """
+        from boulder_sweep.answers.tables import checked_parquet, write_parquet
+
+        target = checked_parquet(path)
+        files = [write_parquet(self.arrow, target)]
+        for name, table in (("indices", self.indices), ("samples", self.samples)):
+            if len(table):
+                files.append(write_parquet(table, target.with_suffix(f".{name}.parquet")))
+        return files
+
+    def plot(self, path: str | Path, design_id: int = 0) -> None:
+        """Draw which drawn designs pass, and what each input does to the chance.
+
+        Raises
+        ------
+        PictureError
+            It cannot be drawn.
+        """
+        draw("uncertainty", "draw_uncertainty", self, path, design_id=design_id)
+
+
+def uncertainty(
+    sweep: Sweep,
+    *,
+    half_width: str | float = 0.01,
+    confidence: str | float = 0.95,
+    margin: str | float = 0.0,
+    seed: int = 0,
+    most: int = 1 << 16,
+    rare: bool = False,
+    jobs: int | None = None,
+    told: Told | None = None,
+) -> Uncertainty:
+    """Estimate the chance of passing for every design of a sweep with uncertain inputs.
+
+    Parameters
+    ----------
+    sweep
+        The sweep; some of its inputs have distributions.
+    half_width
+        Half of the widest interval that is accepted; designs are drawn until it is reached.
+    confidence
+        Share of intervals that hold the chance.
+    margin
+        Least margin to the limits, ``0.25`` or ``"25 %"``.
+    seed
+        Seed of all random numbers; the same seed gives the same result, whatever the number of threads.
+    most
+        Designs drawn for a row at most.
+    rare
+        Whether the smaller of the chances of failing and of passing is worked out by subset simulation, too, which
+        reaches 1e-6 and below.
+    jobs
+        Threads; all cores by default.
+    told
+        Told how far it is.
+
+    Raises
+    ------
+    QuestionError
+        No input has a distribution, or a number makes no sense.
+    """
+    width, sure, least_margin = (
+        share(half_width, "--half-width"),
+        share(confidence, "--confidence"),
+        share(margin, "--margin"),
+    )
+    if not 1e-6 <= width <= 0.5:
+        raise QuestionError(f"--half-width {half_width}: must be between 0.000001 and 0.5")
+    if not 0.5 <= sure < 1.0:
+        raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
+    if rare and sweep.n_designs > MOST_INDEXED:
+        raise QuestionError(f"--rare takes up to {MOST_INDEXED} designs; this file has {sweep.n_designs:,}")
+    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most, rare)
+    asked.judges.own.warm_up()
+    points = Points(len(asked.spread.names), seed)
+    tables, done = [], 0
+    parallel = threads(jobs)
+    for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE):
+        tables.append(_rows(asked, points, parallel, start, stop))
+        done += stop - start
+        if told is not None:
+            told(done, sweep.n_designs)
+    from boulder_sweep.answers.tables import index_table, joined_tables, sample_table
+
+    few = sweep.n_designs <= MOST_INDEXED
+    drawn = [_sensitivity(asked, points, parallel, row) for row in range(sweep.n_designs if few else 0)]
+    return Uncertainty(
+        sweep,
+        joined_tables(tables, asked.metadata()),
+        index_table(asked.spread.names, [own for own, _ in drawn], OUTPUTS),
+        sample_table(asked.spread.names, [own for _, own in drawn]),
+        seed,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is asked of a sweep."""
+
+    sweep: Sweep
+    spread: Spread
+    judges: Judges
+    half_width: float
+    confidence: float
+    seed: int
+    most: int
+    rare: bool
+
+    def draws(self, start: int, stop: int, parallel: joblib.Parallel) -> Draws:
+        return Draws(self.sweep.plan.given_rows(start, stop), self.spread, self.judges, parallel)
+
+    def metadata(self) -> dict[bytes, bytes]:
+        """Return the metadata of a file."""
+        from boulder_sweep.store.provenance import file_metadata, identity
+
+        own = self.judges.own
+        found = identity(
+            self.sweep.resolved(), own.readings._asdict(), own.control._asdict(), self.judges.accuracy.to_dict()
+        )
+        question = {
+            "asked": "p_pass",
+            "half_width": self.half_width,
+            "confidence": self.confidence,
+            "margin": self.judges.least_margin,
+            "seed": self.seed,
+            "most": self.most,
+        }
+        return file_metadata(found | {"question": question}, "boulder_sweep.uncertainty")
+
+
+def _rows(asked: _Asked, points: Points, parallel: joblib.Parallel, start: int, stop: int) -> pa.Table:
+    """Return the table of the rows ``[start, stop)``."""
+    from boulder_sweep.answers.tables import chance_table
+
+    draws = asked.draws(start, stop, parallel)
+    n = stop - start
+    first: list[np.ndarray] = []
+
+    def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
+        found = draws.distance(index, z)
+        if not first:
+            first.append(found.reshape(n, -1))
+        return found > 0.0
+
+    found = chance(event, n, points, half_width=asked.half_width, confidence=asked.confidence, most=asked.most)
+    z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
+    driver = drivers(z, first[0])
+    failing = rare_failing(asked, draws, found) if asked.rare else None
+    block = block_of(draws.rows)
+    return chance_table(start, block, asked.judges.own(block), found, driver, asked.spread.words, failing)
+
+
+def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Chance:
+    """Return the chances of failing by subset simulation of the smaller of failing and passing."""
+    n = len(found.estimate)
+    sign = np.where(found.estimate >= 0.5, 1.0, -1.0)
+
+    def distance(index: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return sign[index] * draws.distance(index, z)
+
+    small = subset_simulation(distance, n, len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
+    fails = sign > 0.0
+    return Chance(
+        np.where(fails, small.estimate, 1.0 - small.estimate),
+        np.where(fails, small.low, 1.0 - small.high),
+        np.where(fails, small.high, 1.0 - small.low),
+        found.points,
+    )
+
+
+def _sensitivity(asked: _Asked, points: Points, parallel: joblib.Parallel, row: int) -> tuple[Any, Any]:
+    """Return the indices of one design, and designs drawn of it."""
+    draws = asked.draws(row, row + 1, parallel)
+
+    def outputs(z: np.ndarray) -> np.ndarray:
+        found = draws.distance(np.zeros(len(z), dtype=np.int64), z)
+        return np.stack([(found > 0.0).astype(float), found])
+
+    decided = indices(outputs, len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
+    z = points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1)
+    index = np.zeros(SAMPLES, dtype=np.int64)
+    given = draws.given(index, z, {})
+    return decided, ({name: given[name] for name in asked.spread.names}, draws.distance(index, z))

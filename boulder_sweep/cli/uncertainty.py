@@ -1,0 +1,104 @@
+"""``sweep uncertainty``: the chance of passing where inputs are uncertain, and which of them decides."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from boulder_sweep.cli.loading import load_sweep
+from boulder_sweep.cli.options import json_option, set_option
+
+EXAMPLES = """\b
+Examples:
+  sweep uncertainty configs/uncertain_site.yaml
+  sweep uncertainty configs/uncertain_site.yaml -o chances.parquet --plot chances.png
+  sweep uncertainty configs/rwg.yaml --rare --set soil.friction_angle='{mean: 43.2 deg, cov: 5 %}'
+  sweep uncertainty --published
+"""
+
+
+def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from boulder_sweep.answers.published import PUBLISHED
+
+        for own in PUBLISHED:
+            click.echo(f"{own.input:<24}{own.cov:<14}{own.of}\n{'':<38}{own.source}")
+        ctx.exit()
+
+
+@click.command("uncertainty", short_help="The chance of passing with uncertain inputs.", epilog=EXAMPLES)
+@click.argument("grid", type=click.Path())
+@click.option("--half-width", default="0.01", metavar="P", help="Half of the widest interval accepted [0.01].")
+@click.option("--confidence", default="95 %", metavar="SHARE", help="Share of intervals that hold the chance [95 %].")
+@click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
+@click.option("--rare", is_flag=True, help="Small chances, too, by subset simulation.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
+@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
+@click.option(
+    "-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table; indices, samples beside it."
+)
+@click.option(
+    "--plot", "picture", type=click.Path(), metavar="F.png", help="Picture (.png, .svg or .pdf) of one design."
+)
+@click.option("--design", default=0, metavar="ID", help="The design that is drawn [0].")
+@click.option(
+    "--published",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_published,
+    help="List published spreads with their sources.",
+)
+@click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@set_option
+@json_option
+def uncertainty(
+    grid: str,
+    half_width: str,
+    confidence: str,
+    margin: str,
+    rare: bool,
+    seed: int,
+    jobs: int | None,
+    out: str | None,
+    picture: str | None,
+    design: int,
+    quiet: bool,
+    overrides: tuple[str, ...],
+    as_json: bool,
+) -> int:
+    """Estimate the chance of passing for every design of GRID, in which some inputs have distributions.
+
+    An input takes a distribution in place of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Designs are drawn
+    until the interval of the chance is narrow enough.
+    """
+    from boulder_sweep.answers.printing import uncertainty_lines
+    from boulder_sweep.answers.tables import checked_parquet
+    from boulder_sweep.answers.uncertainty import uncertainty as estimate
+    from boulder_sweep.cli.console import counted, say
+
+    sweep = load_sweep(grid, overrides, quiet)
+    if out is not None:
+        checked_parquet(out)
+    if picture is not None:
+        from boulder_sweep.views.figures import checked_kind, require_matplotlib
+
+        require_matplotlib()
+        checked_kind(picture)
+    found = estimate(
+        sweep, half_width=half_width, confidence=confidence, margin=margin, seed=seed, rare=rare, jobs=jobs
+    )
+    if as_json:
+        click.echo(json.dumps(found.to_dict()))
+    else:
+        click.echo("\n".join(uncertainty_lines(found)))
+    if not quiet:
+        drawn = sum(found.arrow["p_pass_designs"].to_pylist())
+        say(f"{counted(len(found), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {seed}")
+    if out is not None:
+        for file in found.write(out):
+            say(f"written  {file}")
+    if picture is not None:
+        found.plot(picture, design)
+    return 0

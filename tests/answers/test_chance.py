@@ -1,0 +1,123 @@
+"""Chances, Sobol indices and small probabilities against cases of which the answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+from scipy.stats import sobol_indices, uniform
+
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance
+from boulder_sweep.answers.sensitivity import drivers, estimators, indices
+from boulder_sweep.answers.subset import subset_simulation
+
+
+def linear(z: np.ndarray) -> np.ndarray:
+    return z.sum(axis=1) / np.sqrt(z.shape[1])
+
+
+@pytest.mark.parametrize("beta", [-3.0, -0.5, 0.0, 1.0, 2.5])
+def test_chance_of_a_linear_limit_state(beta: float) -> None:
+    found = chance(lambda _, z: linear(z) <= beta, 1, Points(3, 1), half_width=2e-3, confidence=0.999, most=1 << 18)
+    assert found.low[0] <= ndtr(beta) <= found.high[0]
+    assert found.high[0] - found.low[0] <= 4e-3
+    assert abs(found.estimate[0] - ndtr(beta)) < 2e-3
+
+
+def test_rows_stop_when_they_are_sure_enough() -> None:
+    edges = np.array([-9.0, 0.3, 9.0])
+    found = chance(lambda index, z: linear(z) <= edges[index], 3, Points(2, 1), half_width=5e-3)
+    assert found.points.tolist()[::2] == [FIRST * SCRAMBLINGS] * 2
+    assert found.points[1] > FIRST * SCRAMBLINGS
+    assert (found.estimate[0], found.low[0], found.estimate[2], found.high[2]) == (0.0, 0.0, 1.0, 1.0)
+    assert 0.0 < found.high[0] < 0.01
+    assert 0.99 < found.low[2] < 1.0
+
+
+def test_no_more_points_than_allowed() -> None:
+    found = chance(lambda _, z: linear(z) <= 0.3, 1, Points(2, 1), half_width=1e-6, most=2048)
+    assert found.points[0] == 2048
+    assert found.high[0] - found.low[0] > 2e-6
+
+
+def test_the_same_seed_gives_the_same() -> None:
+    one, two, other = (chance(lambda _, z: linear(z) <= 0.3, 1, Points(2, seed), half_width=0.01) for seed in (1, 1, 2))
+    assert one.estimate[0] == two.estimate[0] != other.estimate[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edge", [0.4, 2.0])
+def test_stated_intervals_hold_at_their_rate(edge: float) -> None:
+    held = 0
+    for seed in range(200):
+        found = chance(lambda _, z: linear(z) <= edge, 1, Points(3, seed), half_width=0.01)
+        held += int(found.low[0] <= ndtr(edge) <= found.high[0])
+    assert held >= 182, "95 % of 200 are 190, less three standard deviations"
+
+
+def ishigami(u: np.ndarray) -> np.ndarray:
+    x = np.pi * (2.0 * u - 1.0)
+    return (np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0]))[None]
+
+
+def test_sobol_indices_of_ishigami() -> None:
+    found = indices(ishigami, 3, seed=0, base=4096, confidence=0.99, uniform=True)
+    for name, exact in (("first", (0.3139, 0.4424, 0.0)), ("total", (0.5576, 0.4424, 0.2437))):
+        assert np.allclose(getattr(found, name)[0], exact, atol=0.02)
+        assert (getattr(found, f"{name}_low")[0] <= exact).all()
+        assert (getattr(found, f"{name}_high")[0] >= exact).all()
+
+
+def test_estimators_are_those_of_scipy() -> None:
+    rng = np.random.default_rng(3)
+    A, B = rng.random((64, 3)), rng.random((64, 3))
+    mixed = np.repeat(A[None], 3, axis=0)
+    for place in range(3):
+        mixed[place, :, place] = B[:, place]
+    f_A, f_B, f_AB = ishigami(A), ishigami(B), np.stack([ishigami(own) for own in mixed])
+    reference = sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": f_AB}, n=64, dists=[uniform()] * 3)
+    first, total = estimators(f_A[0], f_B[0], f_AB[:, 0])
+    assert np.allclose(first, reference.first_order)
+    assert np.allclose(total, reference.total_order)
+
+
+def test_what_does_not_vary_has_no_indices() -> None:
+    found = indices(lambda z: np.ones((1, len(z))), 2, seed=0, base=64)
+    assert np.isnan(found.first).all()
+    assert drivers(np.random.default_rng(1).standard_normal((512, 2)), np.ones((1, 512))).tolist() == [-1]
+
+
+def test_driver_is_the_input_that_decides() -> None:
+    z = Points(3, 0).upto(FIRST).reshape(-1, 3)
+    outputs = np.stack([z[:, 0] + 0.3 * z[:, 1], z[:, 2] ** 3 - z[:, 0], (z[:, 1] > 0.5).astype(float)])
+    assert drivers(z, outputs).tolist() == [0, 2, 1]
+
+
+@pytest.mark.parametrize("dimensions", [1, 4])
+def test_small_probability_of_a_linear_limit_state(dimensions: int) -> None:
+    betas = np.array([4.753424, 3.0902])
+    found = subset_simulation(lambda row, z: betas[row] - linear(z), 2, dimensions, seed=3)
+    for row, exact in enumerate((1e-6, 1e-3)):
+        assert found.low[row] <= exact <= found.high[row]
+        assert found.high[row] < 2.5 * found.low[row]
+
+
+def test_what_cannot_happen_has_an_upper_end_only() -> None:
+    found = subset_simulation(lambda row, z: np.ones(len(z)), 1, 2, seed=0, points=100)
+    assert (found.estimate[0], found.low[0]) == (0.0, 0.0)
+    assert 0.0 < found.high[0] <= 1e-11
+
+
+def test_what_always_happens_is_certain() -> None:
+    assert subset_simulation(lambda row, z: -np.ones(len(z)), 1, 2, seed=0, points=100).estimate[0] == 1.0
+
+
+@pytest.mark.slow
+def test_intervals_of_small_probabilities_hold_at_their_rate() -> None:
+    held, found = 0, []
+    for seed in range(200):
+        rare = subset_simulation(lambda row, z: 4.753424 - linear(z), 1, 3, seed=seed)
+        held += int(rare.low[0] <= 1e-6 <= rare.high[0])
+        found.append(rare.estimate[0])
+    assert held >= 180
+    assert np.mean(found) == pytest.approx(1e-6, rel=0.04), "without bias"

@@ -1,0 +1,133 @@
+"""The chance of passing, and what decides it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from scipy.special import ndtr, ndtri
+
+import boulder_sweep
+from boulder_sweep.answers.need import need
+from boulder_sweep.answers.printing import uncertainty_lines
+from boulder_sweep.answers.uncertainty import uncertainty
+from boulder_sweep.errors import PictureError, QuestionError
+from tests.answers.designs import site
+
+UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 38 deg, sd: 3 deg}"}
+
+
+def test_chance_follows_from_the_least_friction_angle() -> None:
+    """With one uncertain input the design passes from its least friction angle on, and the chance is known."""
+    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle", both_readings=False).frame.passes_at[0]
+    exact = ndtr((38.0 - least) / 3.0)
+    found = uncertainty(site(**UNCERTAIN), half_width=0.002, confidence=0.99).frame.iloc[0]
+    assert found.p_pass_low - 5e-4 <= exact <= found.p_pass_high + 5e-4  # 0.01 deg of the lattice is 0.1 %
+    assert found.verdict == "pass"
+    assert found.p_pass_driver == "soil.friction_angle"
+
+
+def test_rare_failures_by_subset_simulation() -> None:
+    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle", both_readings=False).frame.passes_at[0]
+    spread = (43.0 - least) / -ndtri(1e-6)
+    sweep = site(**UNCERTAIN | {"friction": f"{{mean: 43 deg, sd: {spread:.6f} deg}}"})
+    found = uncertainty(sweep, rare=True).frame.iloc[0]
+    assert found.p_pass == 1.0
+    assert found.p_fail_low * 0.9 <= 1e-6 <= found.p_fail_high * 1.1
+    assert found.p_fail_high < 3.0 * found.p_fail_low
+
+
+def test_rare_passes_by_subset_simulation() -> None:
+    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle", both_readings=False).frame.passes_at[0]
+    spread = (least - 33.0) / -ndtri(1e-5)
+    sweep = site(**UNCERTAIN | {"friction": f"{{mean: 33 deg, sd: {spread:.6f} deg}}"})
+    found = uncertainty(sweep, rare=True).frame.iloc[0]
+    assert found.p_pass == 0.0
+    assert 1.0 - found.p_fail == pytest.approx(1e-5, rel=0.5)
+
+
+def test_every_row_has_its_chance() -> None:
+    sweep = site(**UNCERTAIN | {"height": "[2.8, 3.2, 3.6] m", "friction": "{mean: [34, 38, 42] deg, sd: 3 deg}"})
+    frame = uncertainty(sweep).frame
+    assert len(frame) == 9
+    assert (frame.p_pass_high - frame.p_pass_low <= 0.02).all()
+    assert frame.p_pass.between(frame.p_pass_low, frame.p_pass_high).all()
+    by_angle = frame.p_pass.to_numpy().reshape(3, 3)
+    assert (np.diff(by_angle, axis=1) > 0.0).all(), "the last axis of the file is the friction angle"
+
+
+def test_does_not_depend_on_threads() -> None:
+    one, two = (uncertainty(site(**UNCERTAIN), jobs=jobs, rare=True) for jobs in (1, 2))
+    assert one.arrow.equals(two.arrow)
+    assert one.indices.equals(two.indices)
+    assert one.samples.equals(two.samples)
+    assert not uncertainty(site(**UNCERTAIN), seed=1).arrow.equals(one.arrow)
+
+
+def test_margin_lowers_the_chance() -> None:
+    plain, more = (uncertainty(site(**UNCERTAIN), margin=margin).frame.p_pass[0] for margin in (0.0, "25 %"))
+    assert more < plain - 0.1
+
+
+def test_indices_name_what_decides() -> None:
+    sweep = site(**UNCERTAIN | {"subgrade": "{distribution: lognormal, mean: 60 MN/m^3, cov: 40 %}"})
+    found = uncertainty(sweep)
+    table = found.indices.to_pandas().set_index(["output", "input"])
+    assert table.loc[("margin", "friction_angle_deg"), "total"] > 0.8
+    assert table.loc[("margin", "subgrade_reaction_MN_m3"), "total"] < 0.2
+    assert (table.first_low <= table["first"]).all()
+    assert (table.total_high >= table["total"]).all()
+    assert any("soil.subgrade_reaction" in line for line in uncertainty_lines(found))
+    assert all(len(line) <= 80 for line in uncertainty_lines(found))
+
+
+def test_depth_for_a_probability() -> None:
+    sweep = site(**UNCERTAIN)
+    row = need(sweep, "embedment_depth", probability="95 %", both_readings=False).frame.iloc[0]
+    assert row.found == "found"
+    assert row.p_pass >= 0.95 > row.p_pass_low
+    depth = f"embedment_depth: {row.passes_at} m"
+    there = uncertainty(site(**UNCERTAIN | {"site": depth}), half_width=0.003, seed=7).frame.iloc[0]
+    assert there.p_pass == pytest.approx(0.95, abs=0.006)
+    certain = need(site(**UNCERTAIN | {"friction": "38 deg"}), both_readings=False).frame.passes_at[0]
+    assert row.passes_at > certain
+
+
+def test_files(tmp_path: Path) -> None:
+    found = uncertainty(site(**UNCERTAIN))
+    files = found.write(tmp_path / "chance.parquet")
+    assert [file.name for file in files] == ["chance.parquet", "chance.indices.parquet", "chance.samples.parquet"]
+    frame = pd.read_parquet(files[0])
+    assert frame.attrs["meanings"]["p_pass"].startswith("chance")
+    assert json.loads(pq.read_schema(files[0]).metadata[b"boulder_sweep.question"])["seed"] == 0
+    samples = pd.read_parquet(files[2])
+    assert (samples.distance > 0).mean() == pytest.approx(frame.p_pass[0], abs=0.02)
+
+
+def test_picture(tmp_path: Path) -> None:
+    found = uncertainty(site(**UNCERTAIN))
+    found.plot(tmp_path / "chance.png")
+    assert (tmp_path / "chance.png").stat().st_size > 10_000
+    with pytest.raises(PictureError, match="no samples of design 3"):
+        found.plot(tmp_path / "none.png", 3)
+
+
+@pytest.mark.parametrize(
+    ("question", "message"),
+    [
+        ({"half_width": "0"}, "must be between"),
+        ({"confidence": "101 %"}, "less than 100 %"),
+        ({"margin": "a"}, "is not a number"),
+    ],
+)
+def test_wrong_numbers_are_refused(question: dict[str, str], message: str) -> None:
+    with pytest.raises(QuestionError, match=message):
+        uncertainty(site(**UNCERTAIN), **question)
+
+
+def test_public_names() -> None:
+    assert boulder_sweep.uncertainty is uncertainty
