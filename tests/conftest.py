@@ -1,15 +1,65 @@
-"""Both crash tests over time, simulated once for all tests."""
+"""Which tests belong to the quick layer, and both crash tests over time, simulated once for all tests."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
+import hypothesis
 import pytest
 
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.settings.model import PRESETS
+
+# A busy machine is no reason to fail.
+hypothesis.settings.register_profile("patient", deadline=None)
+hypothesis.settings.load_profile("patient")
+
+QUICK = (
+    "accuracy/test_same_bits.py",
+    "accuracy/test_stability.py",
+    "cli/test_check.py",
+    "cli/test_run.py",
+    "docs/test_documentation.py",
+    "docs/test_drift.py",
+    "docs/test_register.py",
+    "impact/test_error_of_a_design.py",
+    "impact/test_explanation.py",
+    "judge/",
+    "kernels/test_check_values.py",
+    "kernels/test_constants.py",
+    "kernels/test_dense_output.py",
+    "kernels/test_lanes.py",
+    "kernels/test_numerics.py",
+    "kernels/test_rigid_wall.py",
+    "kernels/test_soil.py",
+    "kernels/test_table.py",
+    "kernels/test_tableau.py",
+    "kernels/test_vehicle.py",
+    "oracle/test_constants.py",
+    "oracle/test_soil.py",
+    "oracle/test_vehicle.py",
+    "settings/",
+    "store/test_files.py",
+    "store/test_manifest.py",
+    "store/test_provenance.py",
+    "store/test_reader.py",
+    "test_rooms.py",
+)
+"""Folders and files whose tests are marked ``quick``: together well under a minute, something of every room."""
+NOT_QUICK = ("settings/test_fuzz.py",)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the quick layer; what is slow in it stays out."""
+    folder = Path(__file__).parent
+    for item in items:
+        place = item.path.relative_to(folder).as_posix()
+        if place.startswith(QUICK) and not place.startswith(NOT_QUICK) and "slow" not in item.keywords:
+            item.add_marker("quick")
+
 
 Trajectories = dict[tuple[str, str], Trajectory]
 Command = Callable[..., tuple[int, str, str]]

@@ -14,16 +14,15 @@ from tests.faults.processes import ROOT
 
 pytestmark = pytest.mark.faults
 
-KILLS = 55
 
-
-def test_many_kills_lose_no_row_and_double_none(tmp_path):
+@pytest.mark.parametrize("kills", [8, pytest.param(55, marks=pytest.mark.slow)])
+def test_many_kills_lose_no_row_and_double_none(tmp_path, kills):
     seed = int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
-    command = [sys.executable, "-m", "tests.faults.kills", str(tmp_path), str(KILLS), str(seed)]
+    command = [sys.executable, "-m", "tests.faults.kills", str(tmp_path), str(kills), str(seed)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, f"TEST_SEED={seed}: {done.stderr[-3000:]}"
     found = json.loads(done.stdout.splitlines()[-1])
-    assert found["kills"] == KILLS
+    assert found["kills"] == kills
     assert found["faults"] == [], f"TEST_SEED={seed}"
     assert found["tables"]
     for table in found["tables"]:
