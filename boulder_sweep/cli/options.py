@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from boulder_sweep.runner.backends import BACKENDS
+
 Command = Callable[..., Any]
 
 # "\b" tells click to keep the lines of a paragraph as they are.
@@ -126,8 +128,8 @@ def run_options(function: Command) -> Command:
             click.option("--jobs", type=click.IntRange(min=1), help="Workers [default: all cores]."),
             click.option(
                 "--backend",
-                type=click.Choice(["threading", "dask"]),
-                default="threading",
+                type=click.Choice(BACKENDS),
+                default=BACKENDS[0],
                 show_default=True,
                 help="Threads, or a Dask cluster.",
             ),

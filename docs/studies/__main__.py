@@ -1,4 +1,4 @@
-"""Repeat the studies: ``python -m docs.studies [--check | BLOCK ...]``, in the folder of the repository."""
+"""Repeat the studies: ``python -m docs.studies [--check] [--write] [BLOCK ...]``, in the folder of the repository."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.studies", description=__doc__)
     parser.add_argument("blocks", nargs="*", metavar="BLOCK", help=f"print these blocks: {', '.join(CONTENTS)}")
+    parser.add_argument("--write", action="store_true", help="write the blocks named into their pages")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a number has drifted")
     parser.add_argument("--no-pictures", action="store_true", help="leave the pictures as they are")
     asked = parser.parse_args(arguments)
@@ -33,7 +34,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if unknown:
         parser.error(f"unknown: {', '.join(unknown)}; there are {', '.join(CONTENTS)}")
     if asked.blocks:
-        print("\n\n".join(compute(root, asked.blocks).values()))
+        computed = compute(root, asked.blocks)
+        if asked.write:
+            print("\n".join(str(path) for path in write(root, computed, CONTENTS)) or "nothing changed")
+        else:
+            print("\n\n".join(computed.values()))
         return 0
     if asked.check:
         found = differences(root, compute(root))

@@ -6,7 +6,7 @@ A block stands between ``<!-- name -->`` and ``<!-- end -->``; everything in bet
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,28 +67,37 @@ def differences(root: Path, computed: Mapping[str, str]) -> list[str]:
     return [*found, *(f"{name}: stands on no page" for name in computed if name not in seen)]
 
 
-def write(root: Path, computed: Mapping[str, str]) -> list[Path]:
+def write(root: Path, computed: Mapping[str, str], others: Collection[str] = ()) -> list[Path]:
     """Put what is computed into the pages; return those that changed.
+
+    Parameters
+    ----------
+    root
+        Folder of the repository.
+    computed
+        Text of blocks by name.
+    others
+        Names of blocks that stay as they are.
 
     Raises
     ------
     DocumentError
-        A page holds a block that nothing computes.
+        A page has a block that nothing computes.
     """
     changed = []
     for page in pages(root):
         text = page.read_text(encoding="utf-8")
-        renewed = _BLOCK.sub(lambda match: _renewed(match, computed), text)
+        renewed = _BLOCK.sub(lambda match: _renewed(match, computed, others), text)
         if renewed != text:
             page.write_text(renewed, encoding="utf-8")
             changed.append(page)
     return changed
 
 
-def _renewed(match: re.Match[str], computed: Mapping[str, str]) -> str:
+def _renewed(match: re.Match[str], computed: Mapping[str, str], others: Collection[str]) -> str:
     name = match["name"]
-    if name not in computed:
+    if name not in computed and name not in others:
         raise DocumentError(f"nothing computes the block {name}")
-    if not drift(match["text"], computed[name]):
+    if name not in computed or not drift(match["text"], computed[name]):
         return match[0]  # rounding alone is no reason to change a page
     return f"<!-- {name} -->\n{computed[name].strip()}\n<!-- end -->"

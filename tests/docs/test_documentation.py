@@ -118,6 +118,16 @@ def test_command_prints_blocks(capsys: pytest.CaptureFixture[str], monkeypatch: 
     assert stop.value.code == 2
 
 
+def test_command_writes_single_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(DOCS, tmp_path / "docs", ignore=shutil.ignore_patterns("images", "studies", "__pycache__"))
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "docs" / "validation.md"
+    whole = file.read_text(encoding="utf-8")
+    file.write_text(whole.replace("0.8267 m", "0.9 m").replace("| yes |", "| no |"), encoding="utf-8")
+    assert main(["--write", "rigid-wall"]) == 0
+    assert file.read_text(encoding="utf-8") == whole.replace("| yes |", "| no |"), "this block and no other"
+
+
 def test_command_needs_the_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
