@@ -123,7 +123,7 @@ def test_command_writes_single_blocks(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     file = tmp_path / "docs" / "validation.md"
     whole = file.read_text(encoding="utf-8")
-    file.write_text(whole.replace("0.8267 m", "0.9 m").replace("| yes |", "| no |"), encoding="utf-8")
+    file.write_text(whole.replace("0.8267 m", "0.9267 m").replace("| yes |", "| no |"), encoding="utf-8")
     assert main(["--write", "rigid-wall"]) == 0
     assert file.read_text(encoding="utf-8") == whole.replace("| yes |", "| no |"), "this block and no other"
 
