@@ -76,7 +76,7 @@ INPUTS: tuple[ColumnSpec, ...] = (
     ColumnSpec("boulder_height_m", "float64", "m", "whole height H of the boulder, buried part included"),
     ColumnSpec("boulder_density_kg_m3", "float64", "kg/m^3", "density of the boulder"),
     ColumnSpec("embedment_depth_m", "float64", "m", "depth d of the boulder's base below the soil line"),
-    ColumnSpec("impact_height_m", "float64", "m", "height e of the blow over the soil line (Eq 9, or as given)"),
+    ColumnSpec("impact_height_m", "float64", "m", "height e of the impact above the soil line (Eq 9, or as given)"),
     ColumnSpec("soil_density_kg_m3", "float64", "kg/m^3", "density of the compacted soil"),
     ColumnSpec("friction_angle_deg", "float64", "deg", "effective friction angle of the soil"),
     ColumnSpec("subgrade_reaction_MN_m3", "float64", "MN/m^3", "constant of horizontal subgrade reaction of the soil"),

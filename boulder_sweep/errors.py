@@ -39,6 +39,12 @@ class ComparisonError(BoulderSweepError):
     """Measurement and simulation cannot be compared."""
 
 
+class ExistingFileError(BoulderSweepError):
+    """A file that would be written is there already."""
+
+    exit_code = EXIT_CONFLICT
+
+
 class FitError(BoulderSweepError):
     """A crash pulse cannot be fitted."""
 

@@ -16,6 +16,7 @@ from boulder_sweep.cli.explain import explain
 from boulder_sweep.cli.explore import explore
 from boulder_sweep.cli.fit_vehicle import fit_vehicle
 from boulder_sweep.cli.need import need
+from boulder_sweep.cli.new import new
 from boulder_sweep.cli.options import GROUP_EPILOG, OrderedGroup, version_option
 from boulder_sweep.cli.plot import plot
 from boulder_sweep.cli.report import report
@@ -28,6 +29,7 @@ from boulder_sweep.cli.validate import validate
 from boulder_sweep.errors import EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError, Interrupted
 
 COMMANDS = (
+    new,
     run,
     check,
     need,
@@ -44,6 +46,8 @@ COMMANDS = (
 )
 """In the order of ``sweep --help``."""
 EXIT_INTERRUPTED = 130
+COMPLETION = "_SWEEP_COMPLETE"
+"""Set by the completion of a shell."""
 REPORT = "this is a bug in boulder-sweep, not in your file; please report it with the command and the file"
 
 
@@ -80,6 +84,11 @@ def execute(arguments: Sequence[str] | None = None) -> int:
         Exit code, as ``sweep --help`` lists them.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
+    completion = os.environ.get(COMPLETION)
+    if completion:
+        from click.shell_completion import shell_complete
+
+        return shell_complete(cli, {}, "sweep", COMPLETION, completion)
     try:
         # Not cli.main(): it would replace an interruption with an exception that lacks the signal and the message.
         with cli.make_context("sweep", words) as context:

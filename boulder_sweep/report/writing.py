@@ -105,6 +105,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
     ReportError
         The design cannot be computed, or the extra ``report`` is not installed.
     """
+    sweep.require_values()
     assembled = _page_maker()
     block = sweep.block(number, number + 1)
     if block.reasons[0]:

@@ -239,7 +239,7 @@ SETTINGS: tuple[Field, ...] = (
         "friction_angle",
         "partial_factor",
         "1",
-        "partial factor on the tangent of the friction angle, as of Eurocode 7",
+        "divides the tangent of every friction angle",
         Bound(1.0, 5.0, "1.25 is usual"),
     ),
     Field(
@@ -287,7 +287,7 @@ SECTIONS: dict[str, str] = {
     "site": "how the boulder stands in the ground",
     "soil": "the soil around the boulder",
     "vehicle": "the vehicle: mass, speed and the Maxwell element of its front",
-    "partial_factor": "partial factors by which inputs are made worse",
+    "partial_factor": "partial factors, as in Eurocode 7",
     "criterion": "what a design must hold",
     "model": "which reading of the paper, which representation of the soil",
     "solver": "how accurately and how long a design is simulated",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from boulder_sweep.columns import RATINGS
+from boulder_sweep.settings.defaults import default_of
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
@@ -18,12 +18,8 @@ from boulder_sweep.settings.model import (
     PRESETS,
     PRINTED,
     SWITCHES,
-    Criterion,
-    Model,
-    SolverSettings,
 )
 from boulder_sweep.settings.units import EXPECTED
-from docs.studies.settings_tables import DEFAULT_WORDS
 
 FILE = Path("docs/sweep.schema.json")
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
@@ -65,12 +61,11 @@ def text() -> str:
 
 def _block(section: str, words: str) -> Schema:
     """Return the schema of one block."""
-    defaults = {**asdict(Criterion()), **asdict(Model()), **asdict(SolverSettings())}
     entries: Schema = {}
     for field in FIELDS:
         if field.section == section:
             entry = {"description": _described(field), **_entry(field)}
-            default = DEFAULT_WORDS.get(field.name, defaults.get(field.name, field.default))
+            default = default_of(field)
             entries[field.key] = entry if default is None else {**entry, "default": default}
     block: Schema = {"description": words, "additionalProperties": False, "properties": entries}
     if section not in NAMED_SETS:

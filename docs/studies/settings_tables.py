@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 from boulder_sweep.columns import OUTCOMES, RATINGS
 from boulder_sweep.crash_tests.tables import Table
+from boulder_sweep.settings.defaults import default_of, default_text
 from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
-from boulder_sweep.settings.model import CLOSED_FORM, Criterion, SolverSettings
-from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.units import EXPECTED
 
 DEFAULTS = {
@@ -24,8 +21,6 @@ FORMS = {
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }
 """What a setting may be, where it is not a plain quantity."""
-DEFAULT_WORDS = {"readings": "corrected", "soil_elements": CLOSED_FORM}
-"""Defaults as they are written in a file."""
 
 
 def entries_table() -> Table:
@@ -43,11 +38,9 @@ def entries_table() -> Table:
 def choices_table() -> Table:
     """Return the entries that hold for all designs of a file."""
     table = Table(("entry", "may be", "where not given", "meaning"))
-    defaults = {**asdict(Criterion()), **asdict(SolverSettings()), "correlation": 0.0, "partial_factor": 1.0}
     for field in SETTINGS:
         form = FORMS.get(field.name) or f"{EXPECTED[field.unit].words} ({EXPECTED[field.unit].examples})"
-        default = DEFAULT_WORDS.get(field.name, defaults.get(field.name))
-        shown = f"`{default}`" if isinstance(default, str) else _with_unit(default, field)
+        shown = f"`{default_text(field)}`" if isinstance(default_of(field), str) else default_text(field)
         table.add(f"`{field.path}`", form, shown, field.meaning)
     return table
 
@@ -66,8 +59,4 @@ def _default(field: Field) -> str:
         return DEFAULTS[field.name]
     if not field.optional:
         return "required"
-    return _with_unit(field.default, field)
-
-
-def _with_unit(value: float | None, field: Field) -> str:
-    return "" if value is None else describe(value, field.unit)
+    return default_text(field)

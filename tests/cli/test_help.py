@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ("run", "check", "need", "uncertainty", "simulate", "status")
+COMMANDS = ("new", "run", "check", "need", "uncertainty", "simulate", "status")
 HEAVY = ("numba", "pandas", "scipy", "pyarrow", "matplotlib", "joblib", "rich", "pint", "pydantic", "dask")
 
 

@@ -1,0 +1,38 @@
+"""``sweep new``: a commented settings file to begin with."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import click
+
+EXAMPLES = """\b
+Examples:
+  sweep new
+  sweep new my-site.yaml
+  sweep new my-site.yaml --yes
+"""
+
+
+@click.command("new", short_help="Write a commented settings file to begin with.", epilog=EXAMPLES)
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path), default="my-site.yaml")
+@click.option("-y", "--yes", is_flag=True, help="Ask nothing; take the answers in brackets.")
+def new(file: Path, yes: bool) -> int:
+    """Write FILE [my-site.yaml], a settings file with a comment for every entry, after three questions."""
+    from boulder_sweep.errors import ExistingFileError
+    from boulder_sweep.settings import load
+    from boulder_sweep.settings.starter import CLASSES, UNITS, starter
+
+    if file.exists():
+        raise ExistingFileError(f"{file} exists already; name another file")
+    name = re.sub(r"[^\w.+-]+", "-", file.stem).strip("-.")[:80] or "my-site"
+    vehicle, units = next(iter(CLASSES)), UNITS[0]
+    if not yes and sys.stdin.isatty():
+        name = click.prompt("Name of the study", default=name, err=True)
+        vehicle = click.prompt("Class of the truck", type=click.Choice(list(CLASSES)), default=vehicle, err=True)
+        units = click.prompt("Units", type=click.Choice(UNITS), default=units, err=True)
+    file.write_text(starter(name, vehicle, "us" if units == "us" else "si", str(file)), encoding="utf-8")
+    click.echo(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep check {file}")
+    return 0

@@ -1,0 +1,72 @@
+"""A commented settings file to begin with, written from the register of entries."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from boulder_sweep.settings.defaults import default_text
+from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, Field, fields_of
+
+UNITS = ("si", "us")
+CLASSES = {"M30": "30 mph", "M40": "40 mph", "M50": "50 mph"}
+"""Speeds of the medium-duty truck of ASTM F2656, 15 000 lb."""
+
+_EXAMPLES: dict[str, tuple[str, str]] = {
+    "boulder.length": ("1.6 m", "5 ft"),
+    "boulder.width": ("{from: 1.6 m, to: 2.4 m, step: 0.2 m}", "{from: 5 ft, to: 8 ft, step: 6 in}"),
+    "boulder.height": ("{from: 2.4 m, to: 3.6 m, step: 0.2 m}", "{from: 8 ft, to: 12 ft, step: 6 in}"),
+    "boulder.density": ("2600 kg/m^3", "162 pcf"),
+    "site.embedment_ratio": ("{from: 0.45, to: 0.75, step: 0.05}",) * 2,
+    "site.embedment_depth": ("2 m", "6.5 ft"),
+    "site.impact_height": ("0.9 m", "3 ft"),
+    "soil.density": ("1860 kg/m^3", "116 pcf"),
+    "soil.friction_angle": ("[36 deg, 40 deg]",) * 2,
+    "soil.subgrade_reaction": ("60 MN/m^3", "220 pci"),
+    "vehicle.mass": ("6800 kg", "15000 lb"),
+    "vehicle.spring": ("3103.3 kN/m", "17720 lb/in"),
+    "vehicle.damper": ("138.91 kN*s/m", "793 lb*s/in"),
+    "partial_factor.friction_angle": ("1.25",) * 2,
+    "solver.step": ("4 ms",) * 2,
+}
+"""By dotted key, in SI and US units; other entries show their default."""
+_HEAD = """\
+# {name}: which boulder, buried how deep, stops the truck?
+#
+#   sweep check {file}     is the file valid, how many designs has it?
+#   sweep run {file}       simulate them all into one table
+#
+# Every entry takes one value, a list [a, b], or a range {{from, to, step}} or {{from, to, count}}, in SI or US units.
+# Every combination of lists and ranges is a design. Lines that begin with # are optional: what they show is the
+# default, or an example. Soil and truck are examples, too: replace them with your own.
+"""
+
+
+def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", file: str = "FILE") -> str:
+    """Return the text of a settings file.
+
+    Parameters
+    ----------
+    name : str
+        Name of the sweep.
+    vehicle : str
+        Class of the truck, a key of `CLASSES`.
+    units : {'si', 'us'}
+        Units of the values.
+    file : str
+        Name of the file, for its first lines.
+    """
+    lines = [*_HEAD.format(name=name, file=file).splitlines(), f"name: {name}"]
+    for section, words in SECTIONS.items():
+        lines += ["", f"{section}:".ljust(60) + f"# {words}"]
+        for field in fields_of(section):
+            lines.append(_line(field, vehicle, UNITS.index(units)))
+    return "\n".join(lines) + "\n"
+
+
+def _line(field: Field, vehicle: str, units: int) -> str:
+    """Return one entry with its meaning, commented out where a file may do without it."""
+    value = CLASSES[vehicle] if field.path == "vehicle.speed" else ""
+    value = value or (_EXAMPLES[field.path][units] if field.path in _EXAMPLES else default_text(field))
+    needed = field in INPUTS and (not field.optional or field.name == EMBEDMENT[0])
+    sign = "" if needed else "# "
+    return f"  {sign}{field.key}: {value}".ljust(60) + f"# {field.meaning}"

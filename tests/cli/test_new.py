@@ -1,0 +1,92 @@
+"""``sweep new``: a settings file to begin with; completion in the shell."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from boulder_sweep.settings import load
+from boulder_sweep.settings.fields import FIELDS
+from boulder_sweep.settings.starter import CLASSES, UNITS, starter
+
+
+@pytest.mark.parametrize("vehicle", CLASSES)
+@pytest.mark.parametrize("units", UNITS)
+def test_the_file_is_valid_without_notes(tmp_path, vehicle, units):
+    path = tmp_path / "new.yaml"
+    path.write_text(starter("new", vehicle, units))
+    sweep = load(path)
+    assert sweep.notes == ()
+    assert sweep.n_designs > 100
+    assert sweep.constants["impact_speed_m_s"] == pytest.approx(int(vehicle[1:]) * 0.44704)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_every_entry_is_in_it_and_every_optional_line_holds(tmp_path, units):
+    text = starter("new", units=units)
+    path = tmp_path / "new.yaml"
+    for field in FIELDS:
+        (line,) = re.findall(rf"^  (?:# )?{field.key}: \S.*# {re.escape(field.meaning)}$", text, re.MULTILINE)
+        if line.startswith("  #"):
+            path.write_text(text.replace(line, line.replace("# ", "", 1)))
+            found = _problems(path)
+            alternatives = {"site.embedment_depth": "not both", "soil.correlation": "needs a distribution"}
+            assert [p for p in found if alternatives.get(field.path, "-") not in p] == [], field.path
+
+
+def _problems(path):
+    from boulder_sweep.settings import SettingsError
+
+    try:
+        load(path)
+    except SettingsError as error:
+        return [problem.message for problem in error.problems]
+    return []
+
+
+def test_it_writes_once(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = sweep("new", "a b.yaml", "--yes")
+    assert (code, err) == (0, "")
+    assert re.fullmatch(r"a b.yaml: \d+ designs. Edit it, then: sweep check a b.yaml\n", out)
+    assert load("a b.yaml").name == "a-b"
+    before = (tmp_path / "a b.yaml").read_bytes()
+    assert sweep("new", "a b.yaml", "--yes") == (4, "", "error: a b.yaml exists already; name another file\n")
+    assert (tmp_path / "a b.yaml").read_bytes() == before
+
+
+def test_it_asks_three_questions_on_a_terminal(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answers = iter(["harbour", "M50", "us"])
+    asked = []
+
+    def prompt(text, **_):
+        asked.append(text)
+        return next(answers)
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("click.prompt", prompt)
+    assert sweep("new", "h.yaml")[0] == 0
+    assert len(asked) == 3
+    made = load("h.yaml")
+    assert (made.name, made.constants["impact_speed_m_s"]) == ("harbour", pytest.approx(22.352))
+    assert "162 pcf" in (tmp_path / "h.yaml").read_text()
+
+
+def _completed(**variables):
+    command = [sys.executable, "-m", "boulder_sweep"]
+    done = subprocess.run(command, env={**os.environ, **variables}, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout
+
+
+def test_the_shell_completes_commands_and_options():
+    code, out = _completed(_SWEEP_COMPLETE="zsh_complete", COMP_WORDS="sweep che", COMP_CWORD="1")
+    assert code == 0
+    assert out.split("\n")[:2] == ["plain", "check"]
+    _, out = _completed(_SWEEP_COMPLETE="bash_complete", COMP_WORDS="sweep run --res", COMP_CWORD="2")
+    assert out == "plain,--resume\n"
+    code, out = _completed(_SWEEP_COMPLETE="fish_source")
+    assert code == 0
+    assert "_SWEEP_COMPLETE=fish_complete" in out
