@@ -78,7 +78,7 @@ def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) ->
     effort = estimate(sweep, out, jobs=options["jobs"], resume=options["resume"])
     if as_json:
         record = {"settings": sweep.resolved(), "out": str(out), "estimate": effort.to_dict()}
-        click.echo(json.dumps(record | {"objections": effort.objections()}))
+        click.echo(json.dumps(record | {"objections": effort.objections}))
     else:
         click.echo("\n".join(console.dry_run_lines(sweep, out, effort)))
     return 0

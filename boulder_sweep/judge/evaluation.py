@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -88,6 +88,10 @@ class Evaluation:
         """Simulate and judge designs that can be computed, n of them; n rows in the same order."""
         outcomes = self.simulate(designs.table, self.readings, self.control)
         return joined([judge(outcomes, designs, self.limits)])
+
+    def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return readings and control as plain data, for the record."""
+        return self.readings._asdict(), self.control._asdict()
 
     def warm_up(self) -> None:
         """Load or compile the kernels by simulating one step of a plain design."""

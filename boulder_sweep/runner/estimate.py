@@ -85,6 +85,7 @@ class Estimate:
     rows_per_block: int
     jobs: int
 
+    @property
     def objections(self) -> list[str]:
         """List what does not fit, with numbers; empty if everything fits."""
         found = []

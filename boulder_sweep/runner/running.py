@@ -65,7 +65,7 @@ class Run:
                     out=self._folder.path,
                     rows_per_part=self._folder.manifest.rows_per_part,
                 )
-                objections = self._estimate.objections()
+                objections = self._estimate.objections
                 if objections and not force:
                     raise DoesNotFitError("; ".join(objections) + ". --force runs all the same")
         except BaseException:

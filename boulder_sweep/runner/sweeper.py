@@ -29,8 +29,6 @@ from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.writer import ROWS_PER_PART
 
 if TYPE_CHECKING:
-    from boulder_sweep.judge.accuracy import Accuracy
-    from boulder_sweep.judge.evaluation import Evaluation
     from boulder_sweep.settings import Sweep
 
 __all__ = ["Estimate", "Interrupted", "Progress", "Summary", "estimate", "run"]
@@ -112,7 +110,12 @@ def run(
         try:
             accuracy = accuracy_of(sweep)
             evaluation = evaluation_of(sweep, accuracy, simulate)
-            manifest = Manifest(_identity(sweep, evaluation, accuracy), sweep.n_designs, rows_per_part, again)
+            manifest = Manifest(
+                identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()),
+                sweep.n_designs,
+                rows_per_part,
+                again,
+            )
             session = new_session(command or "boulder_sweep.run", jobs, backend)
             folder = open_output(out, manifest, session, resume=resume, overwrite=overwrite)
             whole = Run(sweep, evaluation, folder, signals)
@@ -171,7 +174,9 @@ def estimate(
         except NotASweepError:
             pass
     evaluation.warm_up()
-    metadata = file_metadata(_identity(sweep, evaluation, accuracy), repeat_command(sweep))
+    metadata = file_metadata(
+        identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()), repeat_command(sweep)
+    )
     return estimated(
         take_sample(evaluation, sweep.block, sweep.n_designs, metadata),
         rows=sweep.n_designs,
@@ -180,9 +185,3 @@ def estimate(
         out=folder,
         rows_per_part=rows_per_part,
     )
-
-
-def _identity(sweep: Sweep, evaluation: Evaluation, accuracy: Accuracy) -> dict[str, object]:
-    """Return what all rows of a sweep's table have in common."""
-    readings, control = evaluation.readings._asdict(), evaluation.control._asdict()
-    return identity(sweep.resolved(), readings, control, accuracy.to_dict())

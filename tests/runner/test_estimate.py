@@ -179,11 +179,11 @@ def test_objections_name_the_numbers():
         rows=10, rows_to_compute=10, seconds=1.0, disk_bytes=100, disk_free_bytes=200, memory_bytes=100,
         memory_free_bytes=200, rows_per_second=10.0, rows_per_block=1, jobs=1,
     )  # fmt: skip
-    assert fits.objections() == []
-    (disk,) = replace(fits, disk_bytes=3_000_000_000, disk_free_bytes=1_000_000).objections()
+    assert fits.objections == []
+    (disk,) = replace(fits, disk_bytes=3_000_000_000, disk_free_bytes=1_000_000).objections
     assert "3 GB" in disk
     assert "1 MB" in disk
-    (memory,) = replace(fits, memory_bytes=3_000_000_000, memory_free_bytes=1_000_000).objections()
+    (memory,) = replace(fits, memory_bytes=3_000_000_000, memory_free_bytes=1_000_000).objections
     assert "3 GB" in memory
 
 
