@@ -13,6 +13,7 @@ EXIT_INTERNAL = 1
 EXIT_WRONG_USE = 2
 EXIT_SOME_ROWS_FAILED = 3
 EXIT_CONFLICT = 4
+EXIT_INTERRUPTED = 130
 
 
 class BoulderSweepError(Exception):
@@ -33,6 +34,12 @@ class BoulderSweepError(Exception):
 
 class BackendError(BoulderSweepError):
     """Workers are not available; the text says why and what to do."""
+
+
+class ClusterLostError(BackendError):
+    """The scheduler or the last worker of a cluster was lost during a run; the run can be resumed."""
+
+    exit_code = EXIT_INTERRUPTED
 
 
 class ComparisonError(BoulderSweepError):

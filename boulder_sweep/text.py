@@ -24,6 +24,16 @@ def duration_text(seconds: float) -> str:
     return f"{minutes // 60:,} h {minutes % 60:02d} min"
 
 
+def printable(text: str) -> str:
+    """Escape what a terminal or a log would act on: control characters, line breaks, invisible marks of direction."""
+    return "".join(character if character.isprintable() else _escaped(character) for character in text)
+
+
+def _escaped(character: str) -> str:
+    """Return a character as an escape sequence in ASCII."""
+    return character.encode("unicode_escape").decode("ascii")
+
+
 def one_line(problem: BaseException) -> str:
     """Describe an exception in one line of bounded length."""
     words = " ".join(str(problem).split())

@@ -101,7 +101,7 @@ def test_kernels_know_nothing_of_the_package_above() -> None:
 def test_modules_are_chosen_by_name_at_run_time_only_where_it_says_why() -> None:
     """`import_module` escapes the tests above: the package's face, the one way to the pictures, and an extra."""
     found = {module for module, file in MODULES.items() if "import_module(" in file.read_text(encoding="utf-8")}
-    assert found == {"boulder_sweep", "boulder_sweep.drawing", "boulder_sweep.runner.backends"}
+    assert found == {"boulder_sweep", "boulder_sweep.drawing", "boulder_sweep.runner.cluster"}
 
 
 def test_only_pictures_are_drawn_through_the_back_door() -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS
-from boulder_sweep.text import duration_text, size_text
+from boulder_sweep.text import duration_text, printable, size_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,29 +25,49 @@ PLAIN_EVERY_S = 10.0
 
 
 def say(text: str) -> None:
-    """Write a line to stderr."""
-    print(text, file=sys.stderr, flush=True)
+    """Write lines to stderr; what a terminal would act on is escaped."""
+    print("\n".join(map(printable, text.split("\n"))), file=sys.stderr, flush=True)
+
+
+def show(lines: Iterable[str]) -> None:
+    """Write lines to stdout; what a terminal would act on is escaped, line breaks within a line as well."""
+    print("\n".join(map(printable, lines)))
 
 
 @contextmanager
-def progress(quiet: bool) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows progress: a bar on a terminal, a line now and then elsewhere."""
+def progress(quiet: bool, notes: Notes) -> Iterator[Callable[[Progress], None] | None]:
+    """Give a function that shows progress and notes: a bar on a terminal, a line now and then elsewhere."""
     if quiet:
         yield None
     elif sys.stderr.isatty():
-        with _bar() as show:
+        with _bar(notes) as show:
             yield show
     else:
-        yield _PlainLines()
+        yield _PlainLines(notes)
+
+
+class Notes:
+    """The notes of a run that were shown already."""
+
+    def __init__(self) -> None:
+        self._shown = 0
+
+    def new(self, notes: Sequence[str]) -> Sequence[str]:
+        """Return the notes that were not shown yet; they count as shown now."""
+        fresh, self._shown = notes[self._shown :], len(notes)
+        return fresh
 
 
 class _PlainLines:
     """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
 
-    def __init__(self) -> None:
+    def __init__(self, notes: Notes) -> None:
         self.last = time.monotonic()
+        self._notes = notes
 
     def __call__(self, now: Progress) -> None:
+        for note in self._notes.new(now.notes):
+            say(f"note: {note}")
         if time.monotonic() - self.last < PLAIN_EVERY_S:
             return
         self.last = time.monotonic()
@@ -59,7 +79,7 @@ class _PlainLines:
 
 
 @contextmanager
-def _bar() -> Iterator[Callable[[Progress], None]]:
+def _bar(notes: Notes) -> Iterator[Callable[[Progress], None]]:
     # rich is for terminals only. It honours NO_COLOR by itself.
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
@@ -71,6 +91,8 @@ def _bar() -> Iterator[Callable[[Progress], None]]:
         task = bars.add_task("preparing", total=None, numbers="(the first run compiles the kernels)")
 
         def show(now: Progress) -> None:
+            for note in notes.new(now.notes):
+                bars.console.print(f"note: {printable(note)}", markup=False, highlight=False)
             left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
             numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
             bars.update(task, description="simulating", total=now.rows, completed=now.rows_done, numbers=numbers)

@@ -26,7 +26,8 @@ from boulder_sweep.cli.status import status
 from boulder_sweep.cli.tradeoff import tradeoff
 from boulder_sweep.cli.uncertainty import uncertainty
 from boulder_sweep.cli.validate import validate
-from boulder_sweep.errors import EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError, Interrupted
+from boulder_sweep.errors import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_WRONG_USE, BoulderSweepError, Interrupted
+from boulder_sweep.runner.interruption import noted_signals
 
 COMMANDS = (
     new,
@@ -45,7 +46,6 @@ COMMANDS = (
     fit_vehicle,
 )
 """In the order of ``sweep --help``."""
-EXIT_INTERRUPTED = 130
 COMPLETION = "_SWEEP_COMPLETE"
 """Set by the completion of a shell."""
 REPORT = "this is a bug in boulder-sweep, not in your file; please report it with the command and the file"
@@ -90,11 +90,10 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
         return shell_complete(cli, {}, "sweep", COMPLETION, completion)
     try:
-        # Not cli.main(): it would replace an interruption with an exception that lacks the signal and the message.
-        with cli.make_context("sweep", words) as context:
-            code = cli.invoke(context)
+        with noted_signals() as signals:
+            code = signals.call(lambda: _invoke(words))
         sys.stdout.flush()
-        return int(code)
+        return code
     except click.exceptions.Exit as end:  # after --help or --version
         return end.exit_code
     except click.ClickException as error:
@@ -112,6 +111,13 @@ def execute(arguments: Sequence[str] | None = None) -> int:
         return EXIT_INTERRUPTED
     except Exception as error:
         return _report(error, verbose=bool({"-v", "--verbose"} & set(words)))
+
+
+def _invoke(words: list[str]) -> int:
+    """Run a command."""
+    # Not cli.main(): it would replace an interruption by an exception without the signal and the message.
+    with cli.make_context("sweep", words) as context:
+        return int(cli.invoke(context))
 
 
 def _report(error: Exception, verbose: bool) -> int:

@@ -52,7 +52,8 @@ def run(
         console.say(f"{sweep.name}: {console.counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.runner.sweeper import run as run_sweep
 
-    with console.progress(quiet) as show:
+    notes = console.Notes()
+    with console.progress(quiet, notes) as show:
         summary = run_sweep(
             sweep,
             target,
@@ -61,12 +62,12 @@ def run(
             resume_command=_resume_command(grid, target, overrides, accuracy, options),
             **options,
         )
-    for note in summary.notes:
+    for note in notes.new(summary.notes):
         console.say(f"note: {note}")
     if as_json:
         click.echo(json.dumps({"name": sweep.name, **summary.to_dict()}))
     else:
-        click.echo("\n".join(console.summary_lines(sweep.name, summary)))
+        console.show(console.summary_lines(sweep.name, summary))
     return summary.exit_code
 
 
@@ -80,7 +81,7 @@ def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) ->
         record = {"settings": sweep.resolved(), "out": str(out), "estimate": effort.to_dict()}
         click.echo(json.dumps(record | {"objections": effort.objections}))
     else:
-        click.echo("\n".join(console.dry_run_lines(sweep, out, effort)))
+        console.show(console.dry_run_lines(sweep, out, effort))
     return 0
 
 

@@ -20,6 +20,5 @@ def status(out: str, verify: bool, as_json: bool) -> int:
     from boulder_sweep.store import status as look
 
     found = look(out, verify=verify)
-    lines = [json.dumps(found.to_dict(), default=str)] if as_json else console.status_lines(found)
-    click.echo("\n".join(lines))
+    console.show([json.dumps(found.to_dict(), default=str)] if as_json else console.status_lines(found))
     return EXIT_INTERNAL if found.damaged else 0

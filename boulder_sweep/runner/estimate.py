@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.judge.evaluation import Evaluation
-from boulder_sweep.runner.collector import COMMIT_EVERY_S
+from boulder_sweep.runner.assembly import COMMIT_EVERY_S
+from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.writer import ROWS_PER_PART
 from boulder_sweep.text import size_text
 
@@ -23,6 +24,8 @@ LARGEST_BLOCK = 32_768
 """Rows; larger blocks gain nothing and use more memory."""
 BLOCK_S = 0.1
 """Work of one block [s]: long compared with handing it out, short enough for Ctrl-C to act at once."""
+TASK_S = 2.0
+"""Work of one task of a cluster [s]: long compared with scheduling it, short enough to lose little with a worker."""
 _SAMPLE_S = 0.1
 _FIRST_SIZES = (1, 8, 64, 64, 64, 64)
 """Rows at places all over the table, for a first guess of the time per row."""
@@ -33,6 +36,7 @@ _SHARE = 0.05
 """Largest share of a small table that is sampled: the run computes these rows again."""
 _BYTES_IN_PROGRESS = 400
 """Memory per row between being handed out and being written: inputs, outcomes and encoding."""
+_LEAST_BYTES_PER_ROW = 1
 _GOLDEN = 0.618033988749895
 
 
@@ -217,6 +221,29 @@ def rows_per_block(seconds_per_row: float, rows: int, jobs: int) -> int:
     by_time = int(BLOCK_S / max(seconds_per_row, 1e-9))
     by_share = -(-rows // (4 * jobs))
     return max(1, min(by_time, by_share, LARGEST_BLOCK))
+
+
+def rows_per_task(estimate: Estimate, rows_per_part: int) -> int:
+    """Return the rows that a worker of a cluster computes and writes at once: a part, or less where rows take long."""
+    by_time = int(TASK_S * estimate.rows_per_second / estimate.jobs)
+    by_share = -(-estimate.rows_to_compute // (4 * estimate.jobs))
+    return max(1, min(rows_per_part, by_time, by_share))
+
+
+def refuse_hopeless(rows: int, rows_to_compute: int, out: Path) -> None:
+    """Refuse, without computing anything, a table that cannot fit on the disk at a byte per row.
+
+    Raises
+    ------
+    DoesNotFitError
+        Says how much is needed at least, and how much is free.
+    """
+    least, free = rows_to_compute * _LEAST_BYTES_PER_ROW, _disk_free(out)
+    if least > free:
+        raise DoesNotFitError(
+            f"the table of {rows:,} rows needs at least {size_text(least)} of disk, and {size_text(free)} are free. "
+            f"Use --force to run anyway"
+        )
 
 
 def rows_in_progress(block: int, jobs: int, rows_per_part: int) -> int:

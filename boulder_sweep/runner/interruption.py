@@ -1,59 +1,128 @@
-"""SIGINT and SIGTERM during a run: stop soon and properly at the first, at once at the second."""
+"""SIGINT and SIGTERM: noted when they arrive, acted on between units of work; the second one ends the process at once.
+
+A handler that raised would be swallowed where the interpreter was called from compiled code, as Numba's compiler
+does. So the handler only notes the signal. Long work that cannot look for it, such as compiling, runs in a thread of
+its own while the caller waits and looks.
+"""
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
+import sys
 import threading
-from types import FrameType, TracebackType
-from typing import Any, Self
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Any, TypeVar
 
 from boulder_sweep.errors import Interrupted
 
+Result = TypeVar("Result")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_LOOK_EVERY_S = 0.05
 
 
 class Signals:
-    """While entered, notes SIGINT and SIGTERM instead of letting them end the process.
-
-    As long as `prompt` is set, the first signal raises `Interrupted` on the spot: right while nothing has
-    been begun that would have to be ended properly. Outside the main thread, where Python allows no handlers,
-    nothing is noted and signals do what they did.
+    """Signals noted so far.
 
     Attributes
     ----------
     caught : int or None
-        The first signal that came.
-    prompt : bool
-        See above.
+        The first signal that arrived.
     """
 
     def __init__(self) -> None:
         self.caught: int | None = None
-        self.prompt = True
-        self._before: dict[int, Any] = {}
+        self._deferred = 0
+        self._abandoned: list[threading.Thread] = []
 
-    def __enter__(self) -> Self:
-        if threading.current_thread() is threading.main_thread():
-            for signum in _SIGNALS:
-                self._before[signum] = signal.signal(signum, self._handle)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        for signum, handler in self._before.items():
-            signal.signal(signum, handler)
-
-    def _handle(self, signum: int, frame: FrameType | None) -> None:
-        """Note the first signal; die of the second."""
+    def check(self) -> None:
+        """Raise `Interrupted` if a signal has arrived."""
         if self.caught is not None:
-            signal.signal(signum, signal.SIG_DFL)
-            os.kill(os.getpid(), signum)
-            return
+            raise Interrupted(self.caught)
+
+    def call(self, function: Callable[[], Result]) -> Result:
+        """Call a function in a thread of its own, and return what it returns or raise what it raises.
+
+        Raises
+        ------
+        Interrupted
+            A signal arrived. The function goes on until the process ends, and its result is ignored.
+        """
+        outcome: list[Result] = []
+        problem: list[BaseException] = []
+
+        def work() -> None:
+            try:
+                outcome.append(function())
+            except BaseException as raised:
+                problem.append(raised)
+
+        self.check()
+        depth = self._deferred
+        thread = threading.Thread(target=work, name="interruptible work", daemon=True)
+        thread.start()
+        while thread.is_alive():
+            thread.join(_LOOK_EVERY_S)
+            if self.caught is not None and self._deferred <= depth and thread.is_alive():
+                self._abandoned.append(thread)
+                raise Interrupted(self.caught)
+        if problem:
+            raise problem[0]
+        return outcome[0]
+
+    @contextmanager
+    def deferred(self) -> Iterator[None]:
+        """Leave it to the code within to act on signals; `call` further out waits for it."""
+        self._deferred += 1
+        try:
+            yield
+        finally:
+            self._deferred -= 1
+
+    def note(self, signum: int, frame: FrameType | None) -> None:
+        """Note the first signal, and let the second one end the process at once. A signal handler."""
         self.caught = signum
-        if self.prompt:
-            raise Interrupted(signum)
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_DFL)
+
+    def end_abandoned(self) -> None:
+        """End the process now if abandoned work is still running: it could crash while the interpreter shuts down."""
+        if self.caught is not None and any(thread.is_alive() for thread in self._abandoned):
+            for stream in (sys.stdout, sys.stderr):
+                with suppress(OSError, ValueError):
+                    stream.flush()
+            os._exit(128 + self.caught)
+
+
+_installed: Signals | None = None
+
+
+@contextmanager
+def noted_signals() -> Iterator[Signals]:
+    """Note SIGINT and SIGTERM instead of letting them end the process.
+
+    Within a call of this function, another gives the same signals. Outside the main thread, where Python allows no
+    handlers, nothing is noted and signals do what they did.
+    """
+    global _installed
+    if _installed is not None:
+        yield _installed
+        return
+    signals = Signals()
+    if threading.current_thread() is not threading.main_thread():
+        yield signals
+        return
+    before: dict[int, Any] = {signum: signal.signal(signum, signals.note) for signum in _SIGNALS}
+    atexit.register(signals.end_abandoned)
+    _installed = signals
+    try:
+        yield signals
+    finally:
+        _installed = None
+        for signum, handler in before.items():
+            signal.signal(signum, handler)
+        if not signals.caught:
+            atexit.unregister(signals.end_abandoned)

@@ -1,32 +1,44 @@
-"""One run from workers wanted to all rows written; the steps of `sweeper.run`."""
+"""One run, from finding workers to the last row written; the steps of `sweeper.run`."""
 
 from __future__ import annotations
 
 import queue
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from boulder_sweep.errors import Interrupted
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.runner.admission import Admission
-from boulder_sweep.runner.backends import Backend
-from boulder_sweep.runner.collector import Collector
+from boulder_sweep.runner.assembly import Assembly
+from boulder_sweep.runner.backends import DASK
+from boulder_sweep.runner.cluster import Cluster, ClusterWorkers
 from boulder_sweep.runner.commands import repeat_command
-from boulder_sweep.runner.estimate import Estimate, blocks, estimated, rows_in_progress, take_sample
+from boulder_sweep.runner.committer import Committer
+from boulder_sweep.runner.computing import Computation
+from boulder_sweep.runner.estimate import (
+    Estimate,
+    blocks,
+    estimated,
+    rows_in_progress,
+    rows_per_task,
+    take_sample,
+)
 from boulder_sweep.runner.interruption import Signals
+from boulder_sweep.runner.messages import Computed, Ended, Message, Note
 from boulder_sweep.runner.summary import Progress, progress_of
-from boulder_sweep.runner.workers import Ended, Workers
+from boulder_sweep.runner.threads import ThreadWorkers
 from boulder_sweep.store.errors import DoesNotFitError
+from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.provenance import cpu_name, file_metadata
-from boulder_sweep.store.writer import OutputFolder
+from boulder_sweep.store.writer import OutputFolder, StagedPart
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 Report = Callable[[Progress], None]
 """What is told of the progress."""
-_LOOK_UP_S = 0.1
+_LOOK_EVERY_S = 0.1
 _PATIENCE_S = 0.6
 """How long an interrupted run waits for what is being written."""
 
@@ -43,62 +55,61 @@ class Run:
         self._signals = signals
         self._metadata = file_metadata(folder.manifest.identity, repeat_command(sweep))
         self._rows_before = folder.manifest.rows_done
-        self._backend: Backend | None = None
+        self._jobs = 1
+        self._cluster: Cluster | None = None
         self._estimate: Estimate | None = None
         others = {session.cpu for session in folder.manifest.sessions} - {cpu_name()}
         if self._rows_before and others:
             self.notes.append(f"earlier rows were computed on another processor ({', '.join(sorted(others))})")
 
+    @property
+    def manifest(self) -> Manifest:
+        """What is recorded of the folder."""
+        return self._folder.manifest
+
     def prepare(self, backend: str, jobs: int, scheduler: str | None, force: bool) -> None:
-        """Get workers, warm up the kernels, and see that the result will fit."""
-        to_compute = self._sweep.n_designs - self._rows_before
+        """Connect to workers, warm up the kernels, and check that the result will fit."""
+        self._jobs = jobs
         try:
-            self._backend = Backend(backend, jobs, scheduler)
-            if to_compute:
-                self._evaluation.warm_up()
-                rows = self._sweep.n_designs
-                self._estimate = estimated(
-                    take_sample(self._evaluation, self._sweep.block, rows, self._metadata),
-                    rows=rows,
-                    rows_to_compute=to_compute,
-                    jobs=self._backend.jobs,
-                    out=self._folder.path,
-                    rows_per_part=self._folder.manifest.rows_per_part,
-                )
+            if backend == DASK:
+                self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler))
+                self._jobs = max(sum(self._cluster.threads().values()), 1)
+            if self._rows_before < self._sweep.n_designs:
+                self._estimate = self._signals.call(self._estimated)
                 objections = self._estimate.objections
                 if objections and not force:
-                    raise DoesNotFitError("; ".join(objections) + ". --force runs all the same")
+                    raise DoesNotFitError("; ".join(objections) + ". Use --force to run anyway")
         except BaseException:
             self._folder.discard()
             raise
 
     def compute(self, progress: Report | None, commit_every_s: float) -> None:
         """Compute and write what is missing."""
-        self._signals.prompt = False
-        manifest, make_block = self._folder.manifest, self._sweep.block
+        computation = Computation(self._evaluation, self._sweep.block, self._metadata)
         admission = Admission(0)
-        collector = Collector(self._folder, make_block, self._metadata, admission, commit_every_s)
-        collector.start()
-        workers = None
+        workers = self._workers(computation, admission, commit_every_s)
+        committer = Committer(self._folder, computation, admission, tuple if workers is None else workers.flush)
+        committer.start()
         try:
-            if self._backend is not None and self._estimate is not None:
-                size = self._estimate.rows_per_block
-                admission.limit = rows_in_progress(size, self._backend.jobs, manifest.rows_per_part)
-                ranges = blocks(manifest.missing(), size)
-                workers = Workers(self._backend, self._evaluation, make_block, ranges, admission)
+            if workers is None:
+                committer.finish()
+            else:
                 workers.start()
-            self._coordinate(workers, collector, progress)
+            self._coordinate(workers, committer, progress)
         except BaseException:
             if workers is not None:
                 workers.stop()
-            collector.stop()
-            collector.join(_PATIENCE_S)
-            if workers is not None:
                 workers.join(_PATIENCE_S / 3)
+                while not workers.messages.empty():  # parts written meanwhile
+                    message = workers.messages.get()
+                    if isinstance(message, StagedPart):
+                        committer.put(message)
+            committer.stop()
+            committer.join(_PATIENCE_S)
             raise
 
     def end(self, how: str) -> int:
-        """Let folder and workers go.
+        """Release folder and workers.
 
         Parameters
         ----------
@@ -111,41 +122,73 @@ class Run:
             Rows that are safe.
         """
         self._folder.close(how)
-        if self._backend is not None:
-            self._backend.close()
+        if self._cluster is not None:
+            self._cluster.close()
         return self._folder.manifest.rows_done
 
-    def _coordinate(self, workers: Workers | None, collector: Collector, progress: Report | None) -> None:
-        """Pass results on until everything is written."""
+    def _estimated(self) -> Estimate:
+        """Estimate what the missing rows need, from a sample."""
+        self._evaluation.warm_up()
+        rows = self._sweep.n_designs
+        return estimated(
+            take_sample(self._evaluation, self._sweep.block, rows, self._metadata),
+            rows=rows,
+            rows_to_compute=rows - self._rows_before,
+            jobs=self._jobs,
+            out=self._folder.path,
+            rows_per_part=self._folder.manifest.rows_per_part,
+        )
+
+    def _workers(
+        self, computation: Computation, admission: Admission, commit_every_s: float
+    ) -> ThreadWorkers | ClusterWorkers | None:
+        """Return the workers for the missing rows; None if there are no missing rows."""
+        if self._estimate is None:
+            return None
+        manifest, size = self._folder.manifest, self._estimate.rows_per_block
+        if self._cluster is not None:
+            rows = rows_per_task(self._estimate, manifest.rows_per_part)
+            return ClusterWorkers(self._cluster, computation, blocks(manifest.missing(), rows), size, self._folder)
+        admission.limit = rows_in_progress(size, self._jobs, manifest.rows_per_part)
+        assembly = Assembly(manifest.missing(), commit_every_s)
+        ranges = blocks(manifest.missing(), size)
+        return ThreadWorkers(self._jobs, computation, ranges, admission, assembly, self._folder)
+
+    def _coordinate(
+        self, workers: ThreadWorkers | ClusterWorkers | None, committer: Committer, progress: Report | None
+    ) -> None:
+        """Pass messages on until everything is written."""
         begun = reported = time.monotonic()
         ended = workers is None
-        if ended:
-            collector.finish()
-        while collector.is_alive():
-            if self._signals.caught is not None:
-                raise Interrupted(self._signals.caught)
+        while committer.is_alive():
+            self._signals.check()
             if workers is None or ended:
-                collector.join(_LOOK_UP_S)
+                committer.join(_LOOK_EVERY_S)
             else:
-                try:
-                    item = workers.results.get(timeout=_LOOK_UP_S)
-                except queue.Empty:
-                    item = None
-                if isinstance(item, Ended):
-                    ended = True
-                    if item.problem is not None:
-                        raise item.problem
-                    collector.finish()
-                elif item is not None:
-                    self.rows_computed += len(item.judged.verdict)
-                    collector.put(item.start, item.judged)
-            self._folder.sign_of_life()
+                with suppress(queue.Empty):
+                    ended = self._received(workers.messages.get(timeout=_LOOK_EVERY_S), committer)
+            self._folder.heartbeat()
             now = time.monotonic()
-            if progress is not None and (now - reported >= _LOOK_UP_S or ended):
+            if progress is not None and (now - reported >= _LOOK_EVERY_S or ended):
                 reported = now
                 rows = self._sweep.n_designs
-                progress(progress_of(self._rows_before, self.rows_computed, rows, now - begun))
-        if collector.problem is not None:
-            raise collector.problem
+                progress(progress_of(self._rows_before, self.rows_computed, rows, now - begun, self.notes))
+        if committer.problem is not None:
+            raise committer.problem
         if self._folder.manifest.rows_done != self._sweep.n_designs:
             raise RuntimeError("the run ended before every row was written")
+
+    def _received(self, message: Message, committer: Committer) -> bool:
+        """Act on a message of the workers; True for the last one."""
+        if isinstance(message, Computed):
+            self.rows_computed += message.rows
+        elif isinstance(message, StagedPart):
+            committer.put(message)
+        elif isinstance(message, Note):
+            self.notes.append(message.text)
+        elif isinstance(message, Ended):
+            if message.problem is not None:
+                raise message.problem
+            committer.finish()
+            return True
+        return False

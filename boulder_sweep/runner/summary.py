@@ -1,7 +1,8 @@
-"""What a run tells of itself: progress on the way, a summary at the end."""
+"""What a run reports: progress on the way, a summary at the end."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,18 +15,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is; handed to the `progress` function of `run` up to ten times a second.
+    """How far a run got; passed to the `progress` function of `run` up to ten times a second.
 
     Parameters
     ----------
     rows_done, rows
-        Computed so far, rows of earlier runs included; rows of the whole table.
+        Rows computed so far, including earlier runs; rows of the whole table.
     seconds
         Since the computing began.
     rows_per_second
         Computed by this run.
     seconds_left
-        By that speed; None before there is one.
+        At that speed; None before there is one.
+    notes
+        What the user should know so far: damaged parts, lost workers.
     """
 
     rows_done: int
@@ -33,6 +36,7 @@ class Progress:
     seconds: float
     rows_per_second: float
     seconds_left: float | None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Summary:
     rows
         Rows of the table.
     rows_computed
-        Rows computed by this run; the others were there before.
+        Rows computed by this run; the others existed before.
     verdicts
         Rows of each verdict.
     reasons
@@ -58,9 +62,9 @@ class Summary:
     parts, bytes
         Files of the table and their size.
     accuracy
-        What accuracy was asked for, the step chosen for it, and the estimated error that a pilot found.
+        The accuracy requested, the step chosen for it, and the error estimated by a pilot.
     notes
-        What the user should know: damaged parts that were computed again, workers that died.
+        What the user should know: damaged parts that were computed again, lost workers.
     """
 
     out: Path
@@ -102,19 +106,21 @@ class Summary:
         }
 
 
-def progress_of(rows_before: int, rows_computed: int, rows: int, seconds: float) -> Progress:
-    """Return how far a run is.
+def progress_of(rows_before: int, rows_computed: int, rows: int, seconds: float, notes: Sequence[str] = ()) -> Progress:
+    """Return the progress of a run.
 
     Parameters
     ----------
     rows_before
-        Rows that were there when the run began.
+        Rows that existed when the run began.
     rows_computed
         Rows computed since.
     rows
         Rows of the whole table.
     seconds
         Since the computing began.
+    notes
+        What the user should know so far.
     """
     speed = rows_computed / seconds if seconds > 0 else 0.0
     done = rows_before + rows_computed
@@ -124,6 +130,7 @@ def progress_of(rows_before: int, rows_computed: int, rows: int, seconds: float)
         seconds=seconds,
         rows_per_second=speed,
         seconds_left=(rows - done) / speed if speed > 0 else None,
+        notes=tuple(notes),
     )
 
 

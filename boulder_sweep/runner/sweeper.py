@@ -1,7 +1,7 @@
 """A whole sweep: every design of a grid simulated, judged and stored.
 
 The calling thread only coordinates: it passes results on, reports progress and watches for signals.
-The `Workers` thread hands out blocks, the `Collector` thread writes parts in order while others are computed.
+Workers compute, encode and write parts; the `Committer` thread records them in the order of the designs.
 What the table holds depends on the settings alone, not on workers, blocks, speed or interruptions.
 """
 
@@ -11,20 +11,20 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.errors import Interrupted
+from boulder_sweep.errors import ClusterLostError, Interrupted
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.runner.backends import available_cores
-from boulder_sweep.runner.collector import COMMIT_EVERY_S
+from boulder_sweep.runner.assembly import COMMIT_EVERY_S
+from boulder_sweep.runner.backends import available_cores, check_backend
 from boulder_sweep.runner.commands import repeat_command
 from boulder_sweep.runner.commands import resume_command as default_resume_command
-from boulder_sweep.runner.estimate import Estimate, estimated, take_sample
-from boulder_sweep.runner.interruption import Signals
+from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample
+from boulder_sweep.runner.interruption import noted_signals
 from boulder_sweep.runner.running import Report, Run
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.store.errors import NotASweepError
 from boulder_sweep.store.manifest import Manifest, load
-from boulder_sweep.store.opening import open_output
+from boulder_sweep.store.opening import claim_output
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.writer import ROWS_PER_PART
 
@@ -97,18 +97,28 @@ def run(
         also when the disk fills up during the run: what is written is whole, and the run can be resumed.
     BackendError
         The workers are not available.
+    ClusterLostError
+        Scheduler or workers were lost; the run can be resumed.
     Interrupted
         SIGINT or SIGTERM arrived (main thread only); the run can be resumed.
     """
     begun = time.monotonic()
     out = Path(out)
     sweep.require_values()
+    check_backend(backend, scheduler)
     again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
     jobs = jobs or available_cores()
-    whole: Run | None = None
-    with Signals() as signals:
+    with noted_signals() as signals, signals.deferred():
+        claimed = claim_output(out, resume=resume, overwrite=overwrite)
+        whole: Run | None = None
+
+        def ended(how: str) -> int:
+            return claimed.release() if whole is None else whole.end(how)
+
         try:
-            accuracy = accuracy_of(sweep)
+            if not force:
+                refuse_hopeless(sweep.n_designs, sweep.n_designs - claimed.rows_done, out)
+            accuracy = signals.call(lambda: accuracy_of(sweep))
             evaluation = evaluation_of(sweep, accuracy, simulate)
             manifest = Manifest(
                 identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()),
@@ -117,21 +127,23 @@ def run(
                 again,
             )
             session = new_session(command or "boulder_sweep.run", jobs, backend)
-            folder = open_output(out, manifest, session, resume=resume, overwrite=overwrite)
-            whole = Run(sweep, evaluation, folder, signals)
+            whole = Run(sweep, evaluation, claimed.open(manifest, session), signals)
             whole.prepare(backend, jobs, scheduler, force)
             whole.compute(progress, commit_every_s)
         except Interrupted as stop:
-            done = whole.end(f"interrupted by signal {stop.signum}") if whole else 0
+            done = ended(f"interrupted by signal {stop.signum}")
             raise Interrupted(stop.signum, done, sweep.n_designs, again) from None
+        except ClusterLostError as lost:
+            done = ended(str(lost))
+            safe = f"{done:,} of {sweep.n_designs:,} rows are safe"
+            raise ClusterLostError(f"{lost}. {safe}. Resume with: {again}") from lost
         except BaseException as problem:
-            if whole:
-                whole.end(f"stopped by {type(problem).__name__}: {problem}")
+            ended(f"stopped by {type(problem).__name__}: {problem}")
             raise
         whole.end("finished")
     return summary_of(
         out,
-        folder.manifest,
+        whole.manifest,
         rows_computed=whole.rows_computed,
         seconds=time.monotonic() - begun,
         jobs=jobs,

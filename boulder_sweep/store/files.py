@@ -36,6 +36,25 @@ def flush_folder(folder: Path) -> None:
         os.fsync(descriptor)
 
 
+def check_writable(folder: Path, name: str, size: int) -> None:
+    """Check that a file of some size can be written into a folder; it is removed again.
+
+    Raises
+    ------
+    OSError
+        It cannot.
+    """
+    with opened_folder(folder) as at:
+        try:
+            descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666, dir_fd=at)
+            try:
+                _write_all(descriptor, bytes(size))
+            finally:
+                os.close(descriptor)
+        finally:
+            _remove(at, name)
+
+
 def put_file(folder: Path, name: str, content: memoryview | bytes) -> None:
     """Put a file into a folder in one step, replacing any file of that name, and make it durable.
 

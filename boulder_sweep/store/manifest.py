@@ -160,14 +160,15 @@ class Manifest:
         settings = self.identity.get("settings")
         return tuple(settings.get("labels", ())) if isinstance(settings, dict) else ()
 
-    def part_name(self, first: int, stop: int) -> str:
-        """Return the file name of the part with the rows [first, stop); names sort as the rows do."""
-        digits = max(_DIGITS, len(str(self.rows)))
-        return f"{_PART_PREFIX}{first:0{digits}d}-{stop:0{digits}d}{_PART_SUFFIX}"
+
+def part_name(first: int, stop: int, table_rows: int) -> str:
+    """Return the file name of the part with the rows [first, stop) of a table; names sort as the rows do."""
+    digits = max(_DIGITS, len(str(table_rows)))
+    return f"{_PART_PREFIX}{first:0{digits}d}-{stop:0{digits}d}{_PART_SUFFIX}"
 
 
 def hidden_name(name: str) -> str:
-    """Return the temporary name of a merged part while the parts it replaces still exist."""
+    """Return the temporary name of a staged part, or of a merged one while the parts it replaces still exist."""
     return f"_{name}{WRITING_SUFFIX}"
 
 

@@ -7,33 +7,87 @@ from pathlib import Path
 from typing import Any
 
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import flush_folder
+from boulder_sweep.store.files import check_writable, flush_folder
 from boulder_sweep.store.lock import LOCK_NAME, FolderLock
-from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest, Session, is_ours, is_part_name, load, save
+from boulder_sweep.store.manifest import (
+    MANIFEST_NAME,
+    Manifest,
+    Session,
+    hidden_name,
+    is_ours,
+    is_part_name,
+    load,
+    save,
+)
 from boulder_sweep.store.merging import recover_merge
 from boulder_sweep.store.provenance import PREFIX, differences
 from boulder_sweep.store.verify import damaged_parts
 from boulder_sweep.store.writer import OutputFolder
 
 
-def open_output(
-    out: Path,
-    manifest: Manifest,
-    session: Session,
-    *,
-    resume: bool = False,
-    overwrite: bool = False,
-) -> OutputFolder:
-    """Open a folder for a run.
+class ClaimedFolder:
+    """An output folder locked for a run that has not begun; nothing is changed in it yet.
+
+    Attributes
+    ----------
+    rows_done : int
+        Rows that a resumed run keeps, if their parts are intact.
+    """
+
+    def __init__(self, out: Path, lock: FolderLock, resume: bool, overwrite: bool, created: bool):
+        self._out, self._lock, self._created = out, lock, created
+        self._names = sorted(entry.name for entry in out.iterdir())
+        there = _allowed(out, self._names, resume, overwrite)
+        self._there = None if overwrite else there
+        self.rows_done = 0 if self._there is None else self._there.rows_done
+        check_writable(out, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
+
+    def open(self, manifest: Manifest, session: Session) -> OutputFolder:
+        """Begin the run.
+
+        Parameters
+        ----------
+        manifest
+            Describes the run, without parts.
+        session
+            Describes this session.
+
+        Raises
+        ------
+        SettingsDifferError
+            The folder holds rows of other settings or another version.
+        WriteError
+            The folder cannot be written.
+        """
+        try:
+            if self._there is None:
+                old = [name for name in self._names if is_ours(name) and name not in (LOCK_NAME, MANIFEST_NAME)]
+                _remove(self._out, old)
+                folder = OutputFolder(self._out, self._lock, manifest, self._created)
+            else:
+                folder = _resumed(self._out, self._lock, manifest, self._there, self._names)
+            folder.manifest.sessions.append(session)
+            save(folder.manifest, self._out)
+        except OSError as problem:
+            raise errors.WriteError(f"cannot write into {self._out}: {problem.strerror}") from problem
+        return folder
+
+    def release(self) -> int:
+        """Release the folder as it was; return the rows in it."""
+        self._lock.release()
+        if self._created:
+            with suppress(OSError):
+                self._out.rmdir()
+        return self.rows_done
+
+
+def claim_output(out: Path, *, resume: bool = False, overwrite: bool = False) -> ClaimedFolder:
+    """Lock a folder for a run, and check that it can be used.
 
     Parameters
     ----------
     out
         The folder; it may exist if it is empty, or with `resume` or `overwrite`.
-    manifest
-        Describes the run, without parts.
-    session
-        Describes this session.
     resume
         Keep the finished parts of the same run, if any. Damaged ones count as missing.
     overwrite
@@ -47,24 +101,35 @@ def open_output(
     if resume and overwrite:
         raise errors.StoreError("--resume and --overwrite exclude each other")
     created = _make(out)
+    lock = None
     try:
         lock = _locked(out)
-    except BaseException:
+        return ClaimedFolder(out, lock, resume, overwrite, created)
+    except BaseException as problem:
+        if lock is not None:
+            lock.release()
         if created:
             with suppress(OSError):
                 out.rmdir()
+        if isinstance(problem, OSError):
+            raise errors.WriteError(f"cannot write into {out}: {problem.strerror}") from problem
         raise
+
+
+def open_output(
+    out: Path, manifest: Manifest, session: Session, *, resume: bool = False, overwrite: bool = False
+) -> OutputFolder:
+    """Open a folder for a run at once: `claim_output`, then `ClaimedFolder.open`."""
+    claimed = claim_output(out, resume=resume, overwrite=overwrite)
     try:
-        folder = _taken(out, lock, manifest, resume, overwrite, created)
-        folder.manifest.sessions.append(session)
-        save(folder.manifest, out)
-    except OSError as problem:
-        lock.release()
-        raise errors.WriteError(f"cannot write into {out}: {problem.strerror}") from problem
+        return claimed.open(manifest, session)
     except BaseException:
-        lock.release()
+        claimed.release()
         raise
-    return folder
+
+
+_PROBE_BYTES = 1 << 16
+"""More than a first manifest takes."""
 
 
 def _make(out: Path) -> bool:
@@ -93,11 +158,8 @@ def _locked(out: Path) -> FolderLock:
     return FolderLock(out, host, holder)
 
 
-def _taken(
-    out: Path, lock: FolderLock, manifest: Manifest, resume: bool, overwrite: bool, created: bool
-) -> OutputFolder:
-    """Bring a locked folder into the state from which the run continues."""
-    names = sorted(entry.name for entry in out.iterdir())
+def _allowed(out: Path, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
+    """Check that a run may use a folder; return its manifest, None if there is none to resume from."""
     foreign = [name for name in names if not is_ours(name) or (out / name).is_dir()]
     there = None
     if MANIFEST_NAME in names and not (overwrite and not _is_readable(out)):
@@ -112,10 +174,7 @@ def _taken(
             raise errors.ForeignFilesError(out, foreign)
     if there is not None and not (resume or overwrite):
         raise errors.OutputExistsError(out, there.rows_done, there.rows)
-    if there is None or overwrite:
-        _remove(out, [name for name in names if is_ours(name) and name not in (LOCK_NAME, MANIFEST_NAME)])
-        return OutputFolder(out, lock, manifest, created)
-    return _resumed(out, lock, manifest, there, names)
+    return there
 
 
 def _resumed(out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, names: list[str]) -> OutputFolder:

@@ -1,30 +1,72 @@
 """The output folder of a run: opened, written part by part, closed.
 
-A part is put in place whole (see `files`) and then recorded in the manifest with its rows and checksum; its
-file never changes, so readers are never disturbed. A slow run writes small parts, so that its progress can be
-read and an interruption loses little. When all rows are there, small parts are merged into those a fast run would have
-written: the merge is announced in the manifest, the merged file is written under a ``_`` name, the small ones
-are removed, and it gets its final name. So no row is ever seen twice, and a run killed in the middle can finish
-the merge.
+Whoever computes a part stages it: the file is written complete (see `files`) under a temporary name. The run
+commits staged parts in the order of their rows: they get their names and are recorded in the manifest with rows
+and checksum. A file never changes, so readers are never disturbed.
+
+A slow run writes small parts, so that its progress can be read and an interruption loses little. When all rows are
+there, small parts are merged into those a fast run would have written: the merge is announced in the manifest, the
+merged file is written under a temporary name, the small ones are removed, and it gets its final name. So no row is
+ever seen twice, and a run killed in the middle can finish the merge.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import put_file
+from boulder_sweep.store.files import WRITING_SUFFIX, opened_folder, put_file
 from boulder_sweep.store.lock import FolderLock
-from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest, Merge, Part, hidden_name, save
+from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest, Merge, Part, hidden_name, is_ours, part_name, save
 from boulder_sweep.store.merging import finish_merge
 from boulder_sweep.store.provenance import now
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
+
+
+class StagedPart(NamedTuple):
+    """A part written under a temporary name."""
+
+    name: str
+    """Its final name."""
+    part: Part
+
+
+def stage(
+    folder: Path, table_rows: int, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]
+) -> StagedPart:
+    """Write a part under its temporary name; other machines that share the folder may do that, too.
+
+    Parameters
+    ----------
+    folder
+        The output folder.
+    table_rows
+        Rows of the whole table.
+    first
+        Row number of the first row of the part.
+    content
+        The bytes of its file.
+    rows
+        Number of its rows.
+    verdicts
+        Number of rows of each verdict and reason.
+
+    Raises
+    ------
+    OSError
+        The disk is full or the folder cannot be written; nothing has changed.
+    """
+    name = part_name(first, first + rows, table_rows)
+    put_file(folder, hidden_name(name), content)
+    return StagedPart(name, _part(first, content, rows, verdicts))
 
 
 class OutputFolder:
@@ -41,8 +83,8 @@ class OutputFolder:
         self._ended: str | None = None
         self._open = True
 
-    def commit(self, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> None:
-        """Put a part in place and record it.
+    def stage(self, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> StagedPart:
+        """Write a part under its temporary name; any thread may do that at any time.
 
         Parameters
         ----------
@@ -51,7 +93,7 @@ class OutputFolder:
         content
             The bytes of its file.
         rows
-            How many rows it has.
+            Number of its rows.
         verdicts
             Number of rows of each verdict and reason.
 
@@ -60,16 +102,37 @@ class OutputFolder:
         WriteError
             The disk is full or the folder cannot be written; earlier parts are unchanged.
         """
-        name = self.manifest.part_name(first, first + rows)
-        with self._writing() as is_open:
-            if not is_open:
-                return  # the run was stopped while this part was encoded
-            put_file(self.path, name, content)
-            self.manifest.parts[name] = _part(first, content, rows, verdicts)
+        try:
+            staged = stage(self.path, self.manifest.rows, first, content, rows, verdicts)
+        except OSError as problem:
+            raise self.write_error(problem) from problem
+        if not self._open:  # the run was stopped meanwhile
+            (self.path / hidden_name(staged.name)).unlink(missing_ok=True)
+        return staged
+
+    def commit(self, staged: Sequence[StagedPart]) -> None:
+        """Give staged parts their names and record them; after `close` they are removed instead.
+
+        Raises
+        ------
+        WriteError
+            As for `stage`.
+        """
+        with self._writing() as is_open, opened_folder(self.path) as at:
+            if not is_open:  # the run was stopped while these parts were written
+                for name, _ in staged:
+                    with suppress(OSError):
+                        os.unlink(hidden_name(name), dir_fd=at)
+                return
+            for name, _ in staged:
+                os.rename(hidden_name(name), name, src_dir_fd=at, dst_dir_fd=at)
+            os.fsync(at)
+            self.manifest.parts.update(staged)
             try:
                 save(self.manifest, self.path)
             except OSError:
-                del self.manifest.parts[name]
+                for name, _ in staged:
+                    del self.manifest.parts[name]
                 raise
 
     def merge(self, names: list[str], content: memoryview | bytes) -> None:
@@ -97,7 +160,7 @@ class OutputFolder:
         with self._writing() as is_open:
             if not is_open:
                 return
-            name = self.manifest.part_name(merged.first, merged.stop)
+            name = part_name(merged.first, merged.stop, self.manifest.rows)
             self.manifest.merge = Merge(name, merged, names)
             try:
                 save(self.manifest, self.path)
@@ -108,7 +171,7 @@ class OutputFolder:
             finish_merge(self.manifest, self.path)
             save(self.manifest, self.path)
 
-    def sign_of_life(self) -> None:
+    def heartbeat(self) -> None:
         """Show that the run is alive; cheap, call it often."""
         self._lock.renew()
 
@@ -131,6 +194,7 @@ class OutputFolder:
                 self._open = False
                 session = self.manifest.sessions[-1]
                 session.ended, session.how = now(), self._ended
+                self._remove_staged()
                 with suppress(OSError):  # a full disk must not hide what stopped the run
                     save(self.manifest, self.path)
                 self._lock.release()
@@ -157,14 +221,26 @@ class OutputFolder:
             try:
                 yield self._open
             except OSError as problem:
-                done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
-                raise errors.WriteError(
-                    f"cannot write into {self.path}: {problem.strerror}. {done}; free some space and resume with: "
-                    f"{self.manifest.resume_command}"
-                ) from problem
+                raise self.write_error(problem) from problem
             finally:
                 if self._ended is not None:
                     self.close(self._ended)
+
+    def write_error(self, problem: OSError) -> errors.WriteError:
+        """Describe why the folder cannot be written, and how to resume."""
+        done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
+        return errors.WriteError(
+            f"cannot write into {self.path}: {problem.strerror}. {done}; free some space and resume with: "
+            f"{self.manifest.resume_command}"
+        )
+
+    def _remove_staged(self) -> None:
+        """Remove parts that were staged and not committed."""
+        merging = None if self.manifest.merge is None else hidden_name(self.manifest.merge.name)
+        with suppress(OSError):
+            for path in self.path.iterdir():
+                if path.name.endswith(WRITING_SUFFIX) and is_ours(path.name) and path.name != merging:
+                    path.unlink(missing_ok=True)
 
 
 def _part(first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> Part:

@@ -11,15 +11,18 @@
     only (`summing_kernel`), so a design gives the same bits wherever in a block it is computed.
 ``cache``
     Compiled code is kept in a folder named by a hash of all kernel sources, because a cached function does
-    not notice that a function it calls has changed in another file.
+    not notice that a function it calls has changed in another file. Only a folder that nobody else can write is used.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import os
+import stat
 import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -49,22 +52,64 @@ def source_hash() -> str:
 
 
 def _cache_folder() -> str | None:
-    """Return a writable folder for this version of the kernels, or None where there is none."""
+    """Return a folder for this version of the kernels that only this user can write, or None with a warning.
+
+    Compiled kernels are loaded from pickles, which run as the user who loads them.
+    """
     named = os.environ.get(CACHE_VARIABLE)
     user_caches = os.environ.get("XDG_CACHE_HOME")
     candidates = [Path(named)] if named else []
     with contextlib.suppress(RuntimeError):  # no home folder, as for some service accounts
         candidates.append((Path(user_caches) if user_caches else Path.home() / ".cache") / "boulder-sweep")
     candidates.append(Path(tempfile.gettempdir()) / f"boulder-sweep-{os.getuid()}")
+    refused = []
     for candidate in candidates:
-        folder = candidate / f"kernels-{source_hash()[:16]}"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder = _own_folder(candidate / f"kernels-{source_hash()[:16]}")
             with tempfile.TemporaryFile(dir=folder):
-                return str(folder)
-        except OSError:
+                pass
+        except OSError as problem:
+            refused.append(f"{candidate}: {problem.strerror}")
             continue
+        if named and refused:
+            warnings.warn(f"compiled kernels are kept in {folder} ({refused[0]})", stacklevel=2)
+        return str(folder)
+    warnings.warn(
+        f"compiled kernels are not kept, so every start takes about half a minute ({'; '.join(refused)}). Set "
+        f"{CACHE_VARIABLE} to a folder that only you can write",
+        stacklevel=2,
+    )
     return None
+
+
+def _own_folder(folder: Path) -> Path:
+    """Make a folder with access for this user only, and check that nobody else can put files into it.
+
+    Returns
+    -------
+    Path
+        Without symbolic links, which could be changed later.
+
+    Raises
+    ------
+    OSError
+        It cannot be made, or others can change it or a folder above it.
+    """
+    folder = Path(os.path.realpath(folder))
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    for place in reversed(missing):
+        place.mkdir(mode=0o700, exist_ok=True)
+    for place in (folder, *folder.parents):
+        found = place.lstat()
+        if not stat.S_ISDIR(found.st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, f"{place} is not a folder")
+        if found.st_uid not in (os.getuid(), 0):
+            raise PermissionError(errno.EPERM, f"{place} belongs to another user")
+        # Where the sticky bit is set, as for /tmp, others cannot replace what lies in the folder.
+        open_to_others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+        if open_to_others and (place == folder or not found.st_mode & stat.S_ISVTX):
+            raise PermissionError(errno.EPERM, f"other users can write into {place}")
+    return folder
 
 
 CACHE_FOLDER = _cache_folder()

@@ -43,7 +43,7 @@ def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, schedule
 
     words = ["-q", "-o", "out", "--backend", "dask", "--scheduler", scheduler]
     with monkeypatch.context() as patch:
-        patch.setattr("boulder_sweep.store.writer.put_file", full)
+        patch.setattr("boulder_sweep.store.writer.save", full)
         code, out, err = sweep("run", possible_grid, *words)
     assert (code, out) == (1, "")
     command = f"sweep run grid.yaml -o out --backend dask --scheduler {scheduler} --resume"
@@ -54,7 +54,7 @@ def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, schedule
 
 
 def test_a_scheduler_that_does_not_answer_is_wrong_use(sweep, possible_grid, monkeypatch):
-    monkeypatch.setattr("boulder_sweep.runner.backends._CONNECT_S", "1s")
+    monkeypatch.setattr("boulder_sweep.runner.cluster.CONNECT_S", 1.0)
     code, out, err = sweep(
         "run", possible_grid, "-q", "-o", "out", "--backend", "dask", "--scheduler", "tcp://127.0.0.1:9"
     )

@@ -128,7 +128,8 @@ def test_where_no_folder_can_be_written(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv(_jit.CACHE_VARIABLE, str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     monkeypatch.setattr(_jit.tempfile, "gettempdir", lambda: str(blocked))
-    assert _jit._cache_folder() is None
+    with pytest.warns(UserWarning, match="compiled kernels are not kept.*is not a folder.*BOULDER_SWEEP_CACHE_DIR"):
+        assert _jit._cache_folder() is None
     monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
     assert _jit.kernel(lambda x: x + 1.0)(1.0) == 2.0
 

@@ -1,4 +1,4 @@
-"""Blocks handed out, results collected, failures retried."""
+"""Workers: blocks computed, failures retried, parts staged in any order and committed in theirs."""
 
 from __future__ import annotations
 
@@ -12,9 +12,15 @@ from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError
 from boulder_sweep.judge.judged import Judged, not_computed
 from boulder_sweep.runner.admission import Admission
-from boulder_sweep.runner.backends import Backend
+from boulder_sweep.runner.assembly import Assembly
+from boulder_sweep.runner.backends import check_backend
+from boulder_sweep.runner.committer import Committer
+from boulder_sweep.runner.computing import Computation, EncodedPart
 from boulder_sweep.runner.estimate import blocks
-from boulder_sweep.runner.workers import Ended, Workers
+from boulder_sweep.runner.messages import Computed, Ended
+from boulder_sweep.runner.threads import ThreadWorkers
+from boulder_sweep.store.manifest import Manifest, Part, part_name
+from boulder_sweep.store.writer import StagedPart
 
 
 class Rows(NamedTuple):
@@ -22,6 +28,29 @@ class Rows(NamedTuple):
 
     start: int
     stop: int
+
+
+class Recorder(Computation):
+    """Keeps judged rows in place of their encoded bytes."""
+
+    def encoded(self, first, pieces):
+        rows = sum(len(piece.verdict) for piece in pieces)
+        return EncodedPart(first, rows, b"", {"pieces": pieces})
+
+
+class Folder:
+    """Stands for an output folder: keeps what is staged and what is committed."""
+
+    def __init__(self, rows, size):
+        self.manifest = Manifest({}, rows, size, "")
+        self.committed = []
+
+    def stage(self, first, content, rows, verdicts):
+        return StagedPart(part_name(first, first + rows, self.manifest.rows), Part(first, rows, 0, "", verdicts, ""))
+
+    def commit(self, staged):
+        self.committed += staged
+        self.manifest.parts.update(staged)
 
 
 def good(block: Rows) -> Judged:
@@ -36,54 +65,57 @@ def good(block: Rows) -> Judged:
     return Judged(rows.columns | own, rows.words | {"reason": REASONS})
 
 
-def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, backend="threading"):
-    """Run workers to their end; rows by their place, and what was told."""
-    engine = Backend(backend, jobs)
-    admission = Admission(limit)
-    workers = Workers(engine, evaluate, Rows, blocks(iter([(0, rows)]), size), admission)
+def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, part=100, make_block=Rows):
+    """Run workers to their end; margin, verdict and reason of every row in the order of the commits."""
+    folder, admission = Folder(rows, part), Admission(limit)
+    computation = Recorder(evaluate, make_block, {})
+    assembly = Assembly(folder.manifest.missing())
+    ranges = blocks(folder.manifest.missing(), size)
+    workers = ThreadWorkers(jobs, computation, ranges, admission, assembly, folder)
+    committer = Committer(folder, computation, admission, workers.flush)
+    committer.start()
     workers.start()
-    margin = np.full(rows, -1.0)
-    verdict = np.full(rows, -1)
-    reasons = [""] * rows
-    while True:
-        piece = workers.results.get(timeout=60)
-        if isinstance(piece, Ended):
-            break
-        n = len(piece.judged.verdict)
-        place = slice(piece.start, piece.start + n)
-        assert (verdict[place] == -1).all(), "rows came twice"
-        margin[place], verdict[place] = piece.judged["margin"], piece.judged.verdict
-        reasons[place] = [piece.judged.reasons[code] for code in piece.judged.reason]
-        admission.release(n)
-    engine.close()
-    return margin, verdict, reasons, piece.problem, workers
+    computed = 0
+    while not isinstance(message := workers.messages.get(timeout=60), Ended):
+        if isinstance(message, Computed):
+            computed += message.rows
+        else:
+            committer.put(message)
+    committer.finish()
+    committer.join(60)
+    assert committer.problem is None
+    assert message.problem is None
+    assert computed == rows
+    assert [staged.part.first for staged in folder.committed] == sorted(range(0, rows, part))
+    pieces = [piece for staged in folder.committed for piece in staged.part.verdicts["pieces"]]
+    reasons = [piece.reasons[code] for piece in pieces for code in piece.reason]
+    return np.concatenate([piece["margin"] for piece in pieces]), np.concatenate([p.verdict for p in pieces]), reasons
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
 @pytest.mark.parametrize("size", [1, 7, 1000])
-def test_every_row_comes_once(jobs, size):
-    margin, verdict, _, problem, _ = work_off(good, rows=200, jobs=jobs, size=size)
-    assert problem is None
+def test_every_row_comes_once_and_in_order(jobs, size):
+    margin, verdict, _ = work_off(good, rows=200, jobs=jobs, size=size, part=30)
     assert np.array_equal(margin, np.arange(200.0))
     assert (verdict == 0).all()
 
 
-def test_rows_under_way_stay_within_bounds():
-    under_way, most = set(), 0
+def test_rows_in_progress_stay_within_bounds():
+    in_progress, most = set(), 0
     lock = threading.Lock()
 
     def watched(block):
         nonlocal most
         with lock:
-            under_way.add(block.start)
-            most = max(most, len(under_way))
+            in_progress.add(block.start)
+            most = max(most, len(in_progress))
         try:
             return good(block)
         finally:
             with lock:
-                under_way.discard(block.start)
+                in_progress.discard(block.start)
 
-    margin, *_ = work_off(watched, rows=500, size=10, jobs=4, limit=20)
+    margin, *_ = work_off(watched, rows=500, size=10, jobs=4, limit=20, part=10)
     assert np.array_equal(margin, np.arange(500.0))
     assert most <= 2
 
@@ -99,14 +131,13 @@ def test_a_block_that_raises_once_is_tried_again(jobs, size):
             raise MemoryError("just now")
         return good(block)
 
-    margin, verdict, _, problem, _ = work_off(flaky, rows=200, jobs=jobs, size=size)
-    assert problem is None
+    margin, verdict, _ = work_off(flaky, rows=200, jobs=jobs, size=size)
     assert len(raised) == 1
     assert (verdict == 0).all()
     assert np.array_equal(margin, np.arange(200.0))
 
 
-@pytest.mark.parametrize("size", [1, 32, 999])
+@pytest.mark.parametrize("size", [1, 32, 99])
 def test_only_the_rows_that_raise_become_errors(size):
     bad = {17, 18, 500, 999}
 
@@ -115,8 +146,7 @@ def test_only_the_rows_that_raise_become_errors(size):
             raise ZeroDivisionError("bad luck\nin two lines")
         return good(block)
 
-    margin, verdict, reasons, problem, _ = work_off(picky, size=size)
-    assert problem is None
+    margin, verdict, reasons = work_off(picky, size=size)
     assert set(np.flatnonzero(verdict == VERDICTS.index("error"))) == bad
     assert np.array_equal(np.delete(margin, sorted(bad)), np.delete(np.arange(1000.0), sorted(bad)))
     assert {reasons[row] for row in bad} == {
@@ -128,23 +158,18 @@ def test_when_everything_raises_it_ends_all_the_same():
     def broken(block):
         raise ValueError("x" * 1000)
 
-    _, verdict, reasons, problem, _ = work_off(broken, rows=20_000, size=5000)
-    assert problem is None
+    _, verdict, reasons = work_off(broken, rows=20_000, size=5000, part=20_000)
     assert (verdict == VERDICTS.index("error")).all()
     assert len(max(reasons, key=len)) < 300
 
 
 def test_a_mistake_in_making_blocks_is_reported_like_one_in_computing_them():
-    engine = Backend("threading", 2)
-
     def no_block(start, stop):
         raise IndexError("no such rows")
 
-    workers = Workers(engine, good, no_block, iter([(0, 4)]), Admission(100))
-    workers.start()
-    found = [workers.results.get(timeout=30) for _ in range(5)]
-    assert sorted(piece.start for piece in found[:4]) == [0, 1, 2, 3]
-    assert found[4] == Ended(None)
+    _, verdict, reasons = work_off(good, rows=4, make_block=no_block)
+    assert (verdict == VERDICTS.index("error")).all()
+    assert set(reasons) == {"the computation of this design failed: IndexError: no such rows"}
 
 
 def test_stopped_workers_hand_out_no_more():
@@ -157,8 +182,10 @@ def test_stopped_workers_hand_out_no_more():
         threading.Event().wait(0.05)
         return good(block)
 
-    engine = Backend("threading", 2)
-    workers = Workers(engine, slow, Rows, blocks(iter([(0, 10**9)]), 1), Admission(10**9))
+    folder = Folder(10**9, 10**9)
+    assembly = Assembly(folder.manifest.missing())
+    ranges = blocks(folder.manifest.missing(), 1)
+    workers = ThreadWorkers(2, Recorder(slow, Rows, {}), ranges, Admission(10**9), assembly, folder)
     workers.start()
     assert begun.wait(10)
     workers.stop()
@@ -167,13 +194,48 @@ def test_stopped_workers_hand_out_no_more():
     assert len(count) < 1000
 
 
+def test_a_problem_in_writing_ends_the_run():
+    class Full(Folder):
+        def stage(self, *_):
+            raise OSError(28, "No space left on device")
+
+    folder = Full(100, 50)
+    assembly = Assembly(folder.manifest.missing())
+    ranges = blocks(folder.manifest.missing(), 10)
+    workers = ThreadWorkers(2, Recorder(good, Rows, {}), ranges, Admission(10**9), assembly, folder)
+    workers.start()
+    while not isinstance(message := workers.messages.get(timeout=60), Ended):
+        pass
+    assert isinstance(message.problem, OSError)
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1]])
+def test_blocks_in_any_order_make_parts_in_order(order):
+    assembly = Assembly(iter([(0, 20), (20, 40)]))
+    parts = [ready for place in order for ready in assembly.add(10 * place, good(Rows(10 * place, 10 * place + 10)))]
+    assert [ready.first for ready in parts] == [0, 20]
+    assert all(sum(len(piece.verdict) for piece in ready.pieces) == 20 for ready in parts)
+    assert assembly.flush() == []
+
+
+def test_a_slow_run_writes_what_it_has_and_an_interrupted_one_flushes():
+    hasty = Assembly(iter([(0, 30)]), commit_every_s=0.0)
+    assert [len(hasty.add(first, good(Rows(first, first + 10)))) for first in (0, 10, 20)] == [1, 1, 1]
+    patient = Assembly(iter([(0, 30)]))
+    assert patient.add(0, good(Rows(0, 10))) == patient.add(20, good(Rows(20, 30))) == []
+    (flushed,) = patient.flush()
+    assert (flushed.first, len(flushed.pieces)) == (0, 1)
+    (rest,) = patient.add(10, good(Rows(10, 20)))
+    assert (rest.first, len(rest.pieces)) == (10, 2)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("ray", 2), "threading, dask"),
-        (("threading", 2, "tcp://127.0.0.1:1"), "needs the backend dask"),
+        (("ray", None), "threading, dask"),
+        (("threading", "tcp://127.0.0.1:1"), "needs the backend dask"),
     ],
 )
-def test_backends_that_cannot_be_had(arguments, words):
+def test_backends_that_do_not_exist(arguments, words):
     with pytest.raises(BackendError, match=words):
-        Backend(*arguments)
+        check_backend(*arguments)

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.runner.collector import verdict_counts
+from boulder_sweep.runner.computing import verdict_counts
 from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest
 from boulder_sweep.store.opening import open_output
 from boulder_sweep.store.provenance import file_metadata, new_session
@@ -42,7 +42,7 @@ def commit(folder: OutputFolder, first: int, rows: int | None = None) -> None:
     """Put a part into a folder."""
     rows = min(SIZE, ROWS - first) if rows is None else rows
     content, verdicts = part_bytes(first, rows)
-    folder.commit(first, content, rows, verdicts)
+    folder.commit([folder.stage(first, content, rows, verdicts)])
 
 
 def finished_folder(out: Path) -> Path:

@@ -22,6 +22,7 @@ from boulder_sweep.store.manifest import (
     is_ours,
     is_part_name,
     load,
+    part_name,
     save,
 )
 from tests.store.folders import OTHER_FORMS, rewrite_records
@@ -30,7 +31,7 @@ from tests.store.folders import OTHER_FORMS, rewrite_records
 def manifest_with_parts() -> Manifest:
     manifest = Manifest({"settings": {"name": "t", "x": [1.5, 2.0]}}, 1000, 300, "sweep run t.yaml --resume")
     for first, rows, verdicts in ((0, 300, {"pass": 290, "fail/overturns": 10}), (600, 50, {"pass": 50})):
-        name = manifest.part_name(first, first + rows)
+        name = part_name(first, first + rows, manifest.rows)
         manifest.parts[name] = Part(first, rows, 5000, "ab", verdicts, "2026")
     manifest.sessions = [Session("2026", "host", 12, "cpu", 2, "threading", "sweep run t.yaml")]
     return manifest
@@ -130,7 +131,7 @@ def test_missing_ranges_are_the_complement_of_what_is_there(rows, size, data):
         start = data.draw(st.integers(first, end - 1))
         while start < end:
             stop = data.draw(st.integers(start + 1, end))
-            name = manifest.part_name(start, stop)
+            name = part_name(start, stop, manifest.rows)
             manifest.parts[name] = Part(start, stop - start, 1, "", {}, "")
             start = stop + data.draw(st.integers(0, 5))
     missing = list(manifest.missing())
@@ -150,15 +151,15 @@ def test_small_parts_are_mergeable_only_when_they_make_a_whole_one():
 
     def add(*edges):
         for first, stop in pairwise(edges):
-            manifest.parts[manifest.part_name(first, stop)] = Part(first, stop - first, 1, "", {}, "")
+            manifest.parts[part_name(first, stop, manifest.rows)] = Part(first, stop - first, 1, "", {}, "")
 
     add(0, 100)
     add(100, 150, 199)
     add(200, 230, 250)
-    assert manifest.mergeable() == [[manifest.part_name(200, 230), manifest.part_name(230, 250)]]
+    assert manifest.mergeable() == [[part_name(200, 230, manifest.rows), part_name(230, 250, manifest.rows)]]
     add(199, 200)
     assert len(manifest.mergeable()) == 2
-    assert manifest.mergeable()[0] == [manifest.part_name(*rows) for rows in ((100, 150), (150, 199), (199, 200))]
+    assert manifest.mergeable()[0] == [part_name(*rows, manifest.rows) for rows in ((100, 150), (150, 199), (199, 200))]
 
 
 def test_missing_ranges_of_a_huge_table_come_one_by_one():
@@ -172,7 +173,7 @@ def test_missing_ranges_of_a_huge_table_come_one_by_one():
 def test_names_sort_as_rows_do(rows, data):
     manifest = Manifest({}, rows, 1, "")
     one, other = data.draw(st.integers(0, rows - 1)), data.draw(st.integers(0, rows - 1))
-    names = [manifest.part_name(first, first + 1) for first in (one, other)]
+    names = [part_name(first, first + 1, manifest.rows) for first in (one, other)]
     assert (names[0] < names[1]) == (one < other)
     assert all(is_part_name(name) for name in names)
 

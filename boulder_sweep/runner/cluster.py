@@ -1,0 +1,398 @@
+"""Workers of a Dask cluster: each computes, encodes and writes its own parts; the scheduler sees short messages."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
+from boulder_sweep.runner.computing import Computation, EncodedPart, failed_rows
+from boulder_sweep.runner.messages import Computed, Ended, Message, Note
+from boulder_sweep.store.lock import LOCK_NAME
+from boulder_sweep.store.manifest import hidden_name
+from boulder_sweep.store.writer import OutputFolder, StagedPart, stage
+from boulder_sweep.text import one_line
+
+CONNECT_S = 10.0
+"""How long to wait for a scheduler to answer, and for a first worker [s]."""
+NO_WORKER_S = 15.0
+"""How long a run waits for a worker after the last one was lost [s]."""
+_LOOK_EVERY_S = 1.0
+_QUIET_S = 10.0
+"""Time without any result after which the user is told [s]."""
+_TASKS_PER_THREAD = 2
+_TRIES = 3
+_LOOPBACK = "127.0.0.1:0"
+
+Fingerprint = tuple[dict[str, str], str, str]
+
+
+class Cluster:
+    """A connection to a Dask scheduler.
+
+    Parameters
+    ----------
+    jobs
+        Threads of the worker to start where no scheduler is given.
+    scheduler
+        Address of a running scheduler; None to start one in this process, reachable from this machine only.
+
+    Raises
+    ------
+    BackendError
+        Dask is not installed, the scheduler does not answer, it has no worker, or a worker has other versions.
+    """
+
+    def __init__(self, jobs: int, scheduler: str | None):
+        self.address = scheduler
+        self._levels: dict[str, int] = {}
+        self._local: Any = None
+        self.client: Any = None
+        try:
+            self.client = self._connected(jobs, scheduler)
+        except BaseException:
+            self.close()
+            raise
+
+    def _connected(self, jobs: int, scheduler: str | None) -> Any:
+        """Connect, or start a scheduler and a worker of threads in this process."""
+        try:
+            distributed = import_module("distributed")  # an extra: most users have no cluster
+        except ImportError:
+            raise BackendError("the backend dask needs a package: pip install 'boulder-sweep[dask]'") from None
+        self._levels = _silenced_loggers()
+        if scheduler is None:
+            self._local = distributed.LocalCluster(
+                processes=False,
+                n_workers=1,
+                threads_per_worker=jobs,
+                dashboard_address=_LOOPBACK,
+                worker_dashboard_address=_LOOPBACK,
+            )
+            return distributed.Client(self._local, set_as_default=False)
+        try:
+            client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as problem:
+            raise BackendError(f"no Dask scheduler answers at {scheduler}: {one_line(problem)}") from problem
+        try:
+            _wait_for_a_worker(client, scheduler)
+            _check_versions(client)
+        except BaseException:
+            client.close(timeout=2)
+            raise
+        return client
+
+    def threads(self) -> dict[str, int]:
+        """Return the threads of every worker, by its address.
+
+        Raises
+        ------
+        ClusterLostError
+            The scheduler does not answer.
+        """
+        try:
+            return dict(self.client.sync(self.client.scheduler.ncores, callback_timeout=CONNECT_S))
+        except (OSError, AttributeError, TimeoutError) as problem:
+            raise ClusterLostError(self.lost_text()) from problem
+
+    def lost_text(self) -> str:
+        """Return what to say when the scheduler is gone."""
+        return f"the connection to the Dask scheduler at {self.address or 'this process'} was lost"
+
+    def close(self) -> None:
+        """Disconnect; a cluster of this process ends."""
+        for part in (self.client, self._local):
+            if part is not None:
+                with suppress(Exception):  # a scheduler that died cannot be told
+                    part.close(timeout=2)
+        for name, level in self._levels.items():
+            logging.getLogger(name).setLevel(level)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Rows [start, stop) of one part, and how often computing them has failed."""
+
+    start: int
+    stop: int
+    tries: int = 0
+    alone: bool = False
+    """Whether no other task is in flight with it, so that it is the one that ends its worker."""
+    relayed: bool = False
+    """Whether the bytes come back through the scheduler, because the worker cannot write into the folder."""
+
+
+class _Done(NamedTuple):
+    """What a worker returns."""
+
+    staged: StagedPart | None
+    relayed: EncodedPart | None
+
+
+class ClusterWorkers(threading.Thread):
+    """Computes ranges of rows on a cluster and puts messages into a queue, at last `Ended`.
+
+    Parameters
+    ----------
+    cluster
+        Where to compute.
+    computation
+        What to do with rows.
+    tasks
+        Ranges of rows [start, stop), none across two parts.
+    rows_per_block
+        Rows that a worker computes at once.
+    folder
+        Where parts are staged, by the workers if they share it.
+    """
+
+    def __init__(
+        self,
+        cluster: Cluster,
+        computation: Computation,
+        tasks: Iterator[tuple[int, int]],
+        rows_per_block: int,
+        folder: OutputFolder,
+    ):
+        super().__init__(name="workers", daemon=True)
+        self.messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self._cluster = cluster
+        self._computation = computation
+        self._tasks = (_Task(*rows) for rows in tasks)
+        self._rows_per_block = rows_per_block
+        self._folder = folder
+        self._again: deque[_Task] = deque()
+        self._suspects: deque[_Task] = deque()
+        """Tasks whose workers died; computed one by one."""
+        self._in_flight: dict[Any, _Task] = {}
+        self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._stopped = threading.Event()
+        self._workers: dict[str, int] = {}
+        self._without_worker_since: float | None = None
+
+    def stop(self) -> None:
+        """Hand out no more tasks; those in progress are dropped."""
+        self._stopped.set()
+
+    def flush(self) -> list[StagedPart]:
+        """Stage what is not written yet: nothing, for workers write what they compute."""
+        return []
+
+    def run(self) -> None:
+        """Compute everything; called by `start`."""
+        problem: BaseException | None = None
+        try:
+            self._work()
+        except BaseException as raised:
+            problem = raised
+            if not isinstance(raised, BoulderSweepError) and self._cluster.client.status != "running":
+                problem = ClusterLostError(self._cluster.lost_text())
+        self.messages.put(Ended(None if self._stopped.is_set() else problem))
+
+    def _work(self) -> None:
+        """Keep some tasks in flight until all are done."""
+        shared = self._cluster.client.submit(_received, self._computation, pure=False)
+        looked = result = time.monotonic()
+        self._look_at_workers()
+        more = True
+        while (more or self._in_flight) and not self._stopped.is_set():
+            if self._suspects:
+                if not self._in_flight:
+                    self._submit(shared, self._suspects.popleft())
+            elif not any(task.alone for task in self._in_flight.values()):
+                more = self._submit_some(shared)
+            with suppress(queue.Empty):
+                future = self._arrived.get(timeout=_LOOK_EVERY_S / 4)
+                result = time.monotonic()
+                self._receive(future)
+            more = more or bool(self._again) or bool(self._suspects)
+            now = time.monotonic()
+            if now - looked > _LOOK_EVERY_S:
+                looked = now
+                self._look_at_workers()
+                if now - result > _QUIET_S and self._workers:
+                    result = now
+                    self.messages.put(
+                        Note(f"no result for {_QUIET_S:.0f} s from {len(self._workers)} workers; waiting")
+                    )
+
+    def _submit_some(self, shared: Any) -> bool:
+        """Submit tasks until every thread has some; False if there are no more."""
+        while len(self._in_flight) < _TASKS_PER_THREAD * sum(self._workers.values()):
+            task = self._again.popleft() if self._again else next(self._tasks, None)
+            if task is None:
+                return False
+            self._submit(shared, task)
+        return True
+
+    def _submit(self, shared: Any, task: _Task) -> None:
+        """Hand a task to the scheduler."""
+        folder = None if task.relayed else str(self._folder.path.resolve())
+        future = self._cluster.client.submit(
+            _compute,
+            shared,
+            (task.start, task.stop),
+            self._rows_per_block,
+            folder,
+            self._folder.manifest.rows,
+            fingerprint(),
+            pure=False,
+        )
+        self._in_flight[future] = task
+        future.add_done_callback(self._arrived.put)
+
+    def _receive(self, future: Any) -> None:
+        """Pass a result on, or retry."""
+        task = self._in_flight.pop(future)
+        if future.status == "finished":
+            done: _Done = future.result()
+            self._accept(task, done)
+        elif future.status == "error":
+            self._retry(task, future.exception())
+        else:  # cancelled, as all are when the connection breaks
+            raise ClusterLostError(self._cluster.lost_text())
+
+    def _accept(self, task: _Task, done: _Done) -> None:
+        """Pass on a part that a worker has written, or write one that it sent."""
+        staged = done.staged
+        if done.relayed is not None:
+            part = done.relayed
+            staged = self._folder.stage(part.first, part.content, part.rows, part.verdicts)
+        elif staged is None or not (self._folder.path / hidden_name(staged.name)).exists():
+            if not task.relayed:
+                self.messages.put(Note("a worker does not share the output folder: its rows pass the scheduler"))
+            self._again.append(replace(task, tries=task.tries + 1, relayed=True))
+            return
+        self.messages.put(Computed(task.stop - task.start))
+        self.messages.put(staged)
+
+    def _retry(self, task: _Task, problem: BaseException) -> None:
+        """Submit a failed task again; halve one that ends its workers, until the row that does so is alone."""
+        if isinstance(problem, OSError) and problem.errno is not None:
+            raise self._folder.write_error(problem) from problem
+        if type(problem).__name__ != "KilledWorker":
+            if isinstance(problem, BoulderSweepError):
+                raise problem
+            if task.tries + 1 >= _TRIES:
+                raise BackendError(f"the workers cannot compute this sweep: {one_line(problem)}") from problem
+            self._again.append(replace(task, tries=task.tries + 1))
+        elif not task.alone:
+            self._suspects.append(replace(task, alone=True))
+        elif task.stop - task.start > 1:
+            middle = (task.start + task.stop) // 2
+            self._suspects += [replace(task, stop=middle), replace(task, start=middle)]
+        else:
+            part = self._computation.encoded(
+                task.start, [failed_rows(1, "every worker that computed this design died")]
+            )
+            self._accept(task, _Done(None, part))
+
+    def _look_at_workers(self) -> None:
+        """Notice workers that came and went."""
+        before, self._workers = self._workers, self._cluster.threads()
+        lost = before.keys() - self._workers.keys()
+        if lost:
+            self.messages.put(
+                Note(f"lost worker {', '.join(sorted(lost))}; its tasks are computed again, {len(self._workers)} left")
+            )
+        if self._workers:
+            self._without_worker_since = None
+            return
+        now = time.monotonic()
+        if self._without_worker_since is None:
+            self._without_worker_since = now
+            self.messages.put(Note(f"no worker left; waiting {NO_WORKER_S:.0f} s for another"))
+        elif now - self._without_worker_since > NO_WORKER_S:
+            raise ClusterLostError(_no_worker_text(self._cluster.address))
+
+
+def fingerprint() -> Fingerprint:
+    """Return versions and hashes of the code that computes here."""
+    from boulder_sweep.store.provenance import kernels_sha256, rules_sha256, versions
+
+    return versions(), kernels_sha256(), rules_sha256()
+
+
+def _received(computation: Computation) -> Computation:
+    """Hold the computation on a worker, from which the others fetch it; repeated if that worker is lost."""
+    return computation
+
+
+def _compute(
+    computation: Computation,
+    rows: tuple[int, int],
+    rows_per_block: int,
+    folder: str | None,
+    table_rows: int,
+    expected: Fingerprint,
+) -> _Done:
+    """Compute, encode and stage some rows of one part on a worker."""
+    if fingerprint() != expected:
+        raise BackendError(_other_versions_text("a worker"))
+    start, stop = rows
+    pieces = [
+        computation.judged(first, min(first + rows_per_block, stop)) for first in range(start, stop, rows_per_block)
+    ]
+    part = computation.encoded(start, pieces)
+    if folder is None:
+        return _Done(None, part._replace(content=bytes(part.content)))
+    if not (Path(folder) / LOCK_NAME).exists():
+        return _Done(None, None)
+    return _Done(stage(Path(folder), table_rows, part.first, part.content, part.rows, part.verdicts), None)
+
+
+def _wait_for_a_worker(client: Any, address: str) -> None:
+    """Wait until a worker is connected.
+
+    Raises
+    ------
+    BackendError
+        None has come.
+    """
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_S)
+    except TimeoutError:
+        raise BackendError(_no_worker_text(address)) from None
+
+
+def _check_versions(client: Any) -> None:
+    """Refuse workers whose rows could differ from those of this machine."""
+    here = fingerprint()
+    different = [address for address, there in client.run(fingerprint).items() if tuple(there) != here]
+    if different:
+        raise BackendError(_other_versions_text(f"the workers {', '.join(different)}"))
+
+
+def _no_worker_text(address: str | None) -> str:
+    """Say that there is no worker and how to start one."""
+    if address is None:
+        return "the Dask worker of this process has ended"
+    return f"the Dask scheduler at {address} has no worker; start one with: dask worker {address}"
+
+
+def _other_versions_text(who: str) -> str:
+    """Say that versions differ."""
+    return (
+        f"{who} and this machine have different versions of boulder-sweep, Python or NumPy; install the same "
+        f"versions everywhere"
+    )
+
+
+def _silenced_loggers() -> dict[str, int]:
+    """Silence the loggers of Dask, whose messages the notes of a run replace; return their levels."""
+    own = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+    levels = {}
+    for name in (*own, "tornado.application", "asyncio"):
+        logger = logging.getLogger(name)
+        levels[name] = logger.level
+        logger.setLevel(logging.CRITICAL + 1)
+    return levels

@@ -1,0 +1,94 @@
+"""What a worker does with rows: simulate and judge them, retry failures, encode parts.
+
+A block that raises is tried again, then halved until the rows that raise are alone; those become rows of
+verdict ``error``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from boulder_sweep.columns import VERDICTS
+from boulder_sweep.judge.judged import Judged, joined, not_computed
+from boulder_sweep.text import one_line
+
+if TYPE_CHECKING:
+    from boulder_sweep.designs import DesignBlock
+
+MakeBlock = Callable[[int, int], "DesignBlock"]
+Evaluate = Callable[["DesignBlock"], Judged]
+_TRIES = 2
+_FAILURES_BUDGET = 5_000
+"""Failed tries after which blocks are no longer halved: then something is wrong with all of them."""
+
+
+class EncodedPart(NamedTuple):
+    """A part of the table as the bytes of its file."""
+
+    first: int
+    rows: int
+    content: memoryview | bytes
+    verdicts: dict[str, int]
+    """Number of rows of each verdict and reason, keyed as by `verdict_counts`."""
+
+
+class Computation:
+    """How the rows of one sweep are computed and encoded; the same for every worker, and picklable.
+
+    Parameters
+    ----------
+    evaluate
+        Simulates and judges a block.
+    make_block
+        Gives the inputs of some rows.
+    metadata
+        Metadata of the files of parts.
+    """
+
+    def __init__(self, evaluate: Evaluate, make_block: MakeBlock, metadata: Mapping[bytes, bytes]):
+        self._evaluate = evaluate
+        self._make_block = make_block
+        self._metadata = dict(metadata)
+        self._failures = 0
+
+    def judged(self, start: int, stop: int, tries: int = _TRIES) -> Judged:
+        """Compute the rows [start, stop); those that fail every time are rows of verdict ``error``."""
+        reason = ""
+        for _ in range(tries):
+            try:
+                return self._evaluate(self._make_block(start, stop))
+            except Exception as problem:
+                self._failures += 1
+                reason = one_line(problem)
+        if stop - start > 1 and self._failures < _FAILURES_BUDGET:
+            middle = (start + stop) // 2
+            return joined([self.judged(start, middle, 1), self.judged(middle, stop, 1)])
+        return failed_rows(stop - start, f"the computation of this design failed: {reason}")
+
+    def encoded(self, first: int, pieces: Sequence[Judged]) -> EncodedPart:
+        """Encode consecutive judged rows from `first` on as one part."""
+        from boulder_sweep.store.schema import encode, part_table  # imports pyarrow
+
+        judged = joined(list(pieces))
+        rows = len(judged.verdict)
+        table = part_table(self._make_block(first, first + rows), judged, self._metadata)
+        return EncodedPart(first, rows, encode(table), verdict_counts(judged))
+
+
+def failed_rows(count: int, reason: str) -> Judged:
+    """Return rows of verdict ``error`` that all have the same reason."""
+    return not_computed((reason,), np.zeros(count, dtype=np.int32))
+
+
+def verdict_counts(judged: Judged) -> dict[str, int]:
+    """Count the rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` without one."""
+    width = len(judged.reasons)
+    counts = np.bincount(judged.verdict.astype(np.int64) * width + judged.reason)
+    found = {}
+    for code in np.flatnonzero(counts):
+        verdict, reason = VERDICTS[code // width], judged.reasons[code % width]
+        found[f"{verdict}/{reason}" if reason else verdict] = int(counts[code])
+    return dict(sorted(found.items()))

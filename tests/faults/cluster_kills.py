@@ -1,0 +1,142 @@
+"""Kill workers and schedulers of Dask clusters at random instants, and resume what ended.
+
+Prints one JSON object: kills, tables finished, and what was wrong. Run from the root of the repository as
+``python -m tests.faults.cluster_kills FOLDER WORKER_KILLS SCHEDULER_KILLS SEED``.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from boulder_sweep.errors import ClusterLostError
+from boulder_sweep.runner.sweeper import Progress, run
+from boulder_sweep.store import status
+from boulder_sweep.store.reader import read_table
+from tests.faults.clusters import Cluster
+from tests.faults.faulty import slowly
+from tests.runner.grids import grid_of, same_bits
+
+ROWS, ROWS_PER_PART = 40_000, 6_000
+LONGEST_STANDSTILL_S = 15.0
+
+
+class Watch:
+    """Sees how long a run stands still without a word."""
+
+    def __init__(self) -> None:
+        self.longest_s = 0.0
+        self.under_way = threading.Event()
+        self._last = time.monotonic()
+        self._seen: tuple[int, int] = (-1, -1)
+
+    def __call__(self, progress: Progress) -> None:
+        seen = (progress.rows_done, len(progress.notes))
+        if seen != self._seen:
+            self._seen, self._last = seen, time.monotonic()
+        self.longest_s = max(self.longest_s, time.monotonic() - self._last)
+        self.under_way.set()
+
+
+def one_run(out: Path, address: str, watch: Watch, faults: list[str]) -> bool:
+    """Resume a run; True if it finished."""
+    try:
+        run(
+            grid_of(ROWS),
+            out,
+            backend="dask",
+            scheduler=address,
+            resume=True,
+            progress=watch,
+            rows_per_part=ROWS_PER_PART,
+            simulate=slowly,
+        )
+    except ClusterLostError as lost:
+        if "rows are safe. Resume with: " not in str(lost):
+            faults.append(f"no way to go on: {lost}")
+        return False
+    finally:
+        if watch.longest_s > LONGEST_STANDSTILL_S:
+            faults.append(f"stood still for {watch.longest_s:.0f} s")
+    return True
+
+
+def disturbed(out: Path, cluster: Cluster, kill: Any, wait_s: float, faults: list[str]) -> bool:
+    """Resume a run and kill something a while after it got going; True if it finished."""
+    watch = Watch()
+
+    def kill_later() -> None:
+        if watch.under_way.wait(60):
+            time.sleep(wait_s)
+            kill()
+
+    killer = threading.Thread(target=kill_later)
+    killer.start()
+    finished = one_run(out, cluster.address, watch, faults)
+    killer.join()
+    found = status(out, verify=True)
+    if found.damaged:
+        faults.append(f"damaged: {found.damaged}")
+    if len(read_table(out)) != found.rows_done:
+        faults.append("recorded rows are missing")
+    return finished
+
+
+def check(out: Path, whole: Path, faults: list[str]) -> None:
+    """Compare a finished table with the undisturbed one: rows, and the bytes of every part."""
+    table = read_table(out)
+    if table["design_id"].to_pylist() != list(range(ROWS)) or not same_bits(table, read_table(whole)):
+        faults.append(f"{out} differs")
+    for path in whole.glob("rows-*.parquet"):
+        if (out / path.name).read_bytes() != path.read_bytes():
+            faults.append(f"{out / path.name} differs")
+
+
+def main() -> None:
+    """Kill as often as requested and print the findings."""
+    folder, worker_kills, scheduler_kills, seed = Path(sys.argv[1]), *map(int, sys.argv[2:5])
+    chance = random.Random(seed)
+    faults: list[str] = []
+    whole = folder / "whole"
+    begun = time.monotonic()
+    run(grid_of(ROWS), whole, jobs=2, rows_per_part=ROWS_PER_PART, simulate=slowly)
+    length_s = time.monotonic() - begun
+    done = {"worker": 0, "scheduler": 0}
+    tables = 0
+    with Cluster(2, folder) as cluster:
+
+        def kill_worker() -> None:
+            cluster.start_worker()  # before, so that there is another soon
+            cluster.kill_worker(chance.randrange(len(cluster.workers) - 1))
+            done["worker"] += 1
+
+        while done["worker"] < worker_kills:
+            out = folder / f"workers-{tables}"
+            while not disturbed(out, cluster, kill_worker, chance.uniform(0.0, 0.8 * length_s), faults):
+                pass
+            check(out, whole, faults)
+            tables += 1
+    out, finished = folder / "schedulers-0", True
+    while done["scheduler"] < scheduler_kills or not finished:
+        with Cluster(1, folder) as cluster:
+
+            def kill_scheduler(cluster: Cluster = cluster) -> None:
+                if done["scheduler"] < scheduler_kills:
+                    cluster.kill_scheduler()
+                    done["scheduler"] += 1
+
+            finished = disturbed(out, cluster, kill_scheduler, chance.uniform(0.0, 0.4 * length_s), faults)
+            if finished:
+                check(out, whole, faults)
+                tables += 1
+                out = folder / f"schedulers-{tables}"
+    print(json.dumps({"kills": done, "tables": tables, "faults": faults}))
+
+
+if __name__ == "__main__":
+    main()

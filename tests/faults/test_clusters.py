@@ -1,0 +1,151 @@
+"""Dask clusters that lose workers or their scheduler, have none, or stop answering."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from boulder_sweep.errors import BackendError, ClusterLostError
+from boulder_sweep.runner import cluster as backend
+from boulder_sweep.runner.sweeper import run
+from boulder_sweep.store import status
+from boulder_sweep.store.reader import read_table
+from tests.faults import faulty
+from tests.faults.clusters import Cluster
+from tests.faults.faulty import slowly
+from tests.faults.processes import ROOT
+from tests.runner.grids import grid_of, plausible, same_bits
+
+pytestmark = pytest.mark.faults
+
+WORKER_KILLS, SCHEDULER_KILLS = 20, 10
+
+
+@pytest.mark.slow
+def test_many_kills_lose_no_row_and_double_none(tmp_path):
+    seed = int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
+    kills = (str(WORKER_KILLS), str(SCHEDULER_KILLS))
+    command = [sys.executable, "-m", "tests.faults.cluster_kills", str(tmp_path), *kills, str(seed)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900)
+    assert done.returncode == 0, f"TEST_SEED={seed}: {done.stderr[-3000:]}"
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found["kills"] == {"worker": WORKER_KILLS, "scheduler": SCHEDULER_KILLS}
+    assert found["faults"] == [], f"TEST_SEED={seed}"
+    assert found["tables"] >= 2
+
+
+def test_a_scheduler_without_workers_says_how_to_start_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(backend, "CONNECT_S", 2.0)
+    with Cluster(0, tmp_path) as cluster:
+        command = f"dask worker {cluster.address}"
+        with pytest.raises(BackendError, match=f"the Dask scheduler at {cluster.address} has no worker.*{command}$"):
+            run(grid_of(10), tmp_path / "out", backend="dask", scheduler=cluster.address, simulate=plausible)
+    assert not (tmp_path / "out").exists()
+
+
+def test_losing_the_last_worker_ends_the_run_resumable(tmp_path, monkeypatch):
+    monkeypatch.setattr(backend, "NO_WORKER_S", 2.0)
+    rows, out, told = 40_000, tmp_path / "out", []
+    with Cluster(1, tmp_path) as cluster:
+        threading.Timer(1.5, cluster.kill_worker).start()
+        how = {"backend": "dask", "scheduler": cluster.address, "rows_per_part": 5000, "simulate": slowly}
+        with pytest.raises(
+            ClusterLostError, match=r"has no worker; start one with.*rows are safe. Resume with"
+        ) as lost:
+            run(grid_of(rows), out, progress=told.append, **how)
+        assert lost.value.exit_code == 130
+        notes = told[-1].notes
+        assert any(note.startswith("lost worker tcp://127.0.0.1") for note in notes)
+        assert any(note.startswith("no worker left; waiting 2 s") for note in notes)
+        assert not status(out).running
+        cluster.start_worker(wait=True)
+        run(grid_of(rows), out, resume=True, **how)
+    run(grid_of(rows), tmp_path / "whole", rows_per_part=5000, simulate=slowly)
+    assert same_bits(read_table(out), read_table(tmp_path / "whole"))
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_hangs_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.setattr(backend, "CONNECT_S", 3.0)
+    out = tmp_path / "out"
+    with Cluster(1, tmp_path) as cluster:
+        threading.Timer(1.5, cluster.pause_scheduler).start()
+        begun = time.monotonic()
+        with pytest.raises(ClusterLostError, match=rf"scheduler at {cluster.address} was lost.*Resume with"):
+            run(grid_of(100_000), out, backend="dask", scheduler=cluster.address, simulate=slowly)
+        assert time.monotonic() - begun < 25
+    assert status(out, verify=True).damaged == {}
+
+
+@pytest.mark.slow
+def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypatch):
+    out, rows = tmp_path / "out", 8
+    run(grid_of(rows), tmp_path / "whole", simulate=plausible)
+    whole = read_table(tmp_path / "whole")
+    poison = whole["subgrade_reaction_MN_m3"][5].as_py()
+    monkeypatch.setenv(faulty.POISON, str(round(poison, 6)))
+    monkeypatch.setenv(faulty.MAIN_PROCESS, str(os.getpid()))
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+    with Cluster(1, tmp_path) as cluster:
+        stop = threading.Event()
+
+        def replace_workers() -> None:
+            while not stop.wait(0.1):
+                for worker in [worker for worker in cluster.workers if worker.poll() is not None]:
+                    cluster.workers.remove(worker)
+                    cluster.start_worker()
+
+        replacing = threading.Thread(target=replace_workers)
+        replacing.start()
+        try:
+            run(grid_of(rows), out, backend="dask", scheduler=cluster.address, simulate=faulty.ends_its_worker)
+        finally:
+            stop.set()
+            replacing.join()
+    table = read_table(out)
+    assert table["reason"][5].as_py() == "every worker that computed this design died"
+    others = [row for row in range(rows) if row != 5]
+    assert same_bits(table.take(others), whole.take(others))
+
+
+def test_workers_that_do_not_share_the_folder_send_their_parts(tmp_path, monkeypatch):
+    """Their bytes are written here, and are the same."""
+    monkeypatch.setattr(backend, "LOCK_NAME", "a file that no worker sees")
+    rows, how = 3000, {"rows_per_part": 1000, "simulate": plausible}
+    summary = run(grid_of(rows), tmp_path / "out", backend="dask", jobs=2, **how)
+    assert any("does not share the output folder" in note for note in summary.notes)
+    run(grid_of(rows), tmp_path / "whole", **how)
+    for path in (tmp_path / "whole").glob("rows-*.parquet"):
+        assert (tmp_path / "out" / path.name).read_bytes() == path.read_bytes()
+
+
+def test_whatever_dask_opens_here_is_bound_to_loopback(tmp_path):
+    """Scheduler, worker and dashboards of a cluster that is started by the run itself."""
+    before = _listening()
+    cluster = backend.Cluster(1, None)
+    try:
+        opened = _listening() - before
+    finally:
+        cluster.close()
+    assert opened
+    assert {address for address, _ in opened} == {"0100007F"}
+
+
+def _listening() -> set[tuple[str, str]]:
+    """Addresses, in hexadecimal, and ports on which this process listens."""
+    own = {link.readlink().name for link in Path("/proc/self/fd").iterdir() if link.is_symlink() and link.exists()}
+    found = set()
+    for name in ("tcp", "tcp6"):
+        for line in Path(f"/proc/self/net/{name}").read_text().splitlines()[1:]:
+            words = line.split()
+            if words[3] == "0A" and f"socket:[{words[9]}]" in own:
+                address, port = words[1].split(":")
+                found.add((address, port))
+    return found

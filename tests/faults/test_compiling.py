@@ -1,0 +1,93 @@
+"""Signals while the kernels are compiled for the first time."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.faults.processes import ROOT
+
+pytestmark = [pytest.mark.faults, pytest.mark.slow, pytest.mark.compiled]
+
+TRIES = 20
+LONGEST_S = 3.0
+GRID = """\
+name: small grid
+boulder: {length: 1.65 m, width: 1.68 m, height: [1.6, 2.6, 3.4] m, density: 2596 kg/m^3}
+site: {embedment_ratio: 0.5}
+soil: {density: 1859.9 kg/m^3, friction_angle: 43.2 deg, subgrade_reaction: [60, 95] MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start a command with no compiled kernels on the disk, and wait until it compiles them."""
+    (tmp_path / "grid.yaml").write_text(GRID)
+    started = []
+
+    def begin(*words):
+        cache = tmp_path / f"cache-{len(started)}"
+        process = subprocess.Popen(
+            [sys.executable, "-m", "boulder_sweep", *words],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'kernels'}", "BOULDER_SWEEP_CACHE_DIR": str(cache)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        while not list(cache.rglob("*.nbi")):  # the first small function is ready
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        return process
+
+    yield begin
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def stopped(process: subprocess.Popen[str], *signals: int) -> tuple[int, str, float]:
+    """Send signals; exit code, what was told on stderr, and how long it took."""
+    begun = time.monotonic()
+    for number in signals:
+        process.send_signal(number)
+        time.sleep(0.1)
+    _, told = process.communicate(timeout=200)
+    return process.returncode, told, time.monotonic() - begun
+
+
+def test_the_first_signal_stops_a_run_soon_and_without_a_traceback(start, tmp_path):
+    seed = int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
+    chance = random.Random(seed)
+    for attempt in range(TRIES):
+        process = start("run", "grid.yaml", "-o", f"out-{attempt}")
+        time.sleep(chance.uniform(0.0, 8.0))
+        number = chance.choice([signal.SIGINT, signal.SIGTERM])
+        code, told, seconds = stopped(process, number)
+        assert code == 128 + number, f"TEST_SEED={seed}: {told}"
+        assert seconds < LONGEST_S, f"TEST_SEED={seed}: {seconds:.1f} s"
+        assert told.splitlines()[-1].startswith(f"interrupted by {signal.Signals(number).name}; 0 of 6 rows are safe.")
+        assert "Traceback" not in told
+        assert "ignored" not in told
+        assert not (tmp_path / f"out-{attempt}").exists()
+
+
+def test_a_command_that_is_no_run_stops_as_soon(start):
+    code, told, seconds = stopped(start("simulate", "grid.yaml"), signal.SIGINT)
+    assert (code, told.splitlines()[-1]) == (130, "interrupted by SIGINT")
+    assert seconds < LONGEST_S
+
+
+def test_the_second_signal_ends_it_at_once(start):
+    code, told, seconds = stopped(start("run", "grid.yaml"), signal.SIGINT, signal.SIGINT)
+    assert code in (-signal.SIGINT, 130)  # 130 where the first was quicker
+    assert seconds < 1.0
+    assert "Traceback" not in told

@@ -1,0 +1,149 @@
+"""Compiled kernels are pickles: only a folder that nobody else can write is used for them."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from boulder_kernels import _jit
+
+ROOT = Path(__file__).parents[2]
+OTHER_USER = 65534
+
+
+@pytest.fixture
+def place() -> Iterator[Path]:
+    """A folder of this user in the shared temporary folder; that of pytest is not open to other users."""
+    folder = Path(tempfile.mkdtemp(prefix="test-cache-"))
+    folder.chmod(0o755)
+    yield folder
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def named_only(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Leave one candidate for the folder: the named one."""
+    monkeypatch.setenv(_jit.CACHE_VARIABLE, str(folder))
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    monkeypatch.setattr(_jit.tempfile, "gettempdir", lambda: "/dev/null")
+
+
+def test_new_folders_are_closed_to_others(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    named_only(monkeypatch, place / "a" / "b")
+    before = os.umask(0)
+    try:
+        folder = _jit._cache_folder()
+    finally:
+        os.umask(before)
+    assert folder is not None
+    for made in (Path(folder), place / "a" / "b", place / "a"):
+        assert stat.S_IMODE(made.stat().st_mode) == 0o700
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o757, 0o1777])
+@pytest.mark.parametrize("where", ["itself", "above"])
+def test_a_folder_that_others_can_write_is_refused(
+    place: Path, monkeypatch: pytest.MonkeyPatch, mode: int, where: str
+) -> None:
+    """A sticky folder above is safe, as the shared temporary folder: nobody else can replace what lies in it."""
+    named_only(monkeypatch, place / "cache")
+    folder = _jit._cache_folder()
+    assert folder is not None
+    (Path(folder) if where == "itself" else place).chmod(mode)
+    if where == "above" and mode & stat.S_ISVTX:
+        assert _jit._cache_folder() == folder
+    else:
+        with pytest.warns(UserWarning, match="other users can write into"):
+            assert _jit._cache_folder() is None
+
+
+def test_a_folder_of_another_user_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Made by a second user where this one may do that, else seen as one."""
+    folder = place / "cache"
+    folder.mkdir(mode=0o755)
+    if os.getuid() == 0:
+        os.chown(folder, OTHER_USER, OTHER_USER)
+    else:
+        user = os.getuid() + 1
+        monkeypatch.setattr(_jit.os, "getuid", lambda: user)
+    named_only(monkeypatch, folder)
+    with pytest.warns(UserWarning, match="belongs to another user"):
+        assert _jit._cache_folder() is None
+
+
+def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is checked is what is used, though the link may be changed afterwards."""
+    (place / "real").mkdir()
+    (place / "link").symlink_to(place / "real")
+    named_only(monkeypatch, place / "link")
+    folder = _jit._cache_folder()
+    assert folder is not None
+    assert Path(folder).parent == place / "real"
+
+
+TINY = """
+from boulder_kernels import _jit
+
+@_jit.kernel
+def tiny(x):
+    return x + 1.0
+
+print(tiny(1.0), _jit.CACHE_FOLDER)
+"""
+
+
+class Planted:
+    """Makes a file when it is loaded."""
+
+    def __init__(self, mark: Path):
+        self.mark = mark
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return os.mkdir, (str(self.mark),)
+
+
+def run_tiny(place: Path) -> subprocess.CompletedProcess[str]:
+    """Compile and run a small kernel with a cache at a place, in another process."""
+    environment = {
+        "PATH": os.environ["PATH"],
+        "PYTHONPATH": f"{ROOT / 'kernels'}",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        _jit.CACHE_VARIABLE: str(place / "cache"),
+        "XDG_CACHE_HOME": "/dev/null",
+    }
+    command = [sys.executable, "-W", "always", str(place / "tiny.py")]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, cwd="/")
+
+
+@pytest.mark.compiled
+def test_a_planted_file_does_not_run(place: Path) -> None:
+    """It would, from a folder that is trusted: else this test would show nothing."""
+    (place / "tiny.py").write_text(TINY)
+    assert run_tiny(place).stdout.startswith("2.0 ")
+    (index,) = (place / "cache").rglob("*.nbi")
+    mark = place / "mark"
+    index.write_bytes(pickle.dumps(Planted(mark)))
+    run_tiny(place)
+    assert mark.exists()
+    mark.rmdir()
+    (place / "cache").chmod(0o777)
+    done = run_tiny(place)
+    assert done.stdout.startswith("2.0 ")
+    assert str(place) not in done.stdout
+    assert "other users can write into" in done.stderr
+    assert not mark.exists()
+    (place / "cache").chmod(0o755)
+    if os.getuid() == 0:
+        shutil.chown(place / "cache", OTHER_USER)
+        done = run_tiny(place)
+        assert str(place) not in done.stdout
+        assert "belongs to another user" in done.stderr
+        assert not mark.exists()
