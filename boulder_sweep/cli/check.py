@@ -6,6 +6,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import CHECK_EXAMPLES, set_option
+from boulder_sweep.cli.output import show
 
 
 @click.command(short_help="Check a file: all mistakes at once, with their lines.", epilog=CHECK_EXAMPLES)
@@ -16,5 +17,5 @@ def check(grid: str, overrides: tuple[str, ...]) -> int:
     from boulder_sweep.cli import console
 
     sweep = load_sweep(grid, overrides, quiet=False)
-    click.echo("\n".join([f"{grid}: valid", *console.grid_lines(sweep)]))
+    show(f"{grid}: valid", *console.grid_lines(sweep))
     return 0

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from boulder_sweep.cli.output import say
 from boulder_sweep.columns import BY_NAME, VERDICTS
 from boulder_sweep.text import duration_text, printable, size_text
 
@@ -22,16 +23,6 @@ if TYPE_CHECKING:
 
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
-
-
-def say(text: str) -> None:
-    """Write lines to stderr; what a terminal would act on is escaped."""
-    print("\n".join(map(printable, text.split("\n"))), file=sys.stderr, flush=True)
-
-
-def show(lines: Iterable[str]) -> None:
-    """Write lines to stdout; what a terminal would act on is escaped, line breaks within a line as well."""
-    print("\n".join(map(printable, lines)))
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.options import json_option
+from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
 Examples:
@@ -40,15 +41,15 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
         if trajectory is not None:
             found.trajectory.to_parquet(trajectory)
     elif plot is not None or trajectory is not None:
-        click.echo("note: the design cannot be computed; there is no time history", err=True)
+        say("note: the design cannot be computed; there is no time history")
     if as_json:
-        click.echo(json.dumps(found.as_dict()))
+        show(json.dumps(found.as_dict()))
         return 0
-    click.echo("\n".join(value_lines({"design": found.inputs, "outcome": found.stored})))
+    show(*value_lines({"design": found.inputs, "outcome": found.stored}))
     for name in found.unequal:
-        click.echo(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
+        show(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
     for line in found.changed:
-        click.echo(f"changed since: {line}")
+        show(f"changed since: {line}")
     if not found.unequal:
-        click.echo("computed again: the same to the last bit")
+        show("computed again: the same to the last bit")
     return 0

@@ -10,6 +10,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import set_option, units_option
+from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
 Examples:
@@ -45,7 +46,7 @@ def explore(
         raise click.UsageError(f"{case} holds {sweep.n_designs:,} designs, numbered from 0; there is no {design}")
     target = Path(page or f"{sweep.name.replace('/', '-').replace(' ', '-')}.html")
     written = write_explorer(sweep, design, target, units=units, command=shlex.join(["sweep", *sys.argv[1:]]))
-    click.echo(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")
+    show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")
     if not no_open and not webbrowser.open(written.resolve().as_uri()):
-        click.echo("note: there is no browser here to open it", err=True)
+        say("note: there is no browser here to open it")
     return 0

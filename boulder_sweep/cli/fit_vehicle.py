@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from boulder_sweep.cli.options import json_option
+from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
     from boulder_sweep.crash_tests.fitting import VehicleFit
@@ -45,8 +46,8 @@ def fit_vehicle(pulse: str, mass: str, speed: str | None, plot: str | None, as_j
     if plot is not None:
         fit.plot(plot)
     for warning in fit.warnings:
-        click.echo(f"caution: {warning}", err=True)
-    click.echo(json.dumps(fit.to_dict()) if as_json else "\n".join(lines(fit)))
+        say(f"caution: {warning}")
+    show(*([json.dumps(fit.to_dict())] if as_json else lines(fit)))
     return 0
 
 

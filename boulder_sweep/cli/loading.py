@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from boulder_sweep.cli.output import say
+
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 
 def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
     """Load settings and print the notes on them."""
-    from boulder_sweep.cli.console import say
     from boulder_sweep.settings import load
 
     sweep = load(path, overrides)

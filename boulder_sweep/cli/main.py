@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from boulder_sweep.cli.fit_vehicle import fit_vehicle
 from boulder_sweep.cli.need import need
 from boulder_sweep.cli.new import new
 from boulder_sweep.cli.options import GROUP_EPILOG, OrderedGroup, version_option
+from boulder_sweep.cli.output import say
 from boulder_sweep.cli.plot import plot
 from boulder_sweep.cli.report import report
 from boulder_sweep.cli.run import run
@@ -97,20 +99,27 @@ def execute(arguments: Sequence[str] | None = None) -> int:
     except click.exceptions.Exit as end:  # after --help or --version
         return end.exit_code
     except click.ClickException as error:
-        error.show()
+        say(_usage_text(error))
         return EXIT_WRONG_USE
     except BrokenPipeError:
         # The reader of the output has gone (sweep status ... | head); keep Python from reporting it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Interrupted as stop:
-        print(stop, file=sys.stderr)
+        say(str(stop))
         return stop.exit_code
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        say("interrupted")
         return EXIT_INTERRUPTED
     except Exception as error:
         return _report(error, verbose=bool({"-v", "--verbose"} & set(words)))
+
+
+def _usage_text(error: click.ClickException) -> str:
+    """Return what click says of wrong use, with its line on usage if there is one."""
+    with io.StringIO() as text:
+        error.show(text)
+        return text.getvalue().rstrip()
 
 
 def _invoke(words: list[str]) -> int:
@@ -123,7 +132,7 @@ def _invoke(words: list[str]) -> int:
 def _report(error: Exception, verbose: bool) -> int:
     """Say what went wrong, and return the exit code."""
     if isinstance(error, BoulderSweepError):
-        print(error.user_message(), file=sys.stderr)
+        say(error.user_message())
         return error.exit_code
     if verbose:
         import traceback
@@ -131,7 +140,7 @@ def _report(error: Exception, verbose: bool) -> int:
         traceback.print_exception(error)
     if isinstance(error, OSError):  # a place that cannot be read or written
         place = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
-        print(f"error: {place}", file=sys.stderr)
+        say(f"error: {place}")
         return EXIT_WRONG_USE
-    print(f"internal error: {type(error).__name__}: {error}; {REPORT}", file=sys.stderr)
+    say(f"internal error: {type(error).__name__}: {error}; {REPORT}")
     return EXIT_INTERNAL

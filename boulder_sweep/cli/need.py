@@ -8,6 +8,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
 Examples:
@@ -61,7 +62,7 @@ def need(
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.printing import need_lines
     from boulder_sweep.answers.tables import checked_parquet
-    from boulder_sweep.cli.console import counted, say
+    from boulder_sweep.cli.console import counted
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
     sweep = load_sweep(grid, overrides, quiet)
@@ -84,9 +85,9 @@ def need(
         jobs=jobs,
     )
     if as_json:
-        click.echo(json.dumps(found.to_dict()))
+        show(json.dumps(found.to_dict()))
     else:
-        click.echo("\n".join(need_lines(found)))
+        show(*need_lines(found))
     if not quiet:
         counts = ", ".join(f"{word} {count:,}" for word, count in found.counts().items())
         say(f"{counted(len(found), 'row')}: {counts}; {counted(found.simulated, 'simulation')}")

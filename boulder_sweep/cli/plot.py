@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from boulder_sweep.cli.output import say, show
+
 EXAMPLES = """\b
 Examples:
   sweep plot m30-sizing.sweep
@@ -56,10 +58,10 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None)
     for name, value in held.items():
         taken = shown.fixed.get(name, value)
         if abs(taken - value) > 1e-6 * abs(value):
-            click.echo(f"note: {name} is {taken:.6g} in this map, the value nearest to {value:.6g}", err=True)
+            say(f"note: {name} is {taken:.6g} in this map, the value nearest to {value:.6g}")
     if finished.rows_done < finished.rows:
-        click.echo(f"note: the run is not finished; {shown.total:,} designs are drawn", err=True)
-    click.echo(f"{target}: {shown.count:,} of {shown.total:,} designs")
+        say(f"note: the run is not finished; {shown.total:,} designs are drawn")
+    show(f"{target}: {shown.count:,} of {shown.total:,} designs")
     return 0
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from boulder_sweep.cli.options import units_option
+from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
 Examples:
@@ -43,5 +44,5 @@ def report(out: str, page: str | None, designs: tuple[int, ...], units: str) -> 
     target = Path(page or f"{str(beside).removesuffix('.sweep')}.html")
     command = shlex.join(["sweep", *sys.argv[1:]])
     written = write_report(folder, target, designs=designs, units=units, command=command)
-    click.echo(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")
+    show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")
     return 0

@@ -13,6 +13,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import RUN_EXAMPLES, json_option, run_options, set_option, talk_options
+from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -47,27 +48,27 @@ def run(
     if dry_run:
         return _dry_run(sweep, target, options, as_json)
     if verbose:
-        console.say("\n".join(console.value_lines(sweep.resolved())))
+        say("\n".join(console.value_lines(sweep.resolved())))
     if not quiet:
-        console.say(f"{sweep.name}: {console.counted(sweep.n_designs, 'design')} into {target}")
+        say(f"{sweep.name}: {console.counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.runner.sweeper import run as run_sweep
 
     notes = console.Notes()
-    with console.progress(quiet, notes) as show:
+    with console.progress(quiet, notes) as shown:
         summary = run_sweep(
             sweep,
             target,
-            progress=show,
+            progress=shown,
             command=shlex.join(["sweep", *sys.argv[1:]]),
             resume_command=_resume_command(grid, target, overrides, accuracy, options),
             **options,
         )
     for note in notes.new(summary.notes):
-        console.say(f"note: {note}")
+        say(f"note: {note}")
     if as_json:
-        click.echo(json.dumps({"name": sweep.name, **summary.to_dict()}))
+        show(json.dumps({"name": sweep.name, **summary.to_dict()}))
     else:
-        console.show(console.summary_lines(sweep.name, summary))
+        show(*console.summary_lines(sweep.name, summary))
     return summary.exit_code
 
 
@@ -79,9 +80,9 @@ def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) ->
     effort = estimate(sweep, out, jobs=options["jobs"], resume=options["resume"])
     if as_json:
         record = {"settings": sweep.resolved(), "out": str(out), "estimate": effort.to_dict()}
-        click.echo(json.dumps(record | {"objections": effort.objections}))
+        show(json.dumps(record | {"objections": effort.objections}))
     else:
-        console.show(console.dry_run_lines(sweep, out, effort))
+        show(*console.dry_run_lines(sweep, out, effort))
     return 0
 
 

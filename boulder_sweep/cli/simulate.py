@@ -8,6 +8,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import SIMULATE_EXAMPLES, json_option, set_option, talk_options
+from boulder_sweep.cli.output import say, show
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 
 
@@ -47,19 +48,19 @@ def simulate(
         held = console.counted(sweep.n_designs, "design")
         raise click.UsageError(f"{case} holds {held}, numbered from 0; there is no {number}")
     if design is None and sweep.n_designs > 1 and not quiet:
-        console.say(f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)")
+        say(f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)")
     reason = sweep.block(number, number + 1).reasons[0]
     if reason:
-        console.say(f"design {number} cannot be computed: {reason}")
+        say(f"design {number} cannot be computed: {reason}")
         return EXIT_SOME_ROWS_FAILED
     if verbose:
-        console.say("\n".join(console.value_lines(sweep.resolved())))
+        say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design
 
     result = simulate_design(sweep, number)
     # First of all: a picture may be impossible where nothing moved, a film takes its time.
     values = result.summary()
-    click.echo(json.dumps(values) if as_json else "\n".join(console.value_lines(values)))
+    show(*([json.dumps(values)] if as_json else console.value_lines(values)))
     if plot is not None:
         result.plot(plot)
     if trajectory is not None:

@@ -7,6 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.options import STATUS_EXAMPLES, json_option
+from boulder_sweep.cli.output import show
 from boulder_sweep.errors import EXIT_INTERNAL
 
 
@@ -20,5 +21,5 @@ def status(out: str, verify: bool, as_json: bool) -> int:
     from boulder_sweep.store import status as look
 
     found = look(out, verify=verify)
-    console.show([json.dumps(found.to_dict(), default=str)] if as_json else console.status_lines(found))
+    show(*[json.dumps(found.to_dict(), default=str)] if as_json else console.status_lines(found))
     return EXIT_INTERNAL if found.damaged else 0

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
     from boulder_sweep.tradeoff.study import Tradeoff
@@ -52,7 +53,6 @@ def tradeoff(
     sums over elements, both readings of the paper: errors, changed verdicts, and CPU time per design. With -o the table
     is written as Parquet and CSV, and a picture.
     """
-    from boulder_sweep.cli.console import say
     from boulder_sweep.settings import load
     from boulder_sweep.tradeoff.study import measure
 
@@ -67,16 +67,16 @@ def tradeoff(
     found = measure(sweep, designs=designs, seconds=seconds, tell=None if quiet else say)
     files = [] if out is None else found.write(out)
     if as_json:
-        click.echo(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))
+        show(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))
         return 0
     if found.points:
         _show(found)
     for sentence in found.recommendation():
-        click.echo(sentence)
+        show(sentence)
     for method in found.left_out:
-        click.echo(f"left out for time: {method.readings}, {method.soil}, {method.steps}")
+        show(f"left out for time: {method.readings}, {method.soil}, {method.steps}")
     for file in files:
-        click.echo(f"written  {file}")
+        show(f"written  {file}")
     return 0
 
 

@@ -8,6 +8,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
 Examples:
@@ -23,7 +24,7 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
         from boulder_sweep.answers.published import PUBLISHED
 
         for own in PUBLISHED:
-            click.echo(f"{own.input:<24}{own.cov:<14}{own.of}\n{'':<38}{own.source}")
+            show(f"{own.input:<24}{own.cov:<14}{own.of}\n{'':<38}{own.source}")
         ctx.exit()
 
 
@@ -76,7 +77,7 @@ def uncertainty(
     from boulder_sweep.answers.printing import uncertainty_lines
     from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
-    from boulder_sweep.cli.console import counted, say
+    from boulder_sweep.cli.console import counted
 
     sweep = load_sweep(grid, overrides, quiet)
     if out is not None:
@@ -90,9 +91,9 @@ def uncertainty(
         sweep, half_width=half_width, confidence=confidence, margin=margin, seed=seed, rare=rare, jobs=jobs
     )
     if as_json:
-        click.echo(json.dumps(found.to_dict()))
+        show(json.dumps(found.to_dict()))
     else:
-        click.echo("\n".join(uncertainty_lines(found)))
+        show(*uncertainty_lines(found))
     if not quiet:
         drawn = sum(found.arrow["p_pass_designs"].to_pylist())
         say(f"{counted(len(found), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {seed}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boulder_sweep.cli.options import json_option
+from boulder_sweep.cli.output import show
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
@@ -53,7 +54,7 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         text = [found.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
     if out is not None:
         text += ["", *(f"written  {file}" for file in content["files"])]
-    click.echo(json.dumps(content) if as_json else "\n".join(text))
+    show(*([json.dumps(content)] if as_json else text))
     return 0 if found.holds else 1
 
 

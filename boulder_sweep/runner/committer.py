@@ -104,8 +104,9 @@ class Committer(threading.Thread):
             if self._stopped.is_set():
                 return
             try:
-                paths = [self._folder.path / name for name in names]
-                tables = [pq.read_table(path, page_checksum_verification=True) for path in paths]
+                contents = [(self._folder.path / name).read_bytes() for name in names]
+                sources = [pa.BufferReader(content) for content in contents]
+                tables = [pq.read_table(source, page_checksum_verification=True) for source in sources]
             except (OSError, pa.ArrowException) as problem:
                 raise DamagedError(f"{self._folder.path} was damaged during the run: {problem}") from problem
             first = self._folder.manifest.parts[names[0]].first

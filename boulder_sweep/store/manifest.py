@@ -223,7 +223,8 @@ def load(folder: Path) -> Manifest:
 
     path = folder / MANIFEST_NAME
     try:
-        found = pq.read_metadata(path)
+        with path.open("rb") as file:  # pyarrow takes no names that are not Unicode
+            found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
         raise NotASweepError(_no_result(folder)) from None
     except (OSError, pa.ArrowException) as problem:

@@ -218,7 +218,8 @@ def _is_written_by_us(path: Path) -> bool:
     import pyarrow.parquet as pq
 
     try:
-        metadata: dict[bytes, Any] = pq.read_metadata(path).metadata or {}
+        with path.open("rb") as file:
+            metadata: dict[bytes, Any] = pq.read_metadata(file).metadata or {}
     except (OSError, pa.ArrowException):
         return False
     return any(key.startswith(PREFIX.encode()) for key in metadata)

@@ -100,7 +100,9 @@ def file_metadata(identity_: Mapping[str, Any], repeat: str) -> dict[bytes, byte
     """
     entries = {**identity_, "repeat": repeat, "commit": commit(), "cpu": cpu_name()}
     return {
-        f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode()
+        f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(
+            errors="backslashreplace"
+        )
         for key, value in entries.items()
         if value is not None
     }

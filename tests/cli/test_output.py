@@ -1,0 +1,107 @@
+"""Text of users' files and names on a terminal is text: nothing a terminal acts on comes through."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import boulder_sweep.cli
+from boulder_sweep.cli.output import say, show
+from boulder_sweep.text import printable
+
+HOSTILE = [
+    "\x1b]0;title\x07",
+    "\x1b[2J",
+    "two\nlines",
+    "back\rwards",
+    "\x9b31m",
+    "\u202egnp.exe",
+    "zero\u200bwidth",
+    "\udcff",
+    "\x00",
+    "\x7f",
+]
+ALLOWED = re.compile(r"[^\x00-\x1f\x7f-\x9f\u200b-\u200f\u202a-\u202e\u2060-\u2069\ud800-\udfff]*")
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_what_a_terminal_acts_on_is_escaped(text):
+    shown = printable(f"a{text}b")
+    assert ALLOWED.fullmatch(shown)
+    assert shown.startswith("a")
+    assert shown.endswith("b")
+    assert "\\" in shown
+
+
+def test_plain_text_is_left_alone():
+    text = "43.2°, K_ε = 1 — <script> 'quoted' \"twice\" =1+1 -x ©"
+    assert printable(text) == text
+
+
+def test_a_line_break_within_a_line_cannot_make_another_line(capsys):
+    show("one\ntwo", "three")
+    assert capsys.readouterr().out == "one\\ntwo\nthree\n"
+    say("first\nsecond \x1b[31m")
+    assert capsys.readouterr().err == "first\nsecond \\x1b[31m\n"
+
+
+def test_the_commands_write_through_these_functions_only():
+    """But for the bar and the table of `rich`, and the version."""
+    for path in Path(boulder_sweep.cli.__file__).parent.glob("*.py"):
+        source = path.read_text()
+        direct = re.findall(r"(?<![\w.])print\(|click\.echo\(|sys\.std(?:out|err)\.write", source)
+        expected = {"output.py": ["print("] * 2, "options.py": ["click.echo("]}
+        assert direct == expected.get(path.name, []), path.name
+
+
+@pytest.mark.parametrize("text", [text for text in HOSTILE if "\x00" not in text])
+def test_hostile_names_of_files_and_options(sweep, grid, text):
+    for words in (
+        ("run", f"{text}.yaml"),
+        ("run", grid, f"--{text}"),
+        ("run", grid, "--set", f"{text}=1"),
+        ("run", grid, "--set", f"vehicle.speed={text}"),
+        ("run", grid, "-o", f"no/{text}"),
+        ("status", f"out{text}"),
+        ("plot", f"out{text}"),
+        ("explain", f"out{text}", "0"),
+        (text,),
+    ):
+        code, out, err = sweep(*words)
+        assert code == 2, words
+        assert "internal error" not in err
+        assert all(ALLOWED.fullmatch(line) for line in (out + err).split("\n")), words
+
+
+@pytest.mark.parametrize("text", [*HOSTILE, "../up", "a/b", "-rf", "<script>", "'quoted'", "=cmd", ""])
+def test_a_name_that_could_be_more_than_a_name_is_refused(sweep, grid, text):
+    escaped = "".join(f"\\U{ord(character):08x}" if not character.isprintable() else character for character in text)
+    grid.write_text(grid.read_text().replace("name: small grid", f'name: "{escaped}"'))
+    code, out, err = sweep("run", grid)
+    assert (code, out) == (2, "")
+    assert all(ALLOWED.fullmatch(line) for line in err.split("\n"))
+
+
+def test_a_folder_and_a_file_whose_names_are_no_unicode(sweep, possible_grid):
+    file, out = Path("grid\udcff.yaml"), "out\udcff"
+    possible_grid.rename(file)
+    assert sweep("run", file, "-o", out)[0] == 0
+    code, shown, err = sweep("run", file, "-o", out, "--resume")
+    assert (code, err) == (0, "small grid: 18 designs into out\\udcff\n")
+    assert "out\\udcff" in shown
+    assert sweep("status", out, "--verify")[0] == 0
+    assert sweep("explain", out, "3")[0] == 0
+
+
+def test_a_folder_with_a_hostile_name_is_shown_escaped(sweep, possible_grid):
+    name = "out\x1b[31m\nnext"
+    code, out, err = sweep("run", possible_grid, "-o", name)
+    assert code == 0
+    assert Path(name).is_dir()
+    assert "out\\x1b[31m\\nnext" in out
+    assert ALLOWED.fullmatch((out + err).replace("\n", ""))
+    code, out, _ = sweep("status", name)
+    assert code == 0
+    assert out.startswith("out\\x1b[31m\\nnext: finished")
