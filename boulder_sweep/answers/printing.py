@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
+    from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
 
 WIDTH = 80
@@ -113,6 +114,41 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     if count == 1:
         lines += ["", *_index_lines(found, width)]
     return lines
+
+
+def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:
+    """Return what designs withstand as lines: what varies, the verdict, each value and by how much it differs.
+
+    Parameters are those of `need_lines`.
+    """
+    count = len(found)
+    rows = _shown_rows(found.arrow, most)
+    given = found.sweep.plan.given
+    varying = [name for name in HEADS if name in given and _varies(found.arrow, name)]
+    columns: list[Column] = [(HEADS[name], _number(name)) for name in varying]
+    columns.append((("verdict", ""), lambda row: str(row["verdict"])))
+    for head, column, own, decimals in (
+        (("speed", "m/s"), "withstands_speed_m_s", "impact_speed_m_s", 2),
+        (("truck", "kg"), "withstands_mass_kg", "vehicle_mass_kg", 0),
+        (("φ′", "deg"), "withstands_friction_angle_deg", "friction_angle_deg", 2),
+    ):
+        columns.append((head, _withstood(column, own, decimals)))
+    columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or "-"))
+    lines = table_lines(columns, rows, width)
+    if count > most:
+        lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
+    return lines
+
+
+def _withstood(column: str, own: str, decimals: int) -> Cell:
+    """Return what shows a value that is withstood, and by how much it differs from that of the design."""
+
+    def cell(row: Row) -> str:
+        if row[column] is None:
+            return "-"
+        return f"{row[column]:.{decimals}f} ({row[column] / row[own] - 1.0:+.0%})"
+
+    return cell
 
 
 def _index_lines(found: Uncertainty, width: int) -> list[str]:

@@ -119,9 +119,9 @@ class Question:
             trial.chances(found.shown),
         )
 
-    def trial(self, rows: Rows) -> _Trial:
+    def trial(self, rows: Rows) -> Trial:
         """Return what tries values in some rows."""
-        return _Trial(self.key, self.judges, rows)
+        return Trial(self.key, self.judges, rows)
 
 
 class ProbabilityQuestion(Question):
@@ -151,12 +151,12 @@ class ProbabilityQuestion(Question):
         points = Points(len(self.spread.names), seed).upto(DRAWN // SCRAMBLINGS)
         self.points = points.reshape(DRAWN, -1)
 
-    def trial(self, rows: Rows) -> _Trial:
+    def trial(self, rows: Rows) -> Trial:
         """Return what tries values in some rows."""
-        return _ProbabilityTrial(self, rows)
+        return ProbabilityTrial(self, rows)
 
 
-class _Trial:
+class Trial:
     """Tries values of the input in some rows, and counts."""
 
     def __init__(self, key: Key, judges: Judges, rows: Rows) -> None:
@@ -195,7 +195,7 @@ class _Trial:
         return np.where(beyond_reach(block, judged), BEYOND, codes)
 
 
-class _ProbabilityTrial(_Trial):
+class ProbabilityTrial(Trial):
     """Tries values of the input in some rows: whether the designs drawn with them pass often enough.
 
     All rows and all values see the same points, so the share that passes changes with the value alone.

@@ -188,6 +188,24 @@ def frame_of(table: pa.Table) -> pd.DataFrame:
     return frame
 
 
+def with_columns(table: pa.Table, columns: Sequence[tuple[str, str, str, Any]]) -> pa.Table:
+    """Return a table with further columns behind its own.
+
+    Parameters
+    ----------
+    table
+        The table, n rows.
+    columns
+        Name, unit, meaning, and n values: numbers, NaN for none, or words, None for none.
+    """
+    for name, unit, meaning, values in columns:
+        array = (
+            _numbers(values) if isinstance(values, np.ndarray) else pa.array(values, pa.string()).dictionary_encode()
+        )
+        table = table.append_column(pa.field(name, array.type, metadata={"unit": unit, "meaning": meaning}), array)
+    return table
+
+
 def boulder_mass(table: pa.Table) -> np.ndarray:
     """Mass of the boulders of a table [kg]."""
     sides = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")

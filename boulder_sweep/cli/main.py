@@ -28,6 +28,7 @@ from boulder_sweep.cli.status import status
 from boulder_sweep.cli.tradeoff import tradeoff
 from boulder_sweep.cli.uncertainty import uncertainty
 from boulder_sweep.cli.validate import validate
+from boulder_sweep.cli.which import which
 from boulder_sweep.errors import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_WRONG_USE, BoulderSweepError, Interrupted
 from boulder_sweep.runner.interruption import noted_signals
 
@@ -37,6 +38,7 @@ COMMANDS = (
     check,
     need,
     uncertainty,
+    which,
     simulate,
     explore,
     status,

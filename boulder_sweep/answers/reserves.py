@@ -1,0 +1,227 @@
+"""What a design withstands: how fast and how heavy a truck, how weak a soil, everything else unchanged.
+
+From its own value an input is made worse until the design fails, or better until it passes where it fails as it stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import joblib
+import numpy as np
+
+from boulder_sweep.answers.draws import threads
+from boulder_sweep.answers.keys import Key, key_of
+from boulder_sweep.answers.questions import Trial, replaced
+from boulder_sweep.answers.search import FAILS, HOLDS, Search, search
+from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
+from boulder_sweep.designs import block_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+    from boulder_sweep.settings import Sweep
+
+ROWS_AT_ONCE = 2048
+MPH = 0.44704
+CLASSES = {"M30": 30 * MPH, "M40": 40 * MPH, "M50": 50 * MPH}
+"""Nominal speeds [m/s] of the classes of ASTM F2656 for a medium-duty truck."""
+CLASS_MASS_KG = 6800.0
+CLASS_TOLERANCE = 0.02
+"""The classes are of a truck of 6800 kg; for a mass farther off than this share none is named."""
+
+Told = Callable[[int, int], None]
+"""Told how many rows of how many are done."""
+
+
+class Reserve(NamedTuple):
+    """One input that is made worse."""
+
+    input: str
+    """Key of the file."""
+    column: str
+    """Column of what is withstood."""
+    best: float
+    """Value up to which it is made better."""
+    worst: float
+    """Value up to which it is made worse."""
+    meaning: str
+
+
+RESERVES = (
+    Reserve("speed", "withstands_speed_m_s", 1.0, 40.0, "largest speed of impact"),
+    Reserve("vehicle.mass", "withstands_mass_kg", 100.0, 60_000.0, "largest mass of the vehicle"),
+    Reserve("friction_angle", "withstands_friction_angle_deg", 59.0, 15.0, "smallest friction angle of the soil"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Reserves:
+    """What the designs of a sweep withstand. Made by `reserves`.
+
+    Attributes
+    ----------
+    sweep : Sweep
+        The sweep.
+    arrow : pyarrow.Table
+        Inputs and outcome of every design, and what it withstands.
+    """
+
+    sweep: Sweep
+    arrow: pa.Table
+
+    def __len__(self) -> int:
+        return len(self.arrow)
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """The table as a data frame; units and meanings in ``.attrs``."""
+        from boulder_sweep.answers.tables import frame_of
+
+        return frame_of(self.arrow)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {"name": self.sweep.name, "rows": self.arrow.to_pylist()}
+
+    def write(self, path: str | Path) -> Path:
+        """Write the table to a Parquet file.
+
+        Raises
+        ------
+        QuestionError
+            It cannot be written.
+        """
+        from boulder_sweep.answers.tables import write_parquet
+
+        return write_parquet(self.arrow, path)
+
+
+def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None) -> Reserves:
+    """Find what every design of a sweep withstands.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    jobs
+        Threads; all cores by default.
+    told
+        Told how far it is.
+
+    Returns
+    -------
+    Reserves
+        One row a design. Where it fails at every value tried, the column is null; where it never fails, the last value
+        tried stands there.
+
+    Raises
+    ------
+    SettingsError
+        An input has a distribution.
+    """
+    from boulder_sweep.answers.tables import joined_tables
+    from boulder_sweep.store.provenance import file_metadata, identity
+
+    sweep.require_values()
+    judges = judges_of(sweep)
+    judges.own.warm_up()
+    tables, done = [], 0
+    pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
+    for table in threads(jobs)(joblib.delayed(_table)(sweep, judges, start, stop) for start, stop in pieces):
+        tables.append(table)
+        done += len(table)
+        if told is not None:
+            told(done, sweep.n_designs)
+    own = judges.own
+    found = identity(sweep.resolved(), own.readings._asdict(), own.control._asdict(), judges.accuracy.to_dict())
+    return Reserves(sweep, joined_tables(tables, file_metadata(found, "boulder_sweep.answers.reserves")))
+
+
+def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: float, worst: float) -> np.ndarray:
+    """Return the worst value of an input that n designs withstand; NaN where they fail at every value.
+
+    Parameters
+    ----------
+    key
+        The input.
+    judges
+        How designs are judged.
+    rows
+        Inputs of the designs.
+    passes
+        Whether they pass as they stand.
+    best, worst
+        Values up to which the input is changed.
+    """
+    trial = Trial(key, judges, rows)
+    own = rows[key.name] / key.tolerance
+    # The nearest place of the lattice on the better side, at which a design that passes passes.
+    first = (np.floor(own + 1e-9) if worst > best else np.ceil(own - 1e-9)).astype(np.int64)
+    ends = (round(end / key.tolerance) for end in (worst, best))
+    last = np.where(passes, *ends)
+
+    def predicate(codes: Callable[[np.ndarray, np.ndarray], np.ndarray], index: np.ndarray) -> Any:
+        """Search for the change: where a design passes as it stands, for the first value at which it does not."""
+
+        def changed(inner: np.ndarray, places: np.ndarray) -> np.ndarray:
+            holds = codes(index[inner], places) == HOLDS
+            return np.where(holds != passes[index[inner]], HOLDS, FAILS)
+
+        return changed
+
+    every = np.arange(len(first))
+    found = search(predicate(trial.quick, every), first, last)
+    wrong = np.flatnonzero(~_certified(trial, found, passes))
+    if len(wrong):
+        part = search(predicate(trial.own, wrong), first[wrong], last[wrong])
+        found = replaced(found, wrong, part)
+    # `fails` is the last place before the change: of a design that passes it is what is withstood.
+    at = np.where(passes, np.where(found.has_holds, found.fails, last), found.holds)
+    at = np.where(passes & found.has_holds & ~found.has_fails, first, at)
+    return np.where(passes | found.has_holds, key.values(at), np.nan)
+
+
+def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
+    """Whether the sweep's own accuracy says the same at both ends of the brackets."""
+    agrees = np.ones(len(passes), dtype=bool)
+    for has, places, changed in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
+        rows = np.flatnonzero(has)
+        agrees[rows] = (trial.own(rows, places[rows]) == HOLDS) == (passes[rows] != changed)
+    return agrees
+
+
+def classes(speed: np.ndarray, mass: np.ndarray) -> list[str | None]:
+    """Return the highest class whose nominal speed is withstood; none for trucks of another mass."""
+    named = np.abs(mass / CLASS_MASS_KG - 1.0) <= CLASS_TOLERANCE
+    bounds = np.array(list(CLASSES.values()))
+    # A speed of 30 mph is 13.41 m/s on the lattice of what is withstood.
+    place = np.searchsorted(bounds - 0.005, np.nan_to_num(speed), side="right")
+    words = ("", *CLASSES)
+    return [words[at] or None if known else None for at, known in zip(place, named, strict=True)]
+
+
+def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
+    """Return the table of the designs ``[start, stop)``."""
+    from boulder_sweep.answers.tables import with_columns
+    from boulder_sweep.store.schema import part_table
+
+    rows = sweep.plan.given_rows(start, stop)
+    block = block_of(rows)
+    judged = judges.own(block)
+    passes = judges.holds(judged)
+    columns: list[tuple[str, str, str, Any]] = []
+    values = {}
+    for own in RESERVES:
+        key = key_of(own.input, most=own.worst > own.best)
+        values[own.column] = withstood(key, judges, rows, passes, own.best, own.worst)
+        meaning = f"{own.meaning} at which the design passes, all else unchanged; simulated"
+        columns.append((own.column, key.field.unit, meaning, values[own.column]))
+    speed_class = classes(values["withstands_speed_m_s"], rows["vehicle_mass_kg"])
+    meaning = "class of ASTM F2656 whose nominal speed is withstood; simulated, which rates no barrier"
+    columns.append(("simulated_class", "", meaning, speed_class))
+    return with_columns(part_table(replace(block, start=start, stop=stop), judged, {}), columns)

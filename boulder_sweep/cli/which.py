@@ -1,0 +1,43 @@
+"""``sweep which``: which truck and which soil every design withstands."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from boulder_sweep.cli.loading import load_sweep
+from boulder_sweep.cli.options import json_option, set_option
+
+EXAMPLES = """\b
+Examples:
+  sweep which configs/crash_tests.yaml
+  sweep which configs/site.yaml -o withstands.parquet
+"""
+
+
+@click.command("which", short_help="Which truck and soil every design withstands.", epilog=EXAMPLES)
+@click.argument("grid", type=click.Path())
+@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
+@click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all designs.")
+@click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@set_option
+@json_option
+def which(grid: str, jobs: int | None, out: str | None, quiet: bool, overrides: tuple[str, ...], as_json: bool) -> int:
+    """Find how far speed, mass of the truck and friction angle may change before the verdict of each design does.
+
+    The highest class of ASTM F2656 whose nominal speed (30, 40, 50 mph) is withstood is named beside; it is simulated,
+    and the standard rates by test.
+    """
+    from boulder_sweep.answers.printing import reserve_lines
+    from boulder_sweep.answers.reserves import reserves
+    from boulder_sweep.answers.tables import checked_parquet
+
+    sweep = load_sweep(grid, overrides, quiet)
+    if out is not None:
+        checked_parquet(out)
+    found = reserves(sweep, jobs=jobs)
+    click.echo(json.dumps(found.to_dict()) if as_json else "\n".join(reserve_lines(found)))
+    if out is not None:
+        found.write(out)
+    return 0
