@@ -172,6 +172,12 @@ def bound(text: str | float, field: fields.Field) -> float:
         raise QuestionError(f"{option} {text}: {problem}") from None
 
 
+def sweep_ranges(sweep: Sweep) -> dict[str, tuple[float, float]]:
+    """Return the least and the largest value of every input that has several, by its column."""
+    columns = (item for axis in sweep.axes for item in axis.columns.items())
+    return {name: (float(values.min()), float(values.max())) for name, values in columns}
+
+
 def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends) -> tuple[np.ndarray, np.ndarray]:
     """Return the range of the input that is searched, row by row.
 
@@ -202,7 +208,7 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
         if not low < high:
             raise QuestionError(f"--between {between[0]} {between[1]}: the first must be less than the second")
         return low * one, high * one
-    axes = {axis.name: (axis.values.min(), axis.values.max()) for axis in sweep.axes}
+    axes = sweep_ranges(sweep)
     if key.name in axes:
         low, high = axes[key.name]
         return low * one, high * one

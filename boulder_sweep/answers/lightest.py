@@ -6,11 +6,12 @@ tried at several depths. The other sides are searched by a lattice that is narro
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.keys import Key
+from boulder_sweep.answers.keys import Key, sweep_ranges
 from boulder_sweep.answers.questions import Answers, replaced
 from boulder_sweep.answers.search import ALWAYS, BEYOND, FAILS, FOUND, HOLDS, NEVER, Search, search
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
@@ -69,7 +70,7 @@ class LightestQuestion:
         if key.most:
             raise QuestionError("the largest mass is that of the largest boulder; ask for the least")
         self.sweep, self.key, self.judges = sweep, key, judges
-        self.bounds = {axis.name: (float(axis.values.min()), float(axis.values.max())) for axis in sweep.axes}
+        self.bounds = sweep_ranges(sweep)
         self.bounds |= {name: (value, value) for name, value in sweep.constants.items()}
         self.free = [side for side in SIDES if self.bounds[side][0] < self.bounds[side][1]]
         self.open = Open(sweep, (*SIDES, DEPTH))
@@ -105,7 +106,8 @@ class LightestQuestion:
             best = np.where(better, mass[np.arange(n), place], best)
             for side in others:
                 chosen[side] = np.where(better, tried[side][np.arange(n), place], chosen[side])
-        return trial.certified(chosen)
+        answers = trial.certified(chosen)
+        return replace(answers, block=replace(answers.block, labels=self.open.labels(start, stop)))
 
 
 class _Boulders:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.need import Need
     from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
+    from boulder_sweep.settings import Sweep
 
 WIDTH = 80
 MOST_LINES = 40
@@ -89,9 +90,7 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     """
     count = len(found)
     rows = _shown_rows(found.arrow, most)
-    given = found.sweep.plan.given
-    varying = [name for name in HEADS if name in given and _varies(found.arrow, name)]
-    columns = [(HEADS[name], _number(name)) for name in varying]
+    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given])
     columns += [
         (("at the", "means"), lambda row: str(row["verdict"])),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
@@ -123,9 +122,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES) -
     """
     count = len(found)
     rows = _shown_rows(found.arrow, most)
-    given = found.sweep.plan.given
-    varying = [name for name in HEADS if name in given and _varies(found.arrow, name)]
-    columns: list[Column] = [(HEADS[name], _number(name)) for name in varying]
+    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given])
     columns.append((("verdict", ""), lambda row: str(row["verdict"])))
     for head, column, own, decimals in (
         (("speed", "m/s"), "withstands_speed_m_s", "impact_speed_m_s", 2),
@@ -182,7 +179,7 @@ def need_columns(need: Need) -> list[Column]:
     """Return the columns of a terminal table: what varies, the answer, what follows from it."""
     key = need.key
     open_ = (key.name, *need.derived)
-    columns = [(HEADS[name], _number(name)) for name in HEADS if name not in open_ and _varies(need.arrow, name)]
+    columns = _leading(need.sweep, need.arrow, [name for name in HEADS if name not in open_])
     if key.name == BOULDER_MASS.name:
         columns.append((("mass", "kg"), _answer(key, "")))
         columns += [(HEADS[name], _size(name)) for name in (*SIDES, "embedment_depth_m")]
@@ -210,6 +207,18 @@ def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> l
         "  ".join(text.rjust(own) for text, own in zip(line, widths, strict=True)) for line in zip(*texts, strict=True)
     ]
     return [*lines[:2], "  ".join("─" * own for own in widths), *lines[2:]]
+
+
+def _leading(sweep: Sweep, table: pa.Table, names: Sequence[str]) -> list[Column]:
+    """Return the columns that tell rows apart: names of sets, and inputs that vary; the numbers of listed designs."""
+    labels: list[Column] = [((name, ""), _word(name)) for name in sweep.plan.labels]
+    if sweep.table is not None:
+        return [*labels, (("design", ""), lambda row: str(row["design_id"]))]
+    return labels + [(HEADS[name], _number(name)) for name in names if _varies(table, name)]
+
+
+def _word(name: str) -> Cell:
+    return lambda row: str(row[name])
 
 
 def _varies(table: pa.Table, name: str) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -109,7 +109,7 @@ class Question:
             found = replaced(found, wrong, part)
         block, judged = trial.judged(np.arange(stop - start), found.shown)
         return Answers(
-            block,
+            replace(block, labels=self.open.labels(start, stop)),
             judged,
             found.kind,
             np.where(found.has_fails, self.key.values(found.fails), np.nan),
@@ -182,7 +182,7 @@ class Trial:
         agrees = np.ones(len(found.kind), dtype=bool)
         for has, places, holds in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
             rows = np.flatnonzero(has)
-            agrees[rows] = (self.own(rows, places[rows]) == HOLDS) == holds
+            agrees[rows] &= (self.own(rows, places[rows]) == HOLDS) == holds
         return agrees
 
     def chances(self, places: np.ndarray) -> Chance | None:

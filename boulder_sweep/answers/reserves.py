@@ -191,7 +191,7 @@ def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
     agrees = np.ones(len(passes), dtype=bool)
     for has, places, changed in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
         rows = np.flatnonzero(has)
-        agrees[rows] = (trial.own(rows, places[rows]) == HOLDS) == (passes[rows] != changed)
+        agrees[rows] &= (trial.own(rows, places[rows]) == HOLDS) == (passes[rows] != changed)
     return agrees
 
 
@@ -224,4 +224,6 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     speed_class = classes(values["withstands_speed_m_s"], rows["vehicle_mass_kg"])
     meaning = "class of ASTM F2656 whose nominal speed is withstood; simulated, which rates no barrier"
     columns.append(("simulated_class", "", meaning, speed_class))
-    return with_columns(part_table(replace(block, start=start, stop=stop), judged, {}), columns)
+    return with_columns(
+        part_table(replace(block, start=start, stop=stop, labels=sweep.block(start, stop).labels), judged, {}), columns
+    )

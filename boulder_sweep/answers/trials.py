@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.designs import DesignBlock, block_of
+from boulder_sweep.designs import DesignBlock, Label, block_of
 from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged
@@ -55,6 +55,10 @@ class Open:
     def count(self) -> int:
         """Number of combinations of the other inputs."""
         return self.sweep.n_designs
+
+    def labels(self, start: int, stop: int) -> dict[str, Label]:
+        """Return the names that the combinations ``[start, stop)`` carry."""
+        return self.sweep.block(start, stop).labels
 
     def rows(self, start: int, stop: int) -> Rows:
         """Return the other inputs of the combinations ``[start, stop)``."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -239,7 +239,7 @@ def _rows(asked: _Asked, points: Points, parallel: joblib.Parallel, start: int, 
     z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
     driver = drivers(z, first[0])
     failing = rare_failing(asked, draws, found) if asked.rare else None
-    block = block_of(draws.rows)
+    block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     return chance_table(start, block, asked.judges.own(block), found, driver, asked.spread.words, failing)
 
 

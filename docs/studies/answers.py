@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from boulder_sweep import load, need, uncertainty
-from boulder_sweep.answers.printing import need_lines, uncertainty_lines
+from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.published import PUBLISHED
+from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.crash_tests.tables import Table
 
 SITE = Path("configs/site.yaml")
@@ -42,6 +43,11 @@ def need_of_site(root: Path) -> str:
 def lightest_of_grid(root: Path) -> str:
     """Return the lightest boulders of the M30 grid as a terminal shows them, at one stiffness of the soil."""
     return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass")))
+
+
+def which_of_site(root: Path) -> str:
+    """Return what the designs of the site withstand as a terminal shows it."""
+    return _fenced(reserve_lines(reserves(load(root / SITE))))
 
 
 def uncertainty_of_site(root: Path) -> str:

@@ -1,0 +1,84 @@
+"""What designs withstand, judged again at the value and one beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from boulder_sweep.answers.printing import reserve_lines
+from boulder_sweep.answers.reserves import CLASSES, RESERVES, classes, reserves
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.settings import SettingsError, Sweep, load
+from boulder_sweep.settings.sweep import DesignList
+from tests.answers.designs import random_designs, site
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+def passes(frame: pd.DataFrame, **inputs: np.ndarray) -> np.ndarray:
+    listed = {name: frame[name].to_numpy(dtype=float) for name in INPUT_COLUMNS if name != "impact_height_m"}
+    sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed | inputs))
+    return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS
+
+
+@pytest.mark.parametrize(
+    ("column", "own", "worse"),
+    [
+        ("withstands_speed_m_s", "impact_speed_m_s", 0.01),
+        ("withstands_mass_kg", "vehicle_mass_kg", 1.0),
+        ("withstands_friction_angle_deg", "friction_angle_deg", -0.01),
+    ],
+)
+def test_a_design_passes_at_what_it_withstands_and_not_beyond(column: str, own: str, worse: float) -> None:
+    frame = reserves(random_designs(400)).frame
+    ends = [getattr(reserve, end) for reserve in RESERVES if reserve.column == column for end in ("best", "worst")]
+    there = frame[frame[column].notna()]
+    assert len(there) > 100
+    assert passes(there, **{own: there[column].to_numpy()}).all()
+    inside = there[~np.isclose(there[column], ends[0]) & ~np.isclose(there[column], ends[1])]
+    assert not passes(inside, **{own: inside[column].to_numpy() + worse}).any()
+    assert (frame[frame.verdict == "pass"][column].notna()).all()
+
+
+def test_reserves_of_designs_that_pass_are_on_the_worse_side() -> None:
+    frame = reserves(site(site="embedment_depth: [1.8, 2.1] m")).frame
+    held, failed = frame[frame.verdict == "pass"], frame[frame.reason == "overturns"]
+    assert len(held)
+    assert len(failed)
+    assert (held.withstands_speed_m_s > held.impact_speed_m_s.astype(float) - 0.01).all()
+    assert (held.withstands_friction_angle_deg < held.friction_angle_deg.astype(float) + 0.01).all()
+    assert (failed.withstands_speed_m_s < failed.impact_speed_m_s.astype(float)).all()
+
+
+def test_classes_are_named_for_medium_trucks_only() -> None:
+    speed = np.array([13.40, 13.41, 17.87, 17.88, 22.4, 30.0, np.nan, 30.0])
+    mass = np.array([6800.0] * 7 + [7500.0])
+    assert classes(speed, mass) == [None, "M30", "M30", "M40", "M50", "M50", None, None]
+    assert list(CLASSES) == ["M30", "M40", "M50"]
+
+
+def test_crash_tests() -> None:
+    found = reserves(load(CONFIGS / "crash_tests.yaml"))
+    abg, rwg = found.frame.to_dict("records")
+    assert abg["withstands_speed_m_s"] < 13.0
+    assert rwg["withstands_speed_m_s"] > 14.0
+    assert rwg["simulated_class"] == "M30"
+    lines = reserve_lines(found)
+    assert all(len(line) <= 80 for line in lines)
+    assert "M30" in lines[-1]
+
+
+def test_threads_do_not_matter() -> None:
+    one, two = (reserves(site(), jobs=jobs) for jobs in (1, 2))
+    assert one.arrow.equals(two.arrow)
+
+
+def test_distributions_are_refused() -> None:
+    with pytest.raises(SettingsError, match="distribution"):
+        reserves(site(friction="{mean: 38 deg, sd: 3 deg}"))

@@ -1,0 +1,23 @@
+"""``sweep which``: lines, JSON, Parquet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+
+CONFIG = Path(__file__).parents[2] / "configs" / "site.yaml"
+
+
+def test_lines_json_and_parquet(sweep, tmp_path):
+    code, out, _ = sweep("which", CONFIG)
+    assert code == 0
+    assert all(len(line) <= 80 for line in out.splitlines())
+    assert "simulated" in out
+    code, out, _ = sweep("which", CONFIG, "--json", "-o", tmp_path / "w.parquet")
+    rows = json.loads(out)["rows"]
+    frame = pd.read_parquet(tmp_path / "w.parquet")
+    assert code == 0
+    assert [row["withstands_speed_m_s"] for row in rows] == frame.withstands_speed_m_s.tolist()
+    assert frame.attrs["units"]["withstands_speed_m_s"] == "m/s"
