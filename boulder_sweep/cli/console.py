@@ -95,7 +95,7 @@ def grid_lines(sweep: Sweep) -> list[str]:
     """Return a description of the designs: how many, and over which axes."""
     count = counted(sweep.n_designs, "design")
     if sweep.table is not None:
-        return [f"{sweep.name}: {count} from {sweep.table.file}"]
+        return [f"{sweep.name}: {count} from {sweep.table.file}", *_uncertain_lines(sweep)]
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
         unit = BY_NAME[axis.name].unit if axis.name in BY_NAME else "1"
@@ -104,6 +104,16 @@ def grid_lines(sweep: Sweep) -> list[str]:
             continue
         ends = f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis) > 1 else f"{axis.values[0]:g}"
         lines.append(f"  {axis.name:<26}{len(axis):>9,} values  {ends}{'' if unit == '1' else ' ' + unit}")
+    return [*lines, *_uncertain_lines(sweep)]
+
+
+def _uncertain_lines(sweep: Sweep) -> list[str]:
+    """Return one line for each input that has a distribution."""
+    lines = []
+    for name, spread in sweep.distributions.items():
+        mean = f", mean {sweep.constants[name]:.4g}" if name in sweep.constants else ""
+        unit = BY_NAME[name].unit if name in BY_NAME else "1"
+        lines.append(f"  {name:<26}uncertain         {spread.words(unit)}{mean}")
     return lines
 
 

@@ -68,6 +68,17 @@ class Distribution:
         assert self.mode is not None
         return self.mode
 
+    def words(self, unit: str) -> str:
+        """Return kind and spread in words, for messages; `unit` is that of the column."""
+        unit = "" if unit == "1" else f" {unit}"
+        spread = f"sd {self.sd}{unit}" if self.cov is None else f"cov {100.0 * self.cov:g} %"
+        ends = f"{self.low:g} to {self.high:g}{unit}"
+        return {
+            "uniform": f"uniform, {ends}",
+            "triangular": f"triangular, {ends}, most likely {self.mode}{unit}",
+            "beta": f"beta, {spread}, {ends}",
+        }.get(self.kind, f"{self.kind}, {spread}")
+
     def to_dict(self) -> dict[str, float | str]:
         """Return what is given as plain data."""
         named = {"kind": self.kind, "sd": self.sd, "cov": self.cov, "low": self.low, "high": self.high}

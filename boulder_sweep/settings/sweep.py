@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -118,10 +120,10 @@ class Sweep:
     correlation: float = 0.0
     partial_factor: float = 1.0
     notes: tuple[Problem, ...] = ()
-    plan: DesignPlan = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        lengths = [len(axis) for axis in self.axes]
+    @cached_property
+    def plan(self) -> DesignPlan:
+        """How the columns of the designs follow from constants, axes and table."""
         given = {name: Source(np.array([value])) for name, value in self.constants.items()}
         labels: dict[str, Label] = {}
         for k, axis in enumerate(self.axes):
@@ -129,15 +131,19 @@ class Sweep:
             if axis.labels:
                 labels[axis.name] = Label(np.arange(len(axis), dtype=np.int32), axis.labels, k)
         if self.table is not None:
-            lengths = [len(self.table)]
             given |= {name: Source(values, (0,)) for name, values in self.table.columns.items()}
             labels = self.table.labels
-        object.__setattr__(self, "plan", DesignPlan(lengths, given, labels))
+        return DesignPlan(self.lengths, given, labels)
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Numbers of values of the axes; of a list of designs, the number of its rows."""
+        return tuple(map(len, self.axes)) if self.table is None else (len(self.table),)
 
     @property
     def n_designs(self) -> int:
         """Number of designs, exact."""
-        return self.plan.n_designs
+        return math.prod(self.lengths)
 
     def block(self, start: int, stop: int) -> DesignBlock:
         """Return the designs ``[start, stop)``; nothing outside of them is made.

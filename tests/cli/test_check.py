@@ -36,3 +36,26 @@ def test_mistakes(sweep, grid):
 def test_a_missing_file(sweep, grid):
     assert sweep("check", "no.yaml") == (2, "", "no.yaml: there is no such file\n")
     assert sweep("check", ".") == (2, "", ".: is a directory; a file is needed\n")
+
+
+def test_uncertain_inputs_are_listed(sweep, grid):
+    text = grid.read_text().replace("43.2 deg", "{mean: 38 deg, sd: 3 deg}")
+    grid.write_text(text.replace("[60, 95] MN/m^3", "{distribution: lognormal, mean: [60, 95] MN/m^3, cov: 30 %}"))
+    code, out, _ = sweep("check", grid)
+    assert code == 0
+    words = [" ".join(line.split()) for line in out.splitlines()]
+    assert "friction_angle_deg uncertain normal, sd 3.0 deg, mean 38" in words
+    assert "subgrade_reaction_MN_m3 uncertain lognormal, cov 30 %" in words
+    code, out, err = sweep("run", grid, "--dry-run")
+    assert (code, out) == (2, "")
+    assert "which only 'sweep uncertainty' takes" in err.splitlines()[-1]
+
+
+def test_named_soils_are_listed(sweep, grid):
+    start, stop = grid.read_text().index("soil:"), grid.read_text().index("vehicle:")
+    soils = "soil:\n  - {name: A, density: 1860, friction_angle: 36, subgrade_reaction: 40}\n"
+    soils += "  - {name: B 2, density: 1860, friction_angle: 42, subgrade_reaction: 90}\n"
+    grid.write_text(grid.read_text()[:start] + soils + grid.read_text()[stop:])
+    code, out, _ = sweep("check", grid)
+    assert code == 0
+    assert [line.split(maxsplit=3) for line in out.splitlines()][-1] == ["soil", "2", "sets", "A, B 2"]
