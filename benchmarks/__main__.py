@@ -1,6 +1,6 @@
-"""Run all benchmarks and write their tables into the README: ``python -m benchmarks``, five minutes or so.
+"""Run all benchmarks and write their tables into the README: ``python -m benchmarks``; takes about five minutes.
 
-Wall times are in some of the tables, so the machine should do nothing else meanwhile.
+Some tables contain wall times, so the machine should be otherwise idle.
 """
 
 from __future__ import annotations

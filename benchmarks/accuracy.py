@@ -1,8 +1,8 @@
-"""Work and precision of the steps, with and without located events: what the named accuracies rest on.
+"""Work and precision for each time step, with and without located events: the basis of the named accuracies.
 
-Run as ``python -m benchmarks.accuracy``. Every step simulates the same random designs; the errors are against a far
-finer step with the yield of the soil located, too. Rotations and displacements are compared where neither solution
-reached the limit of rotation; where only one of them did, the verdict is flipped, and counted.
+Run as ``python -m benchmarks.accuracy``. Every step simulates the same random designs; errors are relative to a
+much finer step that also locates the yield of the soil. Rotations and displacements are compared where neither
+solution reached the limit of rotation; where only one of them did, the verdict is flipped, and counted.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ PRESETS = {"corrected": bk.corrected(), "as_printed": bk.as_printed()}
 
 
 def control(step_s: float, *, error_estimate: bool = False, locate_yield: bool = False) -> bk.Control:
-    """How all ways here simulate: to the limit of rotation, the horizon or the proof that nothing grows."""
+    """Return the control: simulate to the rotation limit, the horizon, or the proof of rest."""
     return bk.Control(step_s, HORIZON, ROTATION_LIMIT, 0, error_estimate, True, locate_yield)
 
 
 def reference_of(table: bk.DesignTable, readings: bk.Readings) -> bk.OutcomeTable:
-    """Solution that all others are compared with."""
+    """Return the reference solution."""
     return bk.simulate_table(table, readings, control(REFERENCE_STEP_S, locate_yield=True))
 
 
@@ -70,7 +70,7 @@ def literal_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable) -
     for step_ms in LITERAL_STEPS_MS:
         work = partial(literal_table, table, readings, 1e-3 * step_ms, known.t_end, ROTATION_LIMIT)
         (theta, x_b, x_v), seconds = timed(work, 1)
-        # A design that the reference stopped at the limit comes to it there only but for the error of either.
+        # Near the limit, one of the two solutions may stop at it and the other just below.
         overturned = (known.status == LIMIT) & (theta > 0.99 * ROTATION_LIMIT) | (theta >= ROTATION_LIMIT)
         found = Peaks(theta, x_b, x_v, overturned)
         cpu_us = 1e6 * seconds / table.L.size
@@ -91,11 +91,11 @@ def measure(count: int = DESIGNS, repeats: int = 2) -> list[Point]:
 
 
 def tables(points: list[Point], count: int) -> list[Table]:
-    """Put the points into tables: one for each preset."""
+    """Return one table for each preset."""
     conditions = (
         f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {count} random designs, {HORIZON:g} s, limit 20 deg; "
         f"errors against a step of {1e3 * REFERENCE_STEP_S:g} ms; CPU time of one thread; switches inside: "
-        f"{min(LITERAL_DESIGNS, count)} designs, told the time at which the reference ended"
+        f"{min(LITERAL_DESIGNS, count)} designs, stopped at the end time of the reference"
     )
     found = []
     for preset in PRESETS:
@@ -106,7 +106,7 @@ def tables(points: list[Point], count: int) -> list[Table]:
             [
                 "way",
                 "step",
-                "CPU time a design",
+                "CPU time per design",
                 "rotation: max, 99 %, rms [deg]",
                 "displacement: max, 99 %, rms [mm]",
                 "verdicts flipped",
@@ -135,7 +135,7 @@ def tables(points: list[Point], count: int) -> list[Table]:
 
 
 def write(points: list[Point]) -> None:
-    """Leave the points as data and as figures."""
+    """Write the points as a data file and as figures."""
     from .plots import plot_order, plot_steps
 
     FIGURES.mkdir(exist_ok=True)

@@ -28,12 +28,12 @@ HORIZON = 1.0
 
 
 def sample(count: int = DESIGNS, seed: int = SEED) -> DesignTable:
-    """Draw designs that the truck meets.
+    """Draw designs that the truck hits.
 
     Parameters
     ----------
     count
-        How many. The first rows are the same whatever the count.
+        Number of designs. The first rows are the same for any count.
     seed
         Of the random numbers.
 

@@ -1,9 +1,9 @@
 """How many floating-point operations a step takes, counted twice: in the formulas and in the machine code.
 
-In the formulas, the kernels' Python functions are run with numbers that count what is done to them, in a process of
-its own whose compiler is off. In the machine code, the packed instructions of the loop over the lanes are counted; it
-has no branches, so each is executed once for every vector of lanes. The second count is what the processor does and
-what rates are computed from; it is a little smaller, because the compiler computes common terms once.
+In the formulas, the kernels' Python functions are run with numbers that count what is done to them, in a separate
+process with the compiler off. In the machine code, the packed instructions of the loop over the lanes are counted;
+it has no branches, so each is executed once for every vector of lanes. The second count is what the processor does
+and what rates are computed from; it is a little smaller, because the compiler computes common terms once.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Operations(NamedTuple):
 
 
 class Tally:
-    """Where counting numbers report to."""
+    """Collects what the counting numbers report."""
 
     def __init__(self) -> None:
         self.add = self.multiply = self.divide = self.least_or_most = 0
@@ -87,7 +87,7 @@ class Counted:
 
 
 class _CountingMath:
-    """Stands in for what the right-hand side takes from Python beside arithmetic."""
+    """Replaces the functions, other than arithmetic, that the right-hand side calls."""
 
     def __init__(self, tally: Tally) -> None:
         self._tally = tally
@@ -120,7 +120,7 @@ def operations_of_step() -> tuple[Operations, Operations]:
 
 
 def _count() -> tuple[Operations, Operations]:
-    """Do the counting; in a process whose compiler is off."""
+    """Count; runs in a process with the compiler off."""
     import boulder_kernels as bk
     from boulder_kernels import soil
     from boulder_kernels.design import design_at
@@ -185,7 +185,7 @@ def packed_instructions(assembly: str) -> int:
 
 
 def assembly_of(kernel: Any, *arguments: Any) -> str:
-    """Machine code of a kernel; compiled once more, because code that came from the disk cannot be shown."""
+    """Return the machine code of a kernel; compiled anew, because code loaded from the cache cannot be inspected."""
     import numba
 
     options = {name: value for name, value in kernel.targetoptions.items() if name not in ("cache", "nopython")}

@@ -1,8 +1,8 @@
-"""The gate: a change that makes a key path markedly slower does not pass.
+"""The gate: it fails if a change makes a key path markedly slower.
 
 Run as ``python -m benchmarks.gate``; exit code 1 and a sentence for each path over its threshold. Every path is timed
-in turn with a reference loop that shares no code with the project, and only the ratio counts: it hardly depends on how
-busy the machine is, or how fast. The thresholds are in ``gate.toml``, with room for other machines.
+in turn with a reference loop that shares no code with the project, and only the ratio counts: it hardly
+depends on the speed or the load of the machine. The thresholds are in ``gate.toml``, with room for other machines.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ solver: {accuracy: balanced, horizon: 1 s}
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 def reference_work(x: np.ndarray, times: int) -> None:
-    """A polynomial map of numbers in the nearest cache: vector arithmetic, and nothing of the project."""
+    """Iterate a polynomial map in the first-level cache: vector arithmetic that shares no code with the project."""
     for _ in range(times):
         for i in range(x.size):
             z = x[i]
@@ -81,7 +81,7 @@ class Finding:
 
     @property
     def passes(self) -> bool:
-        """Whether the path is fast enough; a ratio that is not a number is not."""
+        """Whether the path is fast enough; a ratio of NaN is not."""
         return self.ratio <= self.threshold
 
     def __str__(self) -> str:
@@ -130,7 +130,7 @@ def paths(folder: Path) -> dict[str, Callable[[], object]]:
 def judged(
     works: Mapping[str, Callable[[], object]], thresholds: Mapping[str, float], rounds: int = ROUNDS
 ) -> list[Finding]:
-    """Time some paths in turn with the reference and hold them against their thresholds.
+    """Time paths alternately with the reference and compare the ratios with the thresholds.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def judged(
     others: dict[str, list[float]] = {name: [] for name in works}
     for _ in range(rounds):
         for name, work in works.items():
-            # The reference before and after, so that a change of the clock in between is shared.
+            # The reference runs before and after, so that a change of clock speed in between affects both.
             before = cpu_seconds(reference)
             own[name].append(cpu_seconds(work))
             others[name].append(0.5 * (before + cpu_seconds(reference)))
@@ -174,13 +174,13 @@ def thresholds_of(path: Path = THRESHOLDS) -> dict[str, float]:
 
 
 def complaint(findings: list[Finding]) -> str:
-    """Say what is too slow and what to do; empty where nothing is."""
+    """Return a message about what is too slow and what to do; empty if nothing is."""
     slow = [finding for finding in findings if not finding.passes]
     if not slow:
         return ""
     names = ", ".join(f"{f.name} ({f.ratio:.3f}, at most {f.threshold:.3f})" for f in slow)
     return (
-        f"benchmark gate: too slow: {names}. Find the cause with python -m benchmarks.kernel; where the new cost "
+        f"benchmark gate: too slow: {names}. Find the cause with python -m benchmarks.kernel; if the new cost "
         f"is worth it, raise the threshold in benchmarks/{THRESHOLDS.name} and say why."
     )
 

@@ -74,7 +74,7 @@ def measure(rounds: int = ROUNDS) -> Table:
     instructions = packed_instructions(assembly)
     flops_attempted = executed.flops * ATTEMPTS * LANES
     share = median_ratio(times["peak"], times["attempt"]) * flops_attempted / peak.flops
-    # A processor that could do nothing but this mix, one packed instruction in either unit and cycle, would reach:
+    # The rate of a processor that does only this mix, with one packed instruction per unit and cycle:
     mix = executed.flops / (2 * instructions)
 
     out = empty_outcomes(DESIGNS)
@@ -91,7 +91,7 @@ def measure(rounds: int = ROUNDS) -> Table:
     table.rows = [
         ["one evaluation of the right-hand side in lanes, its stage included", f"{evaluation_ns:.2f} ns"],
         ["one attempted step of six evaluations", f"{attempt_ns:.1f} ns"],
-        ["looking at a step and taking it over", f"{look_ns:.1f} ns"],
+        ["checking a step and accepting it", f"{look_ns:.1f} ns"],
         [
             "flops of a step in the machine code (in the formulas)",
             f"{executed.flops} ({of_step.flops}), and {executed.least_or_most} minima and maxima",
@@ -101,20 +101,20 @@ def measure(rounds: int = ROUNDS) -> Table:
             f"{of_evaluation.flops}, {of_evaluation.divide} of them divisions",
         ],
         ["rate of the steps", f"{executed.flops / attempt_ns:.1f} GFLOP/s"],
-        ["most that a loop of fused multiply-adds reached", f"{1e-9 * peak.flops / least['peak']:.1f} GFLOP/s"],
+        ["highest rate of a loop of fused multiply-adds", f"{1e-9 * peak.flops / least['peak']:.1f} GFLOP/s"],
         ["share of that peak (median of the rounds)", f"{100 * share:.0f} %"],
-        ["most that this mix of instructions would allow", f"{100 * mix:.0f} % of the peak"],
-        ["attempted steps of a design (in lanes that held one)", f"{attempts / DESIGNS:.1f} ({in_use / attempts:.1%})"],
-        ["steps attended to one by one: events, peaks, the end", f"{attended / DESIGNS:.1f} a design"],
-        ["cost of one of these, starting designs included", f"{started * DESIGNS / attended:.0f} ns"],
+        ["highest rate that this mix of instructions allows", f"{100 * mix:.0f} % of the peak"],
+        ["attempted steps per design (lanes occupied)", f"{attempts / DESIGNS:.1f} ({in_use / attempts:.1%})"],
+        ["steps handled one by one: events, peaks, the end", f"{attended / DESIGNS:.1f} per design"],
+        ["cost of one of these, including the start of designs", f"{started * DESIGNS / attended:.0f} ns"],
         ["a whole design", f"{1e6 * whole / DESIGNS:.2f} us"],
-        ["element sums", f"{sum_ns:.2f} ns an element, {1e-3 * sum_ns * ELEMENTS:.1f} us for N = {ELEMENTS}"],
-        ["closed form in their place, one by one", f"{closed_ns:.0f} ns"],
+        ["element sums", f"{sum_ns:.2f} ns per element, {1e-3 * sum_ns * ELEMENTS:.1f} us for N = {ELEMENTS}"],
+        ["closed form instead, one by one", f"{closed_ns:.0f} ns"],
     ]
     peaks = sorted(1e-9 * peak.flops / seconds for seconds in times["peak"])
     table.notes = [
         f"{instructions} packed instructions make up a step, {executed.add + executed.multiply - instructions} of them "
-        "fused; the formulas count common terms each time they stand there, the machine code once.",
+        "fused; the formulas count common terms each time they occur, the machine code once.",
         f"The multiply-add loop reached {peaks[0]:.0f} to {peaks[-1]:.0f} GFLOP/s in the {rounds} rounds.",
     ]
     return table

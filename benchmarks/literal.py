@@ -1,8 +1,8 @@
-"""The model with its switches inside the right-hand side, as a plain reading of the equations has it.
+"""The model with its switches inside the right-hand side, as a plain reading of the equations suggests.
 
-This is what integrators without events get: contact, seat and the direction of the weight's couple are decided anew in
-every evaluation. The kernels do not do this (see `boulder_kernels.modes`); here it shows what that is worth, and serves
-the other solvers that the kernels are compared with.
+This is what integrators without events get: contact, seat and the direction of the weight's couple are decided in
+every evaluation. The kernels do not do this (see `boulder_kernels.modes`); this module shows what that gains, and
+is the model that the other solvers get.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def literal_step(y: State, k1: Acceleration, h: float, readings: Readings, c: Co
 
 @_compiled
 def highest(q: Track) -> float:
-    """Largest displacement in a step: at its ends, or where a rising track turns inside."""
+    """Largest displacement within a step: at its ends, or at a maximum between them."""
     end = displacement_at(q, 1.0)
     slope_end = slope_at(q, 1.0)
     if not q.x1 > 0.0 > slope_end:
@@ -153,7 +153,7 @@ def literal_table(
     h
         Step [s].
     t_end
-        Time at which each design is known to have come to its end [s], shape (n,).
+        End time of each design [s], known beforehand, shape (n,).
     theta_limit
         Rotation at which a simulation ends [rad].
     """

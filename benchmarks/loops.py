@@ -25,7 +25,7 @@ _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "n
 
 @_compiled
 def filled_workspace(table: DesignTable, readings: Readings, control: Control, steps: int) -> np.ndarray:
-    """Workspace whose lanes hold the first designs of a table in the middle of their motion."""
+    """Return a workspace whose lanes hold the first designs of a table during their motion."""
     ws = np.zeros(SIZE)
     for lane in range(LANES):
         start_lane(ws, lane, table, lane, readings, control)
@@ -40,14 +40,14 @@ def filled_workspace(table: DesignTable, readings: Readings, control: Control, s
 
 @_compiled
 def attempt_often(ws: np.ndarray, times: int) -> None:
-    """Attempt the same step again and again; it takes the same time whatever comes out."""
+    """Attempt the same step repeatedly; its time does not depend on the outcome."""
     for _ in range(times):
         attempt_steps(ws)
 
 
 @_compiled
 def look_often(ws: np.ndarray, before: np.ndarray, horizon: float, times: int) -> None:
-    """Look at the outcome of the same attempt again and again; copying the workspace back costs little beside it."""
+    """Check the outcome of the same attempt repeatedly; copying the workspace back costs little in comparison."""
     for _ in range(times):
         ws[:] = before
         take_over_steps(ws, horizon)
@@ -55,14 +55,14 @@ def look_often(ws: np.ndarray, before: np.ndarray, horizon: float, times: int) -
 
 @_compiled
 def copy_often(ws: np.ndarray, before: np.ndarray, times: int) -> None:
-    """What `look_often` does without looking."""
+    """Do what `look_often` does, without the check."""
     for _ in range(times):
         ws[:] = before
 
 
 @_compiled
 def sum_elements_often(k: Kinematics, c: Constants, times: int) -> float:
-    """Sum over the elements at a state that changes a little each time."""
+    """Sum over the elements repeatedly, at slightly different states."""
     total = 0.0
     for i in range(times):
         total += element_sums(Kinematics(k.A + 1e-6 * i, k.slope_x, k.B, k.slope_v, k.q, k.lever_d), c).M
@@ -71,7 +71,7 @@ def sum_elements_often(k: Kinematics, c: Constants, times: int) -> float:
 
 @_compiled
 def integrate_often(k: Kinematics, c: Constants, times: int) -> float:
-    """Evaluate the closed form one by one, each time at a state that depends on the time before."""
+    """Evaluate the closed form repeatedly, each time at a state that depends on the previous result."""
     total = 0.0
     for _ in range(times):
         total += closed_form(Kinematics(k.A + 1e-12 * total, k.slope_x, k.B, k.slope_v, k.q, k.lever_d), c).M
@@ -85,7 +85,7 @@ def count_attempts(table: DesignTable, readings: Readings, control: Control, out
     Returns
     -------
     attempts, in_use, attended
-        Steps attempted by all lanes; those by lanes that held a design; those that had to be attended to one by one.
+        Steps attempted by all lanes; those by lanes that held a design; those handled one by one.
     """
     ws = np.zeros(SIZE)
     rows = np.full(LANES, EMPTY)

@@ -1,7 +1,7 @@
 """What the named accuracies cost and how accurate they are: ``python -m benchmarks.named``.
 
-Exactly what ``sweep run`` asks of the kernels under each name, in either preset. Ratios are medians over rounds in
-which all three were timed in turn.
+Uses the same control as ``sweep run`` under each name, for both presets. Ratios are medians over rounds in which all
+three were timed in turn.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ROUNDS = 5
 
 
 def named_control(name: str, steps: Steps) -> bk.Control:
-    """Return what a sweep asks of the kernels."""
+    """Return the control that a sweep uses."""
     return control(steps.step_s, error_estimate=name != "fast", locate_yield=steps.locate_yield)
 
 
@@ -36,7 +36,7 @@ def steps_text(name: str, steps: Steps) -> str:
 
 
 def wrong_verdicts(found: bk.OutcomeTable, known: bk.OutcomeTable) -> int:
-    """Count the designs on the other side of the limit that their own error does not make undecided."""
+    """Count the designs on the wrong side of the limit that are not undecided by their own error."""
     unsure = (found.status != LIMIT) & (ROTATION_LIMIT - found.theta_max < found.theta_error)
     unsure |= np.isinf(found.theta_error)
     return int(np.sum(((found.status == LIMIT) != (known.status == LIMIT)) & ~unsure))
@@ -50,7 +50,7 @@ def measure(count: int = DESIGNS, rounds: int = ROUNDS) -> Table:
         "The named accuracies",
         f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {count} random designs; CPU time of one thread",
         [
-            *("readings", "accuracy", "steps", "CPU time a design", "over `fast`"),
+            *("readings", "accuracy", "steps", "CPU time per design", "over `fast`"),
             *("rotation: max [deg]", "displacement: max [mm]", "wrong verdicts"),
         ],
     )

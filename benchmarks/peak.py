@@ -1,7 +1,7 @@
-"""What one core can do at most: a loop of nothing but fused multiply-adds in registers.
+"""The peak rate of one core: a loop of nothing but fused multiply-adds in registers.
 
-Written in LLVM's own language, so that no optimiser decides how many accumulators there are: each holds one vector
-and depends on itself only, and there are enough of them to hide the latency of both units.
+Written in LLVM IR, so that no optimiser changes the number of accumulators: each holds one vector and depends only on
+itself, and there are enough of them to hide the latency of both units.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ITERATIONS = 1_000_000
 
 
 class PeakLoop:
-    """The compiled loop and how wide its vectors are."""
+    """The compiled loop and the width of its vectors."""
 
     def __init__(self) -> None:
         # Numba initialises LLVM for this machine when it first compiles.
@@ -43,11 +43,11 @@ class PeakLoop:
         return 2 * ITERATIONS * ACCUMULATORS * self.width
 
     def __call__(self) -> float:
-        """Run the loop; the result converges to 1 and is there only so that nothing can be left out."""
+        """Run the loop; the result converges to 1 and only prevents the loop from being optimised away."""
         return float(self._call(ITERATIONS, 0.5))
 
     def gflops(self, repeats: int = 10) -> float:
-        """Most that was reached in several repeats [GFLOP/s]."""
+        """Highest rate in several repeats [GFLOP/s]."""
         best = float("inf")
         for _ in range(repeats):
             begun = time.process_time()
@@ -56,7 +56,7 @@ class PeakLoop:
         return 1e-9 * self.flops / best
 
     def _module(self) -> llvmlite.ir.Module:
-        """Every accumulator a becomes a f + f in each turn."""
+        """Return the module: each iteration replaces every accumulator a by a f + f."""
         module = llvmlite.ir.Module("peak")
         number, index = llvmlite.ir.DoubleType(), llvmlite.ir.IntType(64)
         vector = llvmlite.ir.VectorType(number, self.width)

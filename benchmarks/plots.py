@@ -37,7 +37,7 @@ def plot_steps(points: Sequence[Point], path: Path) -> None:
         for p in points:
             if p.preset == preset and p.way == "events located" and p.step_ms in (16.0, 8.0, 4.0, 2.0, 1.0):
                 panel.annotate(f" {p.step_ms:g} ms", (p.cpu_us, p.theta_max_deg), fontsize=7, color="#0b5fa5")
-        _finish(panel, f"readings: {preset}", "CPU time of a design, one core [us]")
+        _finish(panel, f"readings: {preset}", "CPU time per design, one core [us]")
         panel.legend(fontsize=7, title="faint: rms over the designs", title_fontsize=7)
     panels[0][0].set_ylabel("error of the largest rotation [deg]")
     _save(figure, path)
@@ -73,7 +73,7 @@ def plot_peers(series: Mapping[str, Sequence[tuple[float, float]]], path: Path, 
     Parameters
     ----------
     series
-        By name of the solver: pairs of CPU time of a design [us] and largest error [deg].
+        By name of the solver: pairs of CPU time per design [us] and largest error [deg].
     path
         Of the PNG file.
     tolerance_deg
@@ -97,7 +97,7 @@ def plot_peers(series: Mapping[str, Sequence[tuple[float, float]]], path: Path, 
         f"compared at {tolerance_deg:g} deg", (0.99, tolerance_deg), xycoords=("axes fraction", "data"), ha="right",
         va="bottom", fontsize=7, color="0.4",
     )  # fmt: skip
-    _finish(panel, "the same impacts, other solvers", "CPU time of a design, one core [us]")
+    _finish(panel, "the same impacts, other solvers", "CPU time per design, one core [us]")
     panel.set_ylabel("largest error of the largest rotation [deg]")
     panel.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.01, 0.5))
     _save(figure, path)

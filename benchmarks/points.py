@@ -1,4 +1,4 @@
-"""Peaks of many designs against those of a reference, reduced to a few sizes of the error."""
+"""Peaks of many designs compared with those of a reference, reduced to a few error measures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Peaks(NamedTuple):
 
     @classmethod
     def of(cls, out: bk.OutcomeTable) -> Peaks:
-        """Take them from outcomes."""
+        """Return the peaks of outcomes."""
         return cls(out.theta_max, out.x_b_max, out.x_v_max, out.status == LIMIT)
 
 

@@ -1,8 +1,8 @@
-"""Designs a second, wall time, by one thread and by two: ``python -m benchmarks.rates``.
+"""Designs per second of wall time, with one thread and with two: ``python -m benchmarks.rates``.
 
-Threads of one process work on the same 8192 designs over and over, as the workers of a sweep do on theirs; the rate is
-the most of several rounds. Three accuracies: 0.01 deg and 0.1 mm, 1e-4 deg and 0.002 mm, and the first with an estimate
-of the error on every row.
+Threads of one process work on the same 8192 designs repeatedly, as the workers of a sweep do on their blocks; the
+rate is the highest of several rounds. Three accuracies: 0.01 deg and 0.1 mm, 1e-4 deg and 0.002 mm, and the first
+with an estimate of the error on every row.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ WAYS = {
 
 
 def rate(designs: bk.DesignTable, how: bk.Control, threads: int) -> float:
-    """Return designs a second of some threads together."""
+    """Return the designs per second of several threads together."""
 
     def work() -> None:
         for _ in range(REPEATS):
@@ -74,7 +74,7 @@ def measure(rounds: int = ROUNDS) -> Table:
                 *(f"{one:,.0f}", f"{two:,.0f}", f"{two / one:.2f}"),
             ]
         )
-    table.notes.append(f"Two threads of nothing but multiply-adds: {peak_scaling(2):.2f} times the rate of one.")
+    table.notes.append(f"Two threads of multiply-adds only: {peak_scaling(2):.2f} times the rate of one.")
     return table
 
 

@@ -19,7 +19,7 @@ class Table:
     Parameters
     ----------
     name
-        Of its place in the README.
+        Name of its place in the README.
     title
         What was measured.
     conditions
@@ -27,7 +27,7 @@ class Table:
     header, rows
         Text of the cells.
     notes
-        What a reader must know to read it right.
+        What a reader must know to interpret it.
     """
 
     name: str
@@ -62,7 +62,7 @@ def from_json(text: str) -> list[Table]:
 
 
 def write_between_markers(tables: Sequence[Table], readme: Path = README) -> None:
-    """Put each table between its markers in the README; the prose around them stays as it is.
+    """Write each table between its markers in the README; the prose around them is left alone.
 
     Raises
     ------

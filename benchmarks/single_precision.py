@@ -1,9 +1,9 @@
-"""Would single precision pay? ``python -m benchmarks.single_precision``: the same kernels compiled on 32-bit floats.
+"""Is single precision worthwhile? ``python -m benchmarks.single_precision``: the same kernels for 32-bit floats.
 
-The sources of the kernels are loaded a second time with every literal rounded to single precision and the lanes in a
-32-bit workspace, twice as many of them in the same registers. The constants of a design and its stable step are still
-worked out in double precision, once. Both precisions simulate the same designs; errors are against a far finer solution
-in double precision. Compiling takes more than a minute: nothing is kept.
+The sources of the kernels are loaded a second time with every literal rounded to single precision and the lanes in
+a 32-bit workspace, twice as many of them in the same registers. The constants of a design and its stable step are
+still computed in double precision, once. Both precisions simulate the same designs; errors are against a far finer
+solution in double precision. Compiling takes more than a minute: nothing is kept.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .timing import machine, timed, versions
 PACKAGE = "boulder_kernels_single"
 SOURCES = Path(bk.__file__).parent
 KEPT = ("design", "readings", "stability")
-"""Modules that stay in double precision: what is worked out once per design."""
+"""Modules that stay in double precision: what is computed once per design."""
 ORDER = (
     *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "soil", "tableau"),
     *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
@@ -51,7 +51,7 @@ STEPS_MS = (16.0, 12.0, 8.0, 4.0, 2.0, 1.0)
 
 
 class _Rounded(ast.NodeTransformer):
-    """Puts every literal, infinity, NaN and pi through ``_single``."""
+    """Wraps every literal, infinity, NaN and pi in ``_single``."""
 
     def visit_Constant(self, node: ast.Constant) -> ast.expr:
         return self._single(node) if isinstance(node.value, float) else node
@@ -112,7 +112,7 @@ def _translated(name: str) -> types.ModuleType:
     module: Any = types.ModuleType(f"{PACKAGE}.{name}")
     module.__package__, module._single = PACKAGE, np.float32
     sys.modules[module.__name__] = module
-    with np.errstate(over="ignore"):  # 1e300 stands for never, and infinity does so as well
+    with np.errstate(over="ignore"):  # 1e300 means never, and so does infinity
         exec(compile(ast.fix_missing_locations(tree), str(file), "exec"), module.__dict__)
     if name == "tableau":
         module.C = tuple(np.float32(value) for value in module.C)

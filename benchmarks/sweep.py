@@ -1,7 +1,7 @@
-"""Whole sweeps, from process start to finished table: throughput, what is not kernels, memory, start-up, scaling.
+"""Whole sweeps, from process start to finished table: throughput, overhead, memory, start-up, scaling.
 
-Run as ``python -m benchmarks.sweep``. Every run is a process of its own. Wall time is what a user waits for, and is
-only worth something on a machine that does nothing else; CPU time and memory hold anywhere.
+Run as ``python -m benchmarks.sweep``. Every run is a separate process. Wall time is what a user waits for, and is
+only meaningful on an idle machine; CPU time and memory are meaningful anywhere.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Run:
 
 
 class Started:
-    """A sweep that is running in a process of its own."""
+    """A sweep that runs in a separate process."""
 
     def __init__(
         self, rows: int, jobs: int, accuracy: str, folder: Path, cache: Path | None = None, core: int | None = None
@@ -139,7 +139,7 @@ class Started:
 
 @contextmanager
 def on_core(core: int | None) -> Iterator[None]:
-    """Keep what is started meanwhile on one core; None: anywhere."""
+    """Pin what is started within the context to one core; None: any core."""
     before = os.sched_getaffinity(0)
     if core is not None:
         os.sched_setaffinity(0, {sorted(before)[core]})
@@ -150,7 +150,7 @@ def on_core(core: int | None) -> Iterator[None]:
 
 
 def peak_scaling(threads: int) -> float:
-    """Rate of several threads with the loop of nothing but multiply-adds, over that of one: what the machine allows."""
+    """Rate of several threads of multiply-adds only, over that of one: the limit of the machine."""
     peak = PeakLoop()
 
     def rate(count: int) -> float:
@@ -173,7 +173,7 @@ def throughput(sizes: tuple[int, ...], folder: Path) -> Table:
         "Whole sweeps, process start to finished table",
         f"{machine()}; {versions('numba', 'numpy', 'pyarrow', 'joblib')}; `sweep run --jobs 2`, corrected readings, "
         "warm cache of compiled kernels; balanced: an error estimate on every row, fast: none",
-        ["designs", "accuracy", "wall time", "designs/s", "CPU time a design", "not in kernels", "peak memory"],
+        ["designs", "accuracy", "wall time", "designs/s", "CPU time per design", "not in kernels", "peak memory"],
     )
     for accuracy in ("balanced", "fast"):
         for rows in sizes:
@@ -190,8 +190,8 @@ def throughput(sizes: tuple[int, ...], folder: Path) -> Table:
                 ]
             )
     table.notes = [
-        "Designs that the truck passes over are in the grid, too; they cost nothing in the kernels.",
-        "Start-up, about a second of imports and loading, is in all figures.",
+        "The grid includes designs that the truck passes over; they cost nothing in the kernels.",
+        "All figures include the start-up, about a second of imports and loading.",
     ]
     return table
 
@@ -215,7 +215,7 @@ def start_up(folder: Path) -> Table:
 
 
 def scaling(folder: Path, rows: int = SCALING_ROWS) -> Table:
-    """One core, two cores, and two processes on a core each that know nothing of each other."""
+    """Measure one core, two cores, and two independent processes on one core each."""
     one = Started(rows, 1, "balanced", folder, core=0).finish()
     two = Started(rows, 2, "balanced", folder).finish()
     both = [Started(rows, 1, "balanced", folder, core=core) for core in range(2)]
@@ -223,7 +223,7 @@ def scaling(folder: Path, rows: int = SCALING_ROWS) -> Table:
     table = Table(
         "scaling",
         "One core and two",
-        f"{machine()}; `sweep run` of {rows:.0e} designs, balanced; one core: kept there with all its threads",
+        f"{machine()}; `sweep run` of {rows:.0e} designs, balanced; one core: pinned to it with all its threads",
         ["", "process start to first block", "from there to the finished table", "over one core", "start-up included"],
     )
     slower = max(run.computing_s for run in apart)
@@ -249,7 +249,7 @@ def scaling(folder: Path, rows: int = SCALING_ROWS) -> Table:
 
 
 def measure(*, large: bool = False) -> list[Table]:
-    """Measure everything; about a minute, and another two with the large grid."""
+    """Measure everything; takes about a minute, and two more with the large grid."""
     sizes = (*SIZES, LARGE) if large else SIZES
     with tempfile.TemporaryDirectory(prefix="sweep-benchmark-") as name:
         folder = Path(name)

@@ -1,4 +1,4 @@
-"""One ``sweep run`` in a process of its own, with a clock around the kernels.
+"""One ``sweep run`` in a separate process, with a timer around the kernels.
 
 Run as ``python -m benchmarks.sweep_child BEGUN RECORD ARGUMENT...``: the arguments are those of ``sweep``, BEGUN is the
 monotonic time at which the process was started, and RECORD the file that takes the measurements.
@@ -15,7 +15,7 @@ from typing import Any
 
 
 class KernelClock:
-    """Stands in for `simulate_table` and takes the CPU time of every call."""
+    """Replaces `simulate_table` and measures the CPU time of every call."""
 
     def __init__(self, simulate: Any) -> None:
         self._simulate = simulate

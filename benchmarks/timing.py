@@ -1,7 +1,7 @@
 """CPU time of a piece of work, the machine it was taken on, and versions.
 
-CPU time and not wall time, because others may use the machine; the least of several repeats, because whatever
-disturbs a measurement makes it longer.
+CPU time rather than wall time, because other processes may use the machine; the minimum of several repeats, because any
+disturbance makes a measurement longer.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ REPEATS = 5
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
-    """CPU time of all threads of this process while some work is done once [s]."""
+    """Return the CPU time of all threads of this process while work is done once [s]."""
     begun = time.process_time()
     work()
     return time.process_time() - begun
 
 
 def timed(work: Callable[[], Result], repeats: int) -> tuple[Result, float]:
-    """Do some compiled work several times; return its result and the least CPU time [s]."""
+    """Do compiled work several times; return its result and the minimum CPU time [s]."""
     best, result = float("inf"), None
     for _ in range(repeats):
         begun = time.process_time()
@@ -38,18 +38,18 @@ def timed(work: Callable[[], Result], repeats: int) -> tuple[Result, float]:
 
 
 def least_cpu_seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Least CPU time of several repeats, after one that is not counted (it may have to compile) [s]."""
+    """Return the minimum CPU time of several repeats, after one that is not counted (it may compile) [s]."""
     work()
     return min(cpu_seconds(work) for _ in range(repeats))
 
 
 def interleaved(works: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """CPU times of several pieces of work, done in turn so that a change of the clock meets all of them [s].
+    """CPU times of several pieces of work, done in turn so that a change of clock speed affects all of them [s].
 
     Parameters
     ----------
     works
-        What to do, by name; each is done once before, uncounted.
+        Work by name; each is done once before, uncounted.
     rounds
         How often each is done.
     """
@@ -63,7 +63,7 @@ def interleaved(works: Mapping[str, Callable[[], object]], rounds: int) -> dict[
 
 
 def median_ratio(times: list[float], others: list[float]) -> float:
-    """Median of the ratios of times that were taken in turn."""
+    """Return the median ratio of times measured in turn."""
     return median(a / b for a, b in zip(times, others, strict=True))
 
 

@@ -1,7 +1,7 @@
 """Compare with other solvers: ``python -m benchmarks.peers``.
 
-The packages of ``benchmarks/requirements-peers.txt`` are best installed in an environment of their own; name its
-interpreter with ``--python``. What is not installed is named in the table.
+The packages of ``benchmarks/requirements-peers.txt`` are best installed in a separate environment; give its
+interpreter with ``--python``. The table lists what is not installed.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ def measure(count: int = DESIGNS) -> tuple[Table, dict[str, list[tuple[float, fl
         f"Other solvers at the same accuracy: largest error of the largest rotation at most {ACCURACY_DEG:g} deg",
         f"{machine()}; {versions(*PACKAGES)}; corrected readings; CPU time of all threads; each solver has the first "
         "designs of the same sample and its loosest tolerance that is accurate enough on them",
-        ["solver", "designs", "tolerance (step)", "error reached", "CPU time a design", "over the lanes"],
+        ["solver", "designs", "tolerance (step)", "error reached", "CPU time per design", "over the lanes"],
     )
     table.rows = [_row(each, measured[0]) for each in measured]
     table.notes = [
-        "The others are told when each design is over; the lanes find that out themselves. Peaks of the others are "
+        "The others get the end time of each design; the lanes find it themselves. Peaks of the others are "
         "taken from 65 output times, uncounted.",
-        "The fewer designs, the easier the accuracy: a solver with a small sample is flattered.",
+        "The accuracy is easier to reach with fewer designs, which favours solvers with a small sample.",
         *missing,
         *(f"{each.name}: {each.problem}" for each in measured if each.problem),
     ]

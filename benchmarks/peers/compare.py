@@ -1,4 +1,4 @@
-"""Bring every solver to the same accuracy, and time it there."""
+"""Bring every solver to the same accuracy and time it."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class Measured:
     designs
         How many designs it solved.
     points
-        Tolerance, CPU time of a design [s], largest error [deg]; in the order tried.
+        Tolerance, CPU time per design [s], largest error [deg]; in the order tried.
     problem
-        Why there is no more; empty where there is nothing to say.
+        Why there are no more points; empty if there is no problem.
     in_steps
         Whether the tolerances are steps [s].
     """
@@ -55,7 +55,7 @@ class Measured:
 
     @property
     def chosen(self) -> tuple[float, float, float] | None:
-        """The loosest tolerance from which on every finer one that was tried is accurate enough, too."""
+        """The loosest tolerance for which all finer ones tried are accurate enough, too."""
         best = None
         for point in reversed(self.points):
             if point[2] > ACCURACY_DEG:
@@ -65,13 +65,13 @@ class Measured:
 
 
 def measure_kernels(problem: Problem) -> Measured:
-    """The lanes of this project; their sample is the whole problem."""
+    """Measure the lanes of this project; their sample is the whole problem."""
     measured = Measured("boulder-sweep, lanes", problem.size, in_steps=True)
     bk.simulate_table(problem.designs, READINGS, bk.Control(0.01, HORIZON, ROTATION_LIMIT, 0, False))
     for step in KERNEL_STEPS_S:
         control = bk.Control(step, HORIZON, ROTATION_LIMIT, 0, False)
         out, seconds = timed(partial(bk.simulate_table, problem.designs, READINGS, control), 5)
-        # A design that only one of two solutions stops at the limit has an error of its own: its distance to it.
+        # If only one of two solutions stops at the limit, the error is the distance of the other to the limit.
         measured.points.append((step, seconds / problem.size, problem.largest_error_deg(out.theta_max)))
     return measured
 
@@ -86,7 +86,7 @@ def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measured
     problem
         At least as many designs as it wants.
     finer
-        How many tolerances more, to see that the accuracy stays.
+        How many further tolerances to try, to confirm that the accuracy holds.
     """
     own = problem.first(min(solver.designs, problem.size))
     measured = Measured(solver.name, own.size, in_steps=solver.in_steps)

@@ -1,4 +1,4 @@
-"""diffrax on JAX: all designs of a batch at once by `vmap`, compiled for the processor by XLA, on the closed form."""
+"""diffrax on JAX: all designs of a batch at once by `vmap`, compiled by XLA for the CPU, with the closed form."""
 
 from __future__ import annotations
 

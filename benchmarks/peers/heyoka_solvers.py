@@ -1,7 +1,7 @@
 """heyoka: Taylor's method compiled by LLVM, eight designs in the lanes of the vectors, on the closed form.
 
-A Taylor step takes every switch as it stands at its start and sees none inside, so what decides the accuracy is the
-longest step that is allowed; the tolerance of the series is fixed well below.
+A Taylor step evaluates every switch at its start and misses changes within, so the accuracy is decided by the
+longest step allowed; the tolerance of the series is fixed well below.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def _prepare(problem: Problem) -> Callable[[float], np.ndarray]:
         states = np.full((problem.size, OUTPUTS, 6), np.nan)
         for start in range(0, problem.size, LANES):
             part = np.arange(start, min(start + LANES, problem.size))
-            lanes = np.resize(part, LANES)  # the last batch is filled up with designs it has already
+            lanes = np.resize(part, LANES)  # the last batch is padded with designs it has already
             integrator.set_time(np.zeros(LANES))
             integrator.pars[:] = rows[lanes, : len(integrator.pars)].T  # the last constants do not occur
             integrator.state[:] = 0.0

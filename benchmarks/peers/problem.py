@@ -1,7 +1,7 @@
-"""The problem all solvers get, and how their answers are compared.
+"""The problem that all solvers get, and how their answers are compared.
 
-They get more than the kernels: each design ends at the time at which the kernels found it over, so that nobody
-simulates what cannot matter, and the peak is taken from 65 output times afterwards, uncounted.
+They get an advantage over the kernels: each design ends at the time at which the kernels stopped, so that no
+solver simulates more than it needs to, and the peak is taken from 65 output times afterwards, untimed.
 """
 
 from __future__ import annotations
@@ -78,9 +78,9 @@ class Solver:
     name
         What a table calls it.
     designs
-        How many designs it is given: fewer to slow ones.
+        Number of designs it gets; slow solvers get fewer.
     prepare
-        Makes, from the problem, the function that solves it at a tolerance; compiles what must be. The function
+        Returns, for the problem, the function that solves it at a tolerance, compiled if need be. The function
         returns the states, shape (n, 65, 6).
     tolerances
         Relative tolerances (or steps) to try, the loosest first.

@@ -71,7 +71,7 @@ def _solve(
     tolerance: float,
     ends: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Solve design by design, as a user of SciPy would; to other ends [s] than the problem's where given."""
+    """Solve design by design, as a user of SciPy would; up to other end times [s] than the problem's if given."""
     states = np.full((problem.size, OUTPUTS, 6), np.nan)
     for row, rate in enumerate(rates):
         times = problem.times(row)
@@ -89,7 +89,7 @@ def _paper(problem: Problem) -> Callable[[float], np.ndarray]:
 
 
 def _paper_to_horizon(problem: Problem) -> Callable[[float], np.ndarray]:
-    """Without being told the end: a design that does not overturn is simulated to the horizon."""
+    """Solve without a known end time: a design that does not overturn is simulated to the horizon."""
     rates = [PaperForces(problem.constants(row, ELEMENTS), problem.designs, row) for row in range(problem.size)]
     ends = np.where(problem.theta < 0.999 * ROTATION_LIMIT, HORIZON, problem.t_end)
     return lambda tolerance: _solve(rates, problem, "RK45", tolerance, ends)
