@@ -99,6 +99,22 @@ def reading_words(settings: Mapping[str, Any]) -> str:
     return ", ".join(f"{name}: {value}" for name, value in model["readings"].items())
 
 
+def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
+    """Return the settings as lines of text, lists in one line each."""
+    lines = []
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            lines += [f"{indent}{name}:", *setting_lines(value, f"{indent}  ")]
+        else:
+            shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in _as_list(value))
+            lines.append(f"{indent}{name}: {shown}")
+    return lines
+
+
+def _as_list(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
+
+
 def _layout() -> dict[str, Any]:
     """Order of the kernel's numbers, and the column of the table that each input comes from."""
     return {

@@ -15,7 +15,7 @@ from bokeh.embed.util import standalone_docs_json_and_render_items
 from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.report.contents import page_data, reading_words, table_data
+from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, verdict_map
 
 if TYPE_CHECKING:
@@ -122,6 +122,7 @@ def assembled(
         facts=facts,
         notes=notes,
         settings=settings,
+        lines=setting_lines(settings),
         readings=reading_words(settings),
         data=_for_script(data),
         style=(ASSETS / "page.css").read_text(),

@@ -4,6 +4,8 @@
 const SAMPLES = 400;
 const AROUND = 40;
 const SPREAD = 0.25;
+/** Width of a sheet of A4 between its margins [px]. */
+const PAPER = 680;
 /** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
 const BEFORE_THE_END = 1 - 1e-14;
 
@@ -30,6 +32,7 @@ class Page {
     const horizon = data.settings[data.layout.settings.indexOf("horizon")];
     this.times = Float64Array.from({ length: SAMPLES + 1 }, (_, k) => ((horizon * k) / SAMPLES) * BEFORE_THE_END);
     this.waiting = 0;
+    this.printing = false;
     /** @type {Record<string, Cell[]>} */
     this.cells = {};
   }
@@ -228,14 +231,15 @@ class Page {
   }
 
   showList() {
-    const columns = [...this.inputs.map((input) => ({ ...input, kind: "input" })), ...this.data.outcomes];
+    const columns = [...this.data.outcomes, ...this.inputs];
     byId("list").hidden = this.list.length === 0;
     byId("list-head").replaceChildren(...["verdict", ...columns.map((one) => this.units.title(one.label, one.unit))].map((words) => element("th", words)));
     const found = this.judged(this.list, false);
     byId("list-rows").replaceChildren(
       ...this.list.map((design, k) => {
         const line = document.createElement("tr");
-        const values = columns.map((one) => this.units.text(found[k][one.name] ?? this.completed(design).inputs[one.name] ?? null, one.unit));
+        const known = { ...this.completed(design).inputs, ...found[k] };
+        const values = columns.map((one) => this.units.bare(known[one.name], one.unit));
         line.append(...[`${found[k].verdict} ${found[k].reason}`, ...values].map((words) => element("td", words)));
         return line;
       }),
@@ -356,10 +360,15 @@ class Page {
     window.addEventListener("beforeprint", () => {
       opened = [...document.querySelectorAll("details")].filter((one) => !one.open);
       for (const one of opened) one.open = true;
-      this.paint(false);
+      const width = byId("live").clientWidth;
+      document.documentElement.style.setProperty("--screen", `${width}px`);
+      document.documentElement.style.setProperty("--paper", String(Math.min(PAPER / width, 1)));
+      this.printing = true;
+      this.paint();
     });
     window.addEventListener("afterprint", () => {
       for (const one of opened) one.open = false;
+      this.printing = false;
       this.paint();
     });
     for (const button of document.querySelectorAll(".load")) {
@@ -370,8 +379,10 @@ class Page {
     }
   }
 
-  /** @param {boolean} [dark] by default as the reader or the system wants it */
-  paint(dark = byId("theme").value === "dark" || (byId("theme").value === "" && matchMedia("(prefers-color-scheme: dark)").matches)) {
+  /** Put on the colours that the reader or the system wants; on paper those of the light. */
+  paint() {
+    const wanted = byId("theme").value || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    const dark = wanted === "dark" && !this.printing;
     document.documentElement.toggleAttribute("data-dark", dark);
     this.plots.recolour();
   }

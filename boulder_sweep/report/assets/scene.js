@@ -27,7 +27,7 @@ class SideView {
   draw(s, motion, sample) {
     this.svg.replaceChildren();
     const wedge = s.depth * Math.tan(Math.PI / 4 + s.friction / 2);
-    const [left, right] = [-(s.bed + 1.6), Math.max(s.length + wedge, s.line + 1.3) + 0.4];
+    const [left, right] = [-(s.bed + 1.6), Math.max(s.length + wedge, s.line + 2.8) + 0.4];
     const [bottom, top] = [-s.depth - 0.4, Math.max(s.height - s.depth, 2.6) + 0.7];
     this.svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
     /** @param {string} name */

@@ -41,6 +41,11 @@ class Units {
     return name === "" ? number(value) : `${number(value / this.size(unit))}${name === "°" ? "" : "\u00a0"}${name}`;
   }
 
+  /** @param {number | string | null} value @param {string} unit of the table @returns {string} a number without its unit */
+  bare(value, unit) {
+    return typeof value === "number" ? number(value / this.size(unit)) : (value ?? "–");
+  }
+
   /** @param {string} words @param {string} unit of the table @returns {string} a title for an axis */
   title(words, unit) {
     const name = this.name(unit);
