@@ -85,8 +85,12 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
         "grid": bool(rows.axes),
         "values": values,
         "given": {name: float(value) for name, value in rows.inputs.items() if value.shape == ()},
-        "labels": {name: _label(name) for name in values},
-        "units": {name: BY_NAME[name].unit for name in values},
+        "labels": {name: name if name in rows.sets else _label(name) for name in values},
+        "units": {name: "" if name in rows.sets else BY_NAME[name].unit for name in values},
+        "sets": {
+            axis: {"names": own.names, "inputs": {name: along.tolist() for name, along in own.inputs.items()}}
+            for axis, own in rows.sets.items()
+        },
         "codes": base64.b64encode(gzip.compress(codes.tobytes(), 6, mtime=0)).decode(),
     }
 

@@ -9,21 +9,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.reader import read_row
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
-SOIL = ("soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3", "strain_rate_factor")
+SOIL = ("soil", "soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3", "strain_rate_factor")
 NOT_YET = "not computed yet"
 MOST_CELLS = 1_500_000
 """Designs of a grid whose verdicts go into the page; of more, some values of the longest axes are left out."""
 MOST_POINTS = 20_000
 """The same of a list of designs, each of which brings its inputs along."""
+
+
+class NamedSets(NamedTuple):
+    """An axis of named soils or vehicles."""
+
+    names: tuple[str, ...]
+    inputs: dict[str, np.ndarray]
+    """What each of them gives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +50,10 @@ class Rows:
     codes : ndarray of uint8, shape (rows,)
         Place of every row among the names.
     axes : dict of str to ndarray
-        Values along each axis of the grid, the last fastest; empty for a list of designs.
+        Values along each axis of the grid, the last fastest; for named sets of soils or vehicles their numbers. Empty
+        for a list of designs.
+    sets : dict of str to NamedSets
+        The axes that are named sets.
     inputs : dict of str to ndarray
         What is given for every design: single values, axes in their places, or one value a row. They broadcast
         against each other, and for a grid against its shape.
@@ -52,6 +64,7 @@ class Rows:
     names: tuple[str, ...]
     codes: np.ndarray
     axes: dict[str, np.ndarray]
+    sets: dict[str, NamedSets]
     inputs: dict[str, np.ndarray]
 
     @property
@@ -116,11 +129,12 @@ def read_rows(folder: Path) -> Rows:
     finished = FinishedRows(folder)
     settings = finished.identity["settings"]
     order, given = settings["order"], settings["inputs"]
-    listed = order == "table"
+    sets = {} if order == "table" else dict(_sets(settings))
     # Very long axes and the columns of a list are in the table only.
-    varying = [name for name, value in given.items() if isinstance(value, list | dict) and name not in order]
-    unlisted = [name for name in order if isinstance(given[name], dict)] if not listed else []
-    wanted = [*(varying if listed else unlisted)]
+    if order == "table":
+        wanted = [name for name, value in given.items() if isinstance(value, list | dict)]
+    else:
+        wanted = [name for name in order if isinstance(given.get(name), dict)]
     stored = list(dict.fromkeys(own for name in wanted for own in _stored(name)))
     codes = np.full(finished.rows, 255, np.uint8)
     columns = {name: np.full(finished.rows, np.nan) for name in stored}
@@ -132,14 +146,24 @@ def read_rows(folder: Path) -> Rows:
             columns[name][rows] = table.column(name).to_numpy()
     codes[codes == 255] = len(names)
     inputs = {name: np.array(float(value)) for name, value in given.items() if isinstance(value, float | int)}
-    if listed:
-        return Rows(
-            folder, finished, (*names, NOT_YET), codes, {}, inputs | {name: _column(columns, name) for name in varying}
-        )
-    axes = dict(_axes(order, given, columns))
-    for place, (name, values) in enumerate(axes.items()):
-        inputs[name] = values.reshape([-1 if k == place else 1 for k in range(len(axes))])
-    return Rows(folder, finished, (*names, NOT_YET), codes, axes, inputs)
+    axes: dict[str, np.ndarray] = {}
+    if order == "table":
+        inputs |= {name: _column(columns, name) for name in wanted}
+    else:
+        axes = dict(_axes(order, given, sets, columns))
+    for place, (axis, values) in enumerate(axes.items()):
+        for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
+            inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
+    return Rows(folder, finished, (*names, NOT_YET), codes, axes, sets, inputs)
+
+
+def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:
+    """Yield the axes that are named sets: each gives the inputs of its block of the file that are no axes."""
+    given, order = settings["inputs"], settings["order"]
+    for axis, names in settings.get("labels", {}).items():
+        own = {name: value for name, value in given.items() if isinstance(value, list) and name not in order}
+        inputs = {name: np.array(value) for name, value in own.items() if BY_NAME[name].section == axis}
+        yield axis, NamedSets(tuple(names), inputs)
 
 
 def _stored(name: str) -> tuple[str, ...]:
@@ -151,15 +175,23 @@ def _column(columns: dict[str, np.ndarray], name: str) -> np.ndarray:
     return columns[DEPTH] / columns["boulder_height_m"] if name == RATIO else columns[name]
 
 
-def _axes(order: list[str], given: dict[str, Any], columns: dict[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
+def _axes(
+    order: list[str], given: dict[str, Any], sets: dict[str, NamedSets], columns: dict[str, np.ndarray]
+) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the axes with their values."""
-    lengths = [given[name]["count"] if isinstance(given[name], dict) else len(given[name]) for name in order]
-    for place, name in enumerate(order):
-        if isinstance(given[name], list):
+    lengths = [len(sets[name].names) if name in sets else _length(given[name]) for name in order]
+    for place, (name, length) in enumerate(zip(order, lengths, strict=True)):
+        if name in sets:
+            yield name, np.arange(length)
+        elif isinstance(given[name], list):
             yield name, np.array(given[name])
-            continue
-        step = int(np.prod(lengths[place + 1 :], dtype=np.int64))
-        yield name, _column(columns, name)[: step * lengths[place] : step]
+        else:
+            step = int(np.prod(lengths[place + 1 :], dtype=np.int64))
+            yield name, _column(columns, name)[: step * length : step]
+
+
+def _length(values: Any) -> int:
+    return int(values["count"]) if isinstance(values, dict) else len(values)
 
 
 def _codes(table: Any, names: list[str]) -> np.ndarray:

@@ -82,7 +82,7 @@ def write_report(
         kept=kept,
         chosen=chosen,
         facts=_facts(identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)),
-        notes=[*notes, *_general_notes(control)],
+        notes=[*notes, *_general_notes(identity["settings"], control)],
         units=units,
     )
     return _written(Path(page), text)
@@ -107,6 +107,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
     """
     sweep.require_values()
     assembled = _page_maker()
+    sweep.require_values()
     block = sweep.block(number, number + 1)
     if block.reasons[0]:
         raise ReportError(f"design {number} cannot be computed: {block.reasons[0]}")
@@ -119,7 +120,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         readings=readings_of(sweep),
         start=inputs,
         facts=_facts(versions(), sha256_of(settings), kernels_sha256(), command, None),
-        notes=_general_notes(control),
+        notes=_general_notes(settings, control),
         units=units,
     )
     return _written(Path(page), text)
@@ -151,9 +152,11 @@ def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
     return {"title": one.title, "number": one.number, "inputs": {name: row[name] for name in INPUT_COLUMNS}}
 
 
-def _general_notes(control: Control) -> list[str]:
+def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
     """What the reader must know of how these designs are simulated."""
     notes = []
+    for factor in settings.get("partial_factor", {}).values():
+        notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:
         notes.append("No numerical error was estimated: verdicts near a limit are unguarded.")
     if control.elements:

@@ -14,6 +14,15 @@ site: {embedment_ratio: {from: 0.45, to: 0.75, count: 7}}
 soil: {density: 1860 kg/m^3, friction_angle: [36, 40] deg, subgrade_reaction: 60 MN/m^3}
 vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
 """
+SETS = """\
+name: sites
+boulder: {length: 1.65 m, width: 1.68 m, height: [2.4, 3.4] m, density: 2596 kg/m^3}
+site: {embedment_ratio: [0.5, 0.6, 0.7]}
+soil:
+  - {name: loose, density: 1700 kg/m^3, friction_angle: 32 deg, subgrade_reaction: 20 MN/m^3}
+  - {name: dense sand, density: 1900 kg/m^3, friction_angle: 42 deg, subgrade_reaction: 90 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 NO_NETWORK = [
     "--no-sandbox",

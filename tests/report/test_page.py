@@ -9,7 +9,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.report import example, write_explorer, write_report
-from tests.report.conftest import GRID
+from tests.report.conftest import GRID, SETS
 
 DESIGNS = 200
 SLIDERS = {
@@ -206,8 +206,17 @@ def test_the_map_shows_the_rows_and_a_rectangle_can_be_picked(report, result, op
     assert design["friction_angle_deg"] == pytest.approx(shown[3]["friction_angle_deg"])
 
 
-@pytest.mark.parametrize("width", [480, 1280])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_named_soils_have_their_names_on_the_slider(tmp_path, opened):
+    (tmp_path / "sites.yaml").write_text(SETS)
+    boulder_sweep.run(boulder_sweep.load(tmp_path / "sites.yaml"), tmp_path / "out")
+    page = opened(write_report(tmp_path / "out", tmp_path / "out.html"))
+    assert page.inner_text("#held") == "soil: dense sand"
+    page.evaluate("page.take(page.cells.sweep[0].pick())")
+    assert page.evaluate("page.design.friction_angle_deg") == 42.0
+    assert page.evaluate("page.design.soil_density_kg_m3") == 1900.0
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(480, "dark"), (1280, "light")])
 def test_nothing_is_wider_than_the_screen(report, opened, width, scheme):
     page = opened(report, viewport={"width": width, "height": 800}, color_scheme=scheme)
     assert page.evaluate("document.documentElement.scrollWidth") <= width

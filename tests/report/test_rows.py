@@ -6,6 +6,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.report.answers import Quantity, answer_of
 from boulder_sweep.report.rows import NOT_YET, read_rows, thinned
+from tests.report.conftest import SETS
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +94,18 @@ def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path)
     rows = read_rows(result)
     codes = rows.codes.copy()
     codes[100:] = len(rows.names) - 1
-    unfinished = type(rows)(rows.folder, rows.finished, rows.names, codes, rows.axes, rows.inputs)
+    unfinished = type(rows)(rows.folder, rows.finished, rows.names, codes, rows.axes, rows.sets, rows.inputs)
     assert unfinished.counts()[NOT_YET] == 152
     assert any("152 designs are not computed yet" in str(sentence[0]) for sentence in answer_of(unfinished).sentences)
+
+
+def test_named_soils_are_one_axis_that_gives_all_their_inputs(tmp_path):
+    (tmp_path / "sites.yaml").write_text(SETS)
+    boulder_sweep.run(boulder_sweep.load(tmp_path / "sites.yaml"), tmp_path / "out")
+    rows, table = read_rows(tmp_path / "out"), boulder_sweep.read(tmp_path / "out")
+    assert rows.shape == (2, 3, 2)
+    assert rows.sets["soil"].names == ("loose", "dense sand")
+    for name in ("soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3", "embedment_ratio"):
+        column = table.embedment_depth_m / table.boulder_height_m if name == "embedment_ratio" else table[name]
+        np.testing.assert_allclose(np.broadcast_to(rows.inputs[name], rows.shape).ravel(), column)
+    assert "all 2 soils" in str(answer_of(rows).sentences) or "every soil" in str(answer_of(rows).sentences)

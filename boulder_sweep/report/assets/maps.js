@@ -10,6 +10,7 @@
  * @property {Record<string, number>} given inputs that are the same for all
  * @property {Record<string, string>} labels
  * @property {Record<string, string>} units
+ * @property {Record<string, {names: string[], inputs: Record<string, number[]>}>} sets axes of named soils or vehicles
  * @property {string} codes
  */
 

@@ -288,7 +288,8 @@ class Page {
         const slider = document.createElement("input");
         Object.assign(slider, { type: "range", min: "0", max: String(values.length - 1), value: String(this.held[name]) });
         const tell = () => {
-          words.textContent = `${rows.labels[name]}: ${this.units.text(values[this.held[name]], rows.units[name])}`;
+          const value = values[this.held[name]];
+          words.textContent = `${rows.labels[name]}: ${rows.sets[name]?.names[value] ?? this.units.text(value, rows.units[name])}`;
           slider.setAttribute("aria-valuetext", words.textContent);
         };
         slider.addEventListener("input", () => {
@@ -307,6 +308,11 @@ class Page {
   /** @param {Record<string, number>} given inputs, embedment_ratio among them perhaps */
   take(given) {
     const { embedment_ratio: ratio, ...inputs } = given;
+    for (const [axis, own] of Object.entries(/** @type {TableRows["sets"]} */ (this.data.rows?.sets ?? {}))) {
+      if (!(axis in inputs)) continue;
+      for (const [name, values] of Object.entries(own.inputs)) inputs[name] = values[inputs[axis]];
+      delete inputs[axis];
+    }
     Object.assign(this.design, inputs);
     if (ratio !== undefined) this.design.embedment_depth_m = ratio * this.design.boulder_height_m;
     this.update();
@@ -430,7 +436,9 @@ class Page {
     byId("units").value = this.units.system;
     if (rows === null) return;
     const varying = Object.keys(rows.values).filter((name) => new Set(rows.values[name]).size > 1);
-    const names = varying.length > 0 ? varying : Object.keys(rows.values);
+    // Numbers make the better axes; names stay on a slider as long as there are enough of them.
+    const numbers = varying.filter((name) => !(name in rows.sets));
+    const names = numbers.length > 1 ? numbers : varying.length > 0 ? varying : Object.keys(rows.values);
     const options = /** @type {[string, string][]} */ (names.map((name) => [name, rows.labels[name]]));
     const first = names.find((name) => name.startsWith("embedment")) ?? names[0];
     const second = names.find((name) => name === "boulder_height_m" && name !== first) ?? names.find((name) => name !== first) ?? first;
