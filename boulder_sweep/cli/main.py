@@ -13,8 +13,10 @@ import click
 # Every module of a command imports heavy packages (numba, pandas, pyarrow, even numpy) inside its function, so that
 # `sweep --help` and `sweep check` are instant.
 from boulder_sweep.cli.check import check
+from boulder_sweep.cli.compare import compare
 from boulder_sweep.cli.explain import explain
 from boulder_sweep.cli.explore import explore
+from boulder_sweep.cli.export import export
 from boulder_sweep.cli.fit_vehicle import fit_vehicle
 from boulder_sweep.cli.need import need
 from boulder_sweep.cli.new import new
@@ -44,6 +46,8 @@ COMMANDS = (
     status,
     plot,
     report,
+    export,
+    compare,
     explain,
     tradeoff,
     validate,

@@ -1,0 +1,32 @@
+"""``sweep export``: a result as a spreadsheet, comma-separated values or one Parquet file."""
+
+from __future__ import annotations
+
+import click
+
+from boulder_sweep.cli.options import units_option
+
+EXAMPLES = """\b
+Examples:
+  sweep export m30-sizing.sweep -o designs.xlsx --units us
+  sweep export m30-sizing.sweep -o designs.csv
+"""
+
+
+@click.command("export", short_help="Write a result as .xlsx, .csv or .parquet.", epilog=EXAMPLES)
+@click.argument("out", type=click.Path())
+@click.option(
+    "-o", "--output", "file", type=click.Path(), required=True, metavar="F.xlsx|.csv|.parquet", help="The table."
+)
+@units_option
+def export(out: str, file: str, units: str) -> int:
+    """Write the result in OUT as one table for colleagues, in SI or US customary units.
+
+    The names of the columns end in their units. A spreadsheet has a second sheet with units, meanings, settings,
+    versions and hashes.
+    """
+    from boulder_sweep.report.export import export as write
+
+    rows = write(out, file, units=units)
+    click.echo(f"{file}: {rows:,} rows")
+    return 0

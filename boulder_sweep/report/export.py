@@ -1,0 +1,199 @@
+"""A result as a table for colleagues: a spreadsheet, comma-separated values or Parquet, in SI or US units."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from boulder_sweep.columns import column_spec
+from boulder_sweep.errors import ReportError
+from boulder_sweep.report.contents import setting_lines
+from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.store.finished import FinishedRows
+from boulder_sweep.views.wording import NOT_A_TEST
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+KINDS = (".xlsx", ".csv", ".parquet")
+MOST_SHEET_ROWS = 1_048_575
+"""Rows of a sheet of a spreadsheet, its head apart."""
+FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
+"""How a text begins that spreadsheets take for a formula."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A column of the exported table."""
+
+    stored: str
+    """Its name in the result."""
+    name: str
+    unit: str
+    size: float
+    """One of its unit in that of the result."""
+    meaning: str
+
+
+def export(out: str | Path, file: str | Path, *, units: str = "si") -> int:
+    """Write a result as one table.
+
+    Parameters
+    ----------
+    out
+        Folder that a sweep wrote; a run may still be writing into it.
+    file
+        The table: ``.xlsx``, with a second sheet of units, settings and versions, ``.csv`` or ``.parquet``.
+    units
+        ``si``, the table as it is, or ``us``: columns in US customary units, which their names end in.
+
+    Returns
+    -------
+    int
+        Rows written.
+
+    Raises
+    ------
+    ReportError
+        The kind is unknown, a sheet cannot hold so many rows, or openpyxl, an extra, is not installed.
+    StoreError
+        There is no result in the folder, or it is damaged.
+    """
+    target, finished = Path(file), FinishedRows(Path(out))
+    kind = target.suffix.lower()
+    if kind not in KINDS:
+        raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
+    if kind == ".xlsx" and finished.rows_done > MOST_SHEET_ROWS:
+        raise ReportError(
+            f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
+        )
+    writer: Callable[[Path, FinishedRows, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
+    passing = target.with_name(f".{target.name}.part")
+    try:
+        rows = writer(passing, finished, units)
+        passing.replace(target)
+    finally:
+        passing.unlink(missing_ok=True)
+    return rows
+
+
+def shown_column(stored: str, units: str) -> Shown:
+    """Return how a column of the result is shown: its name ends in the unit."""
+    spec = column_spec(stored)
+    if units == "si" or not spec.unit:
+        return Shown(stored, stored, spec.unit, 1.0, spec.meaning)
+    unit, size = shown_unit(spec.unit, units)
+    name = stored if size == 1.0 else stored.removesuffix(_suffix(spec.unit)) + _suffix(unit)
+    return Shown(stored, name, unit, size, spec.meaning)
+
+
+def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[str, str, str]]:
+    """Yield what a reader must know of a table: three texts a line."""
+    identity: Mapping[str, Any] = finished.identity
+    yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
+    yield "rows", f"{finished.rows_done:,} of {finished.rows:,}", ""
+    for name, version in identity["versions"].items():
+        yield f"version of {name}", version, ""
+    yield "hash of the settings", identity["settings_sha256"], ""
+    yield "hash of the kernels", identity["kernels_sha256"], ""
+    yield "", "", ""
+    yield "column", "unit", "meaning"
+    for column in columns:
+        yield column.name, column.unit, column.meaning
+    yield "", "", ""
+    yield "settings", "", ""
+    for line in setting_lines(identity["settings"]):
+        yield line, "", ""
+
+
+def _suffix(unit: str) -> str:
+    """End of the name of a column in this unit: ``_kg_m3`` for kg/m^3."""
+    return "_" + unit.replace("^", "").replace("*", "_").replace("/", "_")
+
+
+def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
+    """Yield the rows piece by piece in the units asked for."""
+    import pyarrow.compute as pc
+
+    for table in finished.tables():
+        columns = [shown_column(name, units) for name in table.column_names]
+        for place, column in enumerate(columns):
+            if column.size != 1.0:
+                values = pc.divide(table.column(place), column.size)
+                table = table.set_column(place, column.name, values)
+        yield columns, table.rename_columns([column.name for column in columns])
+
+
+def _csv(target: Path, finished: FinishedRows, units: str) -> int:
+    """Write comma-separated values; null is empty."""
+    rows = 0
+    with target.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        for columns, table in _tables(finished, units):
+            if rows == 0:
+                writer.writerow(column.name for column in columns)
+            writer.writerows(zip(*map(_harmless, table.columns), strict=True))
+            rows += len(table)
+    return rows
+
+
+def _harmless(column: pa.ChunkedArray) -> list[Any]:
+    """Values of a column, no text of which a spreadsheet takes for a formula."""
+    values = column.to_pylist()
+    return [f"'{value}" if isinstance(value, str) and value.startswith(FORMULA_SIGNS) else value for value in values]
+
+
+def _parquet(target: Path, finished: FinishedRows, units: str) -> int:
+    """Write one Parquet file with units and meanings in its field metadata, settings and versions in its own."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rows, writer = 0, None
+    try:
+        for columns, table in _tables(finished, units):
+            fields = [
+                field.with_metadata({"unit": column.unit, "meaning": column.meaning})
+                for field, column in zip(table.schema, columns, strict=True)
+            ]
+            schema = pa.schema(fields, {"about": "\n".join("\t".join(line) for line in about(finished, columns))})
+            writer = writer or pq.ParquetWriter(target, schema, compression="zstd")
+            writer.write_table(table.cast(writer.schema))
+            rows += len(table)
+    finally:
+        if writer is not None:
+            writer.close()
+    return rows
+
+
+def _sheet(target: Path, finished: FinishedRows, units: str) -> int:
+    """Write a spreadsheet: the designs, and what a reader must know of them."""
+    rows, columns = 0, list[Shown]()
+    with _workbook(target) as book:
+        designs = book.create_sheet("designs")
+        designs.freeze_panes = "B2"
+        for columns, table in _tables(finished, units):
+            if rows == 0:
+                designs.append([column.name for column in columns])
+            for values in zip(*map(_harmless, table.columns), strict=True):
+                designs.append(values)
+            rows += len(table)
+        sheet = book.create_sheet("about")
+        for line in about(finished, columns):
+            sheet.append(line)
+    return rows
+
+
+@contextmanager
+def _workbook(target: Path) -> Iterator[Any]:
+    """Give a workbook that is written as it grows."""
+    try:
+        from openpyxl import Workbook
+    except ImportError as lacking:
+        raise ReportError("spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from lacking
+    book = Workbook(write_only=True)
+    yield book
+    book.save(target)
