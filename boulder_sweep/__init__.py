@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.need import Need, need
     from boulder_sweep.answers.uncertainty import Uncertainty, uncertainty
     from boulder_sweep.impact.simulation import Trajectory, simulate
+    from boulder_sweep.report.comparison import compare
+    from boulder_sweep.report.export import export
+    from boulder_sweep.report.writing import write_explorer, write_report
     from boulder_sweep.runner.sweeper import Summary, run
     from boulder_sweep.settings import SettingsError, Sweep, load
     from boulder_sweep.store import read
@@ -30,12 +33,16 @@ __all__ = [
     "Trajectory",
     "Uncertainty",
     "__version__",
+    "compare",
+    "export",
     "load",
     "need",
     "read",
     "run",
     "simulate",
     "uncertainty",
+    "write_explorer",
+    "write_report",
 ]
 
 # Names are fetched at first use: the import of numba or pandas takes longer than checking a file.
@@ -52,6 +59,10 @@ _HOME = {
     "Trajectory": "boulder_sweep.impact.simulation",
     "simulate": "boulder_sweep.impact.simulation",
     "read": "boulder_sweep.store",
+    "compare": "boulder_sweep.report.comparison",
+    "export": "boulder_sweep.report.export",
+    "write_explorer": "boulder_sweep.report.writing",
+    "write_report": "boulder_sweep.report.writing",
 }
 
 

@@ -1,5 +1,6 @@
 """`sweep report` and `sweep explore` from the command line: what they write, what they open, what they refuse."""
 
+import json
 import webbrowser
 from pathlib import Path
 
@@ -76,3 +77,20 @@ def test_without_the_extra_it_says_what_to_install(sweep, grid, monkeypatch):
     monkeypatch.setitem(sys.modules, "jinja2", None)
     code, _, err = sweep("report", "small-grid.sweep")
     assert (code, err) == (2, "error: reports need jinja2: pip install 'boulder-sweep[report]'\n")
+
+
+def test_a_result_is_exported_and_compared(sweep, possible_grid):
+    sweep("run", possible_grid, "-q")
+    sweep("run", possible_grid, "-q", "-o", "fast.sweep", "--set", "vehicle.speed=40 mph")
+    assert sweep("export", "small-grid.sweep", "-o", "designs.csv", "--units", "us") == (
+        0,
+        "designs.csv: 18 rows\n",
+        "",
+    )
+    code, out, err = sweep("compare", "small-grid.sweep", "small-grid.sweep")
+    assert (code, err) == (0, "")
+    assert out.startswith("18 designs in both; 0 only before, 0 only after\n0 verdicts turned\n")
+    code, out, _ = sweep("compare", "small-grid.sweep", "fast.sweep", "--json")
+    found = json.loads(out)
+    assert (code, found["matched"], found["only_before"], found["only_after"]) == (0, 0, 18, 18)
+    assert any("impact_speed_m_s" in line for line in found["changed"])

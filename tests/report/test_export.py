@@ -1,0 +1,106 @@
+"""Tables for colleagues: the same rows, in units that names of columns end in, and harmless in a spreadsheet."""
+
+import csv
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+import boulder_sweep
+from boulder_sweep.columns import COLUMNS
+from boulder_sweep.errors import ReportError
+from boulder_sweep.report import export as module
+from boulder_sweep.report.export import export, shown_column
+from boulder_sweep.settings.units import factor
+
+US = {
+    "boulder_length_m": "boulder_length_ft",
+    "boulder_density_kg_m3": "boulder_density_pcf",
+    "subgrade_reaction_MN_m3": "subgrade_reaction_pci",
+    "vehicle_mass_kg": "vehicle_mass_lb",
+    "impact_speed_m_s": "impact_speed_mph",
+    "vehicle_spring_N_m": "vehicle_spring_lb_in",
+    "vehicle_damper_N_s_m": "vehicle_damper_lb_s_in",
+    "peak_force_kN": "peak_force_kip",
+    "friction_angle_deg": "friction_angle_deg",
+    "verdict": "verdict",
+}
+
+
+@pytest.fixture(scope="module")
+def table(result):
+    return boulder_sweep.read(result)
+
+
+def test_names_end_in_their_units():
+    assert {name: shown_column(name, "us").name for name in US} == US
+    assert [shown_column(spec.name, "si").name for spec in COLUMNS] == [spec.name for spec in COLUMNS]
+    for spec in COLUMNS:
+        column = shown_column(spec.name, "us")
+        if column.size != 1.0 and column.unit != "kip":
+            assert column.size == float(factor(column.unit, spec.unit))
+    assert shown_column("peak_force_kN", "us").size == 4.4482216152605
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "xlsx"])
+def test_every_row_is_there_in_the_units_asked_for(result, table, tmp_path, kind):
+    target = tmp_path / f"designs.{kind}"
+    assert export(result, target, units="us") == len(table)
+    read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "xlsx": lambda file: pd.read_excel(file, "designs")}[kind]
+    found = read(target)
+    assert len(found) == len(table)
+    assert list(found.columns) == [shown_column(name, "us").name for name in table.columns]
+    for name in table.columns:
+        column = shown_column(name, "us")
+        if table[name].dtype == float:
+            np.testing.assert_allclose(found[column.name], table[name] / column.size, rtol=1e-14)
+        else:
+            texts = [column.astype(object).where(column.notna(), "") for column in (found[column.name], table[name])]
+            assert texts[0].astype(str).tolist() == texts[1].astype(str).tolist()
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_spreadsheet_tells_units_settings_and_that_it_is_no_test(result, tmp_path):
+    export(result, tmp_path / "designs.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "designs.xlsx")
+    assert book.sheetnames == ["designs", "about"]
+    lines = [[cell or "" for cell in row] for row in book["about"].iter_rows(values_only=True)]
+    assert "not a rating by test" in lines[0][0]
+    assert ["boulder_length_m", "m", "length L of the boulder along the direction of travel"] in lines
+    assert ["name: sizing", "", ""] in lines
+    assert any(line[0] == "hash of the kernels" for line in lines)
+
+
+def test_parquet_keeps_units_and_meanings(result, tmp_path):
+    export(result, tmp_path / "designs.parquet", units="us")
+    schema = pq.read_schema(tmp_path / "designs.parquet")
+    assert schema.field("peak_force_kip").metadata[b"unit"] == b"kip"
+    assert b"not a rating by test" in schema.metadata[b"about"]
+
+
+def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
+    (tmp_path / "designs.csv").write_text("boulder_id,boulder_height_m\n=HYPERLINK(1),2.4\n@x,3.4\nplain,3\n")
+    (tmp_path / "list.yaml").write_text(
+        "name: list\ntable: designs.csv\nboulder: {length: 1.65 m, width: 1.5 m, density: 2600 kg/m^3}\n"
+        "site: {embedment_ratio: 0.6}\n"
+        "soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}\n"
+        "vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}\n"
+    )
+    boulder_sweep.run(boulder_sweep.load(tmp_path / "list.yaml"), tmp_path / "out")
+    export(tmp_path / "out", tmp_path / "out.csv")
+    with (tmp_path / "out.csv").open(newline="") as file:
+        assert [row["boulder_id"] for row in csv.DictReader(file)] == ["'=HYPERLINK(1)", "'@x", "plain"]
+    export(tmp_path / "out", tmp_path / "out.xlsx")
+    sheet = openpyxl.load_workbook(tmp_path / "out.xlsx")["designs"]
+    assert {cell.data_type for row in sheet.iter_rows() for cell in row} <= {"s", "inlineStr", "n"}
+
+
+def test_what_cannot_be_written_is_refused(result, tmp_path, monkeypatch):
+    with pytest.raises(ReportError, match=r"must end in \.xlsx, \.csv or \.parquet"):
+        export(result, tmp_path / "designs.ods")
+    monkeypatch.setattr(module, "MOST_SHEET_ROWS", 100)
+    with pytest.raises(ReportError, match="a sheet holds 100 rows, not 252"):
+        export(result, tmp_path / "designs.xlsx")
+    assert list(tmp_path.iterdir()) == []
