@@ -7,6 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.options import json_option, units_option
+from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
 Examples:
@@ -19,10 +20,12 @@ LEAST = {"mass_kg": ("lightest boulder", "kg"), "depth_m": ("shallowest depth", 
 @click.command("compare", short_help="Which verdicts turned between two results, and why.", epilog=EXAMPLES)
 @click.argument("before", type=click.Path())
 @click.argument("after", type=click.Path())
-@click.option("--show", type=click.IntRange(min=0), default=5, metavar="N", help="Designs that turned to list [5].")
+@click.option(
+    "--show", "listed", type=click.IntRange(min=0), default=5, metavar="N", help="Designs that turned to list [5]."
+)
 @units_option
 @json_option
-def compare(before: str, after: str, show: int, units: str, as_json: bool) -> int:
+def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> int:
     """Compare the results in BEFORE and AFTER design by design, matched by their inputs.
 
     Tells what differs in settings and versions, how many verdicts turned and which way, and the least mass and depth
@@ -34,22 +37,22 @@ def compare(before: str, after: str, show: int, units: str, as_json: bool) -> in
 
     found = match(before, after)
     if as_json:
-        click.echo(json.dumps(found.to_dict()))
+        show(json.dumps(found.to_dict()))
         return 0
     for line in found.changed:
-        click.echo(f"changed  {line}")
+        show(f"changed  {line}")
     alone = f"{found.only_before:,} only before, {found.only_after:,} only after"
-    click.echo(f"{counted(len(found.matched), 'design')} in both; {alone}")
-    click.echo(f"{counted(len(found.turned), 'verdict')} turned")
+    show(f"{counted(len(found.matched), 'design')} in both; {alone}")
+    show(f"{counted(len(found.turned), 'verdict')} turned")
     for turn, count in found.turns().items():
-        click.echo(f"  {count:>9,}  {turn}")
+        show(f"  {count:>9,}  {turn}")
     for name, pair in found.least.items():
         words, unit = LEAST[name]
         shown, size = shown_unit(unit, units)
         values = ["none passes" if value is None else f"{value / size:,.5g} {shown}" for value in pair]
-        click.echo(f"{words} that passes: {values[0]} before, {values[1]} after")
-    for row in found.turned.head(show).itertuples():
-        click.echo(
+        show(f"{words} that passes: {values[0]} before, {values[1]} after")
+    for row in found.turned.head(listed).itertuples():
+        show(
             f"  design {row.design_id_before:,} -> {row.design_id_after:,}: "
             f"{row.max_rotation_deg_before:.4g} -> {row.max_rotation_deg_after:.4g} deg"
         )

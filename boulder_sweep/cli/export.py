@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from boulder_sweep.cli.options import units_option
+from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
 Examples:
@@ -28,5 +29,5 @@ def export(out: str, file: str, units: str) -> int:
     from boulder_sweep.report.export import export as write
 
     rows = write(out, file, units=units)
-    click.echo(f"{file}: {rows:,} rows")
+    show(f"{file}: {rows:,} rows")
     return 0
