@@ -72,7 +72,7 @@ class Entries:
         from boulder_sweep.settings.table import read_table
 
         if not isinstance(node, Scalar) or not node.text.strip():
-            self.problems.add(node.place, "table", "must be the name of a .csv or .parquet file")
+            self.problems.add(node.place, "table", "must be the name of a .csv, .xlsx or .parquet file")
             return
         # A name in the file is relative to the file's folder, one given by --set to the current directory.
         folder = self.path.parent if node.place.file == str(self.path) else Path()

@@ -40,7 +40,7 @@ def schema() -> Schema:
         "properties": {
             "name": {"type": "string", "pattern": f"^({NAME.pattern})$", "description": "name of the sweep"},
             **{section: _block(section, words) for section, words in SECTIONS.items()},
-            "table": {"type": "string", "pattern": r"\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT])$"},
+            "table": {"type": "string", "pattern": r"\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT]|[xX][lL][sS][xX])$"},
         },
         **_what_is_required(),
         "$defs": {

@@ -1,8 +1,10 @@
 """Explicit lists of designs from CSV and Parquet files."""
 
 import re
+import zipfile
 
 import numpy as np
+import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -232,11 +234,11 @@ def test_files_that_are_no_tables(messages_of, content, words):
     assert any(words in message for message in messages_of(content))
 
 
-@pytest.mark.parametrize("name", ["designs.xlsx", "designs", ".csv.txt"])
+@pytest.mark.parametrize("name", ["designs.xls", "designs", ".csv.txt"])
 def test_other_formats(messages_of, name):
     (message,) = messages_of(HEADER + ROWS, name)
     assert message.startswith("grid.yaml:1:8: table: ")
-    assert "neither a .csv nor a .parquet file" in message
+    assert "is none of these: .csv, .xlsx, .parquet" in message
 
 
 def test_missing_table(messages_of):
@@ -333,3 +335,55 @@ def test_a_long_table_stays_columns(load_table):
     block = sweep.block(20_000, 20_100)
     assert block.columns["boulder_height_m"].to_numpy().tolist() == heights[20_000:20_100].tolist()
     assert len(block.columns["boulder_width_m"].values) == 3
+
+
+@pytest.fixture
+def write_xlsx(tmp_path):
+    def write_xlsx(*rows):
+        book = openpyxl.Workbook()
+        for row in rows:
+            book.active.append(row)
+        book.create_sheet("second").append(["not read"])
+        book.save(tmp_path / "designs.xlsx")
+
+    return write_xlsx
+
+
+def test_a_spreadsheet(load_table, write_xlsx):
+    names = ["Block", "boulder_length_ft", "boulder_width_m", "boulder_height_m", "embedment_depth_m", None]
+    write_xlsx(names, ["A 1", 5.5, 1, 3.44, 2.03], [], ["A 2", "6", 1.2, 3, 1.5, None], [None, 5, 1, 3, 1.5])
+    sweep = load_table(None, "designs.xlsx")
+    assert _column(sweep, "boulder_length_m") == pytest.approx([1.6764, 1.8288, 1.524])
+    assert _column(sweep, "boulder_height_m") == [3.44, 3.0, 3.0]
+    label = sweep.block(0, 3).labels["Block"]
+    assert [label.words[code] for code in label.codes] == ["A 1", "A 2", ""]
+
+
+def test_mistakes_in_a_spreadsheet(write_xlsx, messages_of):
+    write_xlsx(HEADER.strip().split(","), [1, 1, 2, 1], [1, "x", 2, None], [1, 1, 2, 1, 7], [1, 1, 200, 1])
+    messages = messages_of(None, "designs.xlsx")
+    assert [message.split(": ")[0] for message in messages] == [
+        f"designs.xlsx:{place}" for place in ("3:2", "3:4", "4:1", "5:3")
+    ]
+    assert "has 5 cells; the first line has 4" in messages[2]
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", b"x" * 1000])
+def test_files_that_are_no_spreadsheet(messages_of, content):
+    (message,) = messages_of(content, "designs.xlsx")
+    assert "cannot be read as a spreadsheet" in message
+
+
+def test_a_spreadsheet_that_unpacks_to_too_much(messages_of, tmp_path, monkeypatch):
+    monkeypatch.setattr("boulder_sweep.settings.table_rows.MAX_UNPACKED_BYTES", 1_000_000)
+    with zipfile.ZipFile(tmp_path / "designs.xlsx", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/workbook.xml", bytes(1_000_001))
+    (message,) = messages_of(None, "designs.xlsx")
+    assert "once unpacked; save it as CSV" in message
+
+
+def test_an_empty_spreadsheet(write_xlsx, messages_of):
+    write_xlsx()
+    assert "is empty; the first row" in messages_of(None, "designs.xlsx")[0]
+    write_xlsx(HEADER.strip().split(","))
+    assert "no rows below the column names" in messages_of(None, "designs.xlsx")[0]

@@ -1,0 +1,306 @@
+"""Tables of designs whose cells are text: CSV files and spreadsheets, read row by row."""
+
+from __future__ import annotations
+
+import csv
+import re
+import zipfile
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from boulder_sweep.designs import Label
+from boulder_sweep.settings.fields import Field
+from boulder_sweep.settings.leaf import outside
+from boulder_sweep.settings.numbers import NumberError, split_number
+from boulder_sweep.settings.problems import Place, ProblemList, shorten
+from boulder_sweep.settings.source import refuse
+from boulder_sweep.settings.sweep import DesignList
+from boulder_sweep.settings.table_header import TableColumn, check_numbers, read_header
+
+MAX_TABLE_ROWS = 20_000_000
+MAX_UNPACKED_BYTES = 1_000_000_000
+"""Largest spreadsheet once it is unpacked."""
+CHUNK = 20_000
+"""Rows that are converted and checked at once."""
+MAX_ALIKE = 5
+"""Most problems reported of one column, and of lines with a wrong number of cells."""
+MAX_TEXT = 200
+"""Longest text that is carried along, in characters."""
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(\s.*)?")
+
+Origin = Callable[[int], Place]
+"""From the number of a cell in its row to its place."""
+
+
+class Alike:
+    """Reports problems of one kind up to a limit, then counts them."""
+
+    def __init__(self, problems: ProblemList) -> None:
+        self.problems = problems
+        self.counts: Counter[tuple[str, str]] = Counter()
+        self.last: dict[tuple[str, str], Place] = {}
+
+    def add(self, kind: str, place: Place, key: str, message: str, most: int = MAX_ALIKE) -> None:
+        """Report a problem, or count it if there were enough of its kind and key."""
+        self.counts[kind, key] += 1
+        self.last[kind, key] = Place(place.file, place.line)
+        if self.counts[kind, key] <= most:
+            self.problems.add(place, key, message)
+
+    def finish(self) -> None:
+        """Say how many more there are."""
+        for (kind, key), count in self.counts.items():
+            if kind and count > MAX_ALIKE:
+                self.problems.add(self.last[kind, key], key, f"and {count - MAX_ALIKE} more {kind} like these")
+
+
+def check_values(values: np.ndarray, field: Field) -> list[tuple[int, str]]:
+    """Return (row, what is wrong) for values that are not finite or not admitted."""
+    bound = field.admitted
+    assert bound is not None
+    wrong = np.flatnonzero(~((values >= bound.low) & (values <= bound.high)))
+    return [
+        (int(row), outside(float(values[row]), field) if np.isfinite(values[row]) else "is not a finite number")
+        for row in wrong
+    ]
+
+
+def label_of(texts: list[str]) -> Label:
+    """Return texts, one a row, as codes and words; fit to be printed."""
+    words, codes = np.unique(np.array([shorten(text, MAX_TEXT) for text in texts], dtype=object), return_inverse=True)
+    return Label(codes.astype(np.int32), tuple(words.tolist()))
+
+
+def converted(values: np.ndarray, column: TableColumn) -> np.ndarray:
+    """Return values in the unit of the input."""
+    return values if column.factor == 1 else values * float(column.factor)
+
+
+class _Rows:
+    """Turns rows of text into columns of numbers, a chunk at a time."""
+
+    def __init__(self, path: Path, problems: ProblemList) -> None:
+        self.path = path
+        self.label = str(path)
+        self.problems = problems
+        self.before = len(problems.problems)
+        self.alike = Alike(problems)
+        self.columns: list[TableColumn | None] = []
+        self.places: list[Place] = []
+        self.numbers: dict[str, list[np.ndarray]] = {}
+        self.texts: dict[str, list[str]] = {}
+        self.rows: list[list[str]] = []
+        self.origins: list[Origin] = []
+        self.count = 0
+
+    def header(self, names: list[str], origin: Origin) -> None:
+        """Take the column names."""
+        self.places = [origin(index) for index in range(len(names))]
+        self.columns = read_header(names, self.places, self.problems)
+
+    def take(self, row: list[str], origin: Origin, hint: str = "") -> None:
+        """Take a row; `hint` follows the message if it has too many cells."""
+        if len(row) != len(self.columns):
+            message = f"has {len(row)} cell{'' if len(row) == 1 else 's'}; the first line has {len(self.columns)}"
+            message += hint if len(row) > len(self.columns) else ""
+            self.alike.add("lines", origin(0), "", message)
+            return
+        self.count += 1
+        if self.count > MAX_TABLE_ROWS:
+            raise refuse(self.label, f"has more than {MAX_TABLE_ROWS} rows")
+        self.rows.append(row)
+        self.origins.append(origin)
+        if len(self.rows) >= CHUNK:
+            self.flush()
+
+    def finish(self) -> DesignList:
+        """Return the designs; with mistakes in the header or the cells they are not usable."""
+        self.flush()
+        self.alike.finish()
+        if self.count == 0 and len(self.problems.problems) == self.before:
+            raise refuse(self.label, "has no rows below the column names")
+        for column, place in zip(self.columns, self.places, strict=True):
+            if column is not None and column.field is None and _are_numbers(self.texts.get(column.name, [])):
+                check_numbers(column, place, self.problems)
+        numbers = {name: np.concatenate(parts) for name, parts in self.numbers.items()}
+        return DesignList(self.path.name, numbers, {name: label_of(texts) for name, texts in self.texts.items()})
+
+    def flush(self) -> None:
+        """Convert and check the rows taken since the last time."""
+        if not self.rows:
+            return
+        for index, column in enumerate(self.columns):
+            if column is None:
+                continue
+            cells = [row[index] for row in self.rows]
+            if column.field is None:
+                self.texts.setdefault(column.name, []).extend(cells)
+                continue
+            values = converted(self.convert(cells, index, column), column)
+            for row, message in check_values(values, column.field):
+                if not np.isnan(values[row]):  # those have been reported as they were read
+                    self.alike.add("cells", self.origins[row](index), column.name, message)
+            self.numbers.setdefault(column.field.name, []).append(values)
+        self.rows.clear()
+        self.origins.clear()
+
+    def convert(self, cells: list[str], index: int, column: TableColumn) -> np.ndarray:
+        """Return cells as numbers, NaN for those that are none (they are reported)."""
+        if not any("_" in cell or "n" in cell.lower() for cell in cells):
+            try:
+                return np.array([float(cell) for cell in cells])  # the usual case, fast
+            except ValueError:
+                pass
+        assert column.field is not None
+        values = np.full(len(cells), np.nan)
+        for row, cell in enumerate(cells):
+            if _DECIMAL_COMMA.fullmatch(cell):
+                message = f"'{shorten(cell)}' has a decimal comma; save the file with decimal points"
+                self.alike.add("", self.origins[row](index), "", message, most=1)
+                continue
+            try:
+                number, unit = split_number(cell, column.field.unit)
+                if unit:
+                    raise NumberError(f"'{shorten(cell)}' has a unit; units belong in the column's name")
+                values[row] = float(number)
+            except (NumberError, OverflowError) as error:
+                self.alike.add("cells", self.origins[row](index), column.name, str(error))
+        return values
+
+
+def _are_numbers(cells: list[str]) -> bool:
+    """Whether every cell that is not empty holds a plain number, and there is one."""
+    filled = [cell for cell in cells if cell.strip()]
+    try:
+        return bool(filled) and all(np.isfinite(float(cell)) for cell in filled)
+    except ValueError:
+        return False
+
+
+class _Lines:
+    """Lines of a file without the comments (# ...); remembers the line that was read last."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+        self.number = 0
+        self.text = ""
+
+    def __iter__(self) -> Iterator[str]:
+        for line in self.stream:
+            self.number += 1
+            self.text = line
+            if line.startswith("#"):
+                continue
+            yield line
+
+
+def read_csv(path: Path, problems: ProblemList) -> DesignList:
+    """Return the designs of a CSV file.
+
+    Parameters
+    ----------
+    path : Path
+        UTF-8 text, comma, semicolon or tab between the cells, first line the column names. Lines that begin
+        with # and empty lines are skipped.
+    problems : ProblemList
+        Receives mistakes with line and column of the cell.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read at all.
+    """
+    label = str(path)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            return _read_lines(_Lines(stream), _Rows(path, problems))
+    except UnicodeDecodeError:
+        raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
+    except OSError as error:
+        raise refuse(label, f"cannot be read ({error.strerror})") from None
+
+
+def _read_lines(source: _Lines, rows: _Rows) -> DesignList:
+    """Take the lines of a CSV file."""
+    lines = iter(source)
+    header = next((line for line in lines if line.strip()), None)
+    if header is None:
+        raise refuse(rows.label, "is empty; the first line must hold the column names")
+    delimiter = next((sign for sign in ",;\t" if sign in header), ",")
+    hint = " (numbers need a decimal point, and text with a comma needs quotation marks)" if delimiter == "," else ""
+
+    def origin() -> Origin:
+        line, text = source.number, source.text
+        return lambda index: _place(rows.label, line, text.split(delimiter), index)
+
+    try:
+        rows.header([cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))], origin())
+        for row in csv.reader(lines, delimiter=delimiter):
+            if row and (len(row) > 1 or row[0].strip()):
+                rows.take(row, origin(), hint)
+    except csv.Error as error:
+        raise refuse(rows.label, f"cannot be read as CSV ({error})", source.number, 1) from None
+    return rows.finish()
+
+
+def _place(label: str, line: int, cells: list[str], index: int) -> Place:
+    """Return where a cell begins; with quotation marks in the line, only the line is certain."""
+    if any('"' in cell for cell in cells):
+        return Place(label, line)
+    return Place(label, line, sum(len(cell) + 1 for cell in cells[:index]) + 1)
+
+
+def read_xlsx(path: Path, problems: ProblemList) -> DesignList:
+    """Return the designs of the first sheet of a spreadsheet; row and column of a cell are its place.
+
+    Parameters
+    ----------
+    path : Path
+        Excel workbook; first row the column names. Empty rows are skipped, formulas count by their stored value.
+    problems : ProblemList
+        Receives mistakes.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read at all, or openpyxl is not installed.
+    """
+    label = str(path)
+    try:
+        from openpyxl import load_workbook  # an extra, for tables in this format only
+    except ImportError:
+        raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
+    rows = _Rows(path, problems)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > MAX_UNPACKED_BYTES:
+                raise refuse(label, f"has more than {MAX_UNPACKED_BYTES / 1e9:g} GB once unpacked; save it as CSV")
+        book = load_workbook(path, read_only=True, data_only=True)
+        for number, cells in enumerate(book.worksheets[0].iter_rows(values_only=True), 1):
+            texts = ["" if cell is None else str(cell) for cell in cells]
+            origin = _cell_of(label, number)
+            if not any(text.strip() for text in texts):
+                continue
+            if rows.columns:
+                rows.take((texts + [""] * len(rows.columns))[: max(len(rows.columns), _filled(texts))], origin)
+            else:
+                rows.header([text.strip() for text in texts[: _filled(texts)]], origin)
+        book.close()
+    except (OSError, ValueError, KeyError, IndexError, SyntaxError, zipfile.BadZipFile) as error:
+        raise refuse(label, f"cannot be read as a spreadsheet ({shorten(str(error), 100)})") from None
+    if not rows.columns:
+        raise refuse(label, "is empty; the first row must hold the column names")
+    return rows.finish()
+
+
+def _cell_of(label: str, row: int) -> Origin:
+    return lambda index: Place(label, row, index + 1)
+
+
+def _filled(texts: list[str]) -> int:
+    """Return how many cells a row has up to the last one that is not empty."""
+    return max(index + 1 for index, text in enumerate(texts) if text.strip())
