@@ -95,6 +95,8 @@ def run(
     StoreError
         `out` cannot be used, see `boulder_sweep.store.errors`; nothing has been computed then. `WriteError`
         also when the disk fills up during the run: what is written is whole, and the run can be resumed.
+    TypeError, ValueError
+        An argument is of the wrong type, or a count is below one.
     BackendError
         The workers are not available.
     ClusterLostError
@@ -104,6 +106,7 @@ def run(
     """
     begun = time.monotonic()
     out = Path(out)
+    _check_arguments(sweep, jobs, rows_per_part, commit_every_s, progress)
     sweep.require_values()
     check_backend(backend, scheduler)
     again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
@@ -197,3 +200,28 @@ def estimate(
         out=folder,
         rows_per_part=rows_per_part,
     )
+
+
+def _check_arguments(
+    sweep: Sweep, jobs: int | None, rows_per_part: int, commit_every_s: float, progress: Report | None
+) -> None:
+    """Refuse arguments of wrong types and counts below one, by name.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Says what is allowed.
+    """
+    from boulder_sweep.settings import Sweep
+
+    if not isinstance(sweep, Sweep):
+        raise TypeError(f"sweep must be what boulder_sweep.load returns, not {type(sweep).__name__}")
+    for name, count in (("jobs", 1 if jobs is None else jobs), ("rows_per_part", rows_per_part)):
+        if not isinstance(count, int) or isinstance(count, bool):
+            raise TypeError(f"{name} must be a whole number, not {type(count).__name__}")
+        if count < 1:
+            raise ValueError(f"{name} must be at least 1, not {count}")
+    if not commit_every_s >= 0.0:
+        raise ValueError(f"commit_every_s must not be negative, but is {commit_every_s}")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be a function, not {type(progress).__name__}")

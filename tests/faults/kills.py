@@ -1,12 +1,16 @@
-"""Kill runs with SIGKILL at random instants, again and again, and let them go on.
+"""Kill runs with SIGKILL at random instants, again and again, and resume them.
+
+A third of the kills comes after a random time. The others come just before or after a change of the output folder: a
+file gets its name, is removed or flushed, as in commits, merges and the cleaning up of a resumed run.
 
 A process that has loaded everything once forks a child for every run, so that a kill costs a fraction of a
-second. Prints one JSON object: kills, tables finished, and what was found wrong. Run from the root of the
-repository as ``python -m tests.faults.kills FOLDER KILLS SEED``.
+second. Prints one JSON object: kills, tables finished, and what was wrong. Run from the root of the repository as
+``python -m tests.faults.kills FOLDER KILLS SEED``.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import random
@@ -14,7 +18,7 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 import pyarrow as pa
@@ -30,10 +34,35 @@ from tests.runner.grids import grid_of, same_bits
 ROWS, ROWS_PER_PART = 20_000, 4_000
 LONGEST_LIFE = 0.6
 """As a share of the time an undisturbed run takes on this machine now."""
+CHANGES = {"link": 30, "rename": 20, "unlink": 8, "fsync": 60}
+"""Calls that change a folder, and about how often a run makes them."""
+
+
+class Aim(NamedTuple):
+    """When to kill: at a call that changes the folder."""
+
+    call: str
+    number: int
+    before: bool
+
+    def take(self) -> None:
+        """Let this process die at the call."""
+        real, calls = getattr(os, self.call), itertools.count(1)
+
+        def deadly(*arguments: Any, **options: Any) -> Any:
+            now = next(calls) == self.number
+            if now and self.before:
+                os.kill(os.getpid(), signal.SIGKILL)
+            found = real(*arguments, **options)
+            if now:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return found
+
+        setattr(os, self.call, deadly)
 
 
 def one_run(out: Path) -> None:
-    """Go on with the run in this process, and leave it."""
+    """Resume the run in this process."""
     run(
         grid_of(ROWS, soil="{elements: 100}"),
         out,
@@ -44,17 +73,19 @@ def one_run(out: Path) -> None:
     )
 
 
-def in_a_child(out: Path, life_s: float | None) -> bool:
-    """Go on with the run in a child, which is killed after a while; True if it was."""
+def in_a_child(out: Path, life: float | Aim | None) -> bool:
+    """Resume the run in a child, which is killed after a while [s] or at a call; True if it was."""
     child = os.fork()
     if child == 0:
         try:
+            if isinstance(life, Aim):
+                life.take()
             one_run(out)
             os._exit(0)
         finally:
             os._exit(1)
-    if life_s is not None:
-        time.sleep(life_s)
+    if isinstance(life, float):
+        time.sleep(life)
         os.kill(child, signal.SIGKILL)
     _, how = os.waitpid(child, 0)
     if os.WIFSIGNALED(how):
@@ -104,10 +135,17 @@ def main() -> None:
     longest_life_s = LONGEST_LIFE * (time.monotonic() - begun)
     done, tables, faults = 0, [], []
     outs = []
+
+    def life() -> float | Aim:
+        if chance.random() < 1 / 3:
+            return chance.uniform(0.0, longest_life_s)
+        call = chance.choice(list(CHANGES))
+        return Aim(call, chance.randint(1, CHANGES[call]), chance.random() < 0.5)
+
     while done < kills:
         out = folder / f"killed-{len(outs)}"
         outs.append(out)
-        while done < kills and in_a_child(out, chance.uniform(0.0, longest_life_s)):
+        while done < kills and in_a_child(out, life()):
             done += 1
             look_at(out, faults)
     whole = read_table(whole_out)

@@ -1,0 +1,99 @@
+"""What cannot work is refused before anything is compiled or computed."""
+
+from __future__ import annotations
+
+import errno
+
+import pytest
+
+from boulder_sweep.errors import BackendError
+from boulder_sweep.runner import sweeper
+from boulder_sweep.runner.sweeper import run
+from boulder_sweep.store import files
+from boulder_sweep.store.errors import DoesNotFitError, OutputExistsError, StoreError, WriteError
+from tests.runner.grids import grid, grid_of
+
+HUGE = {
+    "width": "{from: 1 m, to: 2.5 m, count: 100000}",
+    "height": "{from: 1.6 m, to: 3.4 m, count: 100000}",
+    "subgrade": "{from: 20 MN/m^3, to: 100 MN/m^3, count: 100000}",
+    "site": "embedment_ratio: 0.5",
+    "friction": "40 deg",
+}
+
+
+@pytest.fixture(autouse=True)
+def nothing_may_be_computed(monkeypatch):
+    """Neither a pilot nor the sweep: each would compile the kernels first."""
+
+    def never(*_):
+        raise AssertionError("too late")
+
+    monkeypatch.setattr(sweeper, "accuracy_of", never)
+    monkeypatch.setattr(sweeper, "evaluation_of", never)
+
+
+def test_a_grid_that_fits_on_no_disk(tmp_path):
+    sweep = grid(**HUGE)
+    assert sweep.n_designs == 10**15
+    with pytest.raises(DoesNotFitError, match=r"1,000,000,000,000,000 rows needs at least 1 PB.*free.*--force"):
+        run(sweep, tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk(tmp_path, monkeypatch):
+    def full(descriptor, content):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files.os, "write", full)
+    with pytest.raises(WriteError, match=r"cannot write into .*: No space left on device"):
+        run(grid(), tmp_path / "out")
+    monkeypatch.undo()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["a file", "a file/out", "no such folder/out", "/sys/out", "/proc/out", "/dev/null"])
+def test_an_output_that_cannot_be_written(tmp_path, name):
+    (tmp_path / "a file").write_text("mine")
+    with pytest.raises(StoreError):
+        run(grid(), tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == ["a file"]
+
+
+def test_an_output_that_exists(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        from boulder_sweep.judge.evaluation import evaluation_of
+        from boulder_sweep.judge.pilot import accuracy_of
+        from tests.runner.grids import plausible
+
+        patch.setattr(sweeper, "accuracy_of", accuracy_of)
+        patch.setattr(sweeper, "evaluation_of", evaluation_of)
+        run(grid_of(10), out, simulate=plausible)
+    with pytest.raises(OutputExistsError):
+        run(grid_of(10), out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem", "words"),
+    [
+        ({"sweep": "grid.yaml"}, TypeError, "sweep must be what boulder_sweep.load returns, not str"),
+        ({"sweep": None}, TypeError, "not NoneType"),
+        ({"out": 5}, TypeError, "PathLike"),
+        ({"jobs": 0}, ValueError, "jobs must be at least 1, not 0"),
+        ({"jobs": -2}, ValueError, "jobs must be at least 1"),
+        ({"jobs": "two"}, TypeError, "jobs must be a whole number, not str"),
+        ({"jobs": 2.0}, TypeError, "jobs must be a whole number, not float"),
+        ({"jobs": True}, TypeError, "jobs must be a whole number, not bool"),
+        ({"rows_per_part": 0}, ValueError, "rows_per_part must be at least 1"),
+        ({"commit_every_s": -1.0}, ValueError, "commit_every_s must not be negative"),
+        ({"commit_every_s": float("nan")}, ValueError, "commit_every_s"),
+        ({"progress": "bar"}, TypeError, "progress must be a function, not str"),
+        ({"backend": "loky"}, BackendError, "unknown backend 'loky': choose one of threading, dask"),
+        ({"backend": 3}, BackendError, "unknown backend 3"),
+    ],
+)
+def test_wrong_arguments_are_named(tmp_path, arguments, problem, words):
+    with pytest.raises(problem, match=words):
+        run(**{"sweep": grid_of(10), "out": tmp_path / "out", **arguments})
+    assert list(tmp_path.iterdir()) == []
