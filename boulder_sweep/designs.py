@@ -141,6 +141,10 @@ class Source:
         self.dictionary: tuple[np.ndarray | None, np.ndarray] = None, self.values
         """Places in the dictionary for every value (None: its own place), and the dictionary."""
 
+    def to_numpy(self) -> np.ndarray:
+        """Return the values."""
+        return self.values
+
     def find_dictionary(self) -> None:
         """Look for repeated values; called once, before the first block, so that all blocks cost the same."""
         head = self.values[: 2 * MAX_DICTIONARY]

@@ -12,6 +12,7 @@ import click
 
 # Every module of a command imports heavy packages (numba, pandas, pyarrow, even numpy) inside its function, so that
 # `sweep --help` and `sweep check` are instant.
+from boulder_sweep.cli.boundary import boundary
 from boulder_sweep.cli.check import check
 from boulder_sweep.cli.compare import compare
 from boulder_sweep.cli.explain import explain
@@ -41,6 +42,7 @@ COMMANDS = (
     need,
     uncertainty,
     which,
+    boundary,
     simulate,
     explore,
     status,

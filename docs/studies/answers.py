@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from boulder_sweep import load, need, uncertainty
+from boulder_sweep.answers.boundary import boundary
 from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.published import PUBLISHED
 from boulder_sweep.answers.reserves import reserves
@@ -48,6 +49,13 @@ def lightest_of_grid(root: Path) -> str:
 def which_of_site(root: Path) -> str:
     """Return what the designs of the site withstand as a terminal shows it."""
     return _fenced(reserve_lines(reserves(load(root / SITE))))
+
+
+def boundary_of_grid(root: Path) -> str:
+    """Return how many designs of the M30 grid its map needs."""
+    found = boundary(load(root / GRID))
+    words = f"{found.simulations:,} simulations for {len(found.verdict):,} designs: {found.share:.1%}"
+    return _fenced([f"{words}, {found.counts()['pass']:,} of them pass"])
 
 
 def uncertainty_of_site(root: Path) -> str:

@@ -156,6 +156,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "result-columns": _result_columns,
     "need-site": answers.need_of_site,
     "need-mass": answers.lightest_of_grid,
+    "boundary-m30": answers.boundary_of_grid,
     "which-site": answers.which_of_site,
     "uncertainty-site": answers.uncertainty_of_site,
     "uncertainty-cases": answers.uncertainty_of_cases,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ("new", "run", "check", "need", "uncertainty", "which", "simulate", "status")
+COMMANDS = ("new", "run", "check", "need", "uncertainty", "which", "boundary", "simulate", "status")
 HEAVY = ("numba", "pandas", "scipy", "pyarrow", "matplotlib", "joblib", "rich", "pint", "pydantic", "dask")
 
 
@@ -34,7 +34,7 @@ def test_every_command_explains_itself_by_example(sweep, command):
 
 def test_files_named_in_the_help_exist(sweep):
     named = set()
-    for words in ([], ["run"], ["check"], ["need"], ["uncertainty"], ["which"], ["simulate"]):
+    for words in ([], ["run"], ["check"], ["need"], ["uncertainty"], ["which"], ["boundary"], ["simulate"]):
         named |= set(re.findall(r"configs/\w+\.yaml", sweep(*words, "--help")[1]))
     assert named
     assert all((ROOT / name).is_file() for name in named)

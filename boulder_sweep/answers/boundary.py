@@ -1,0 +1,327 @@
+"""The map of a grid from a few per cent of its designs: simulated only near where the verdict changes.
+
+One axis, the longest, is taken as a line: along it designs begin to pass at some place. On a few lines, spread over the
+grid, that place is located between the values of the axis; for all others it is interpolated. Then every design is
+simulated that lies nearer to the interpolated place of its line than the interpolation can be trusted, and where one of
+them is a surprise, its neighbours are, too, until there is none. The rest follows. A patch of other verdicts far from
+every change, or a second change along a line, is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import joblib
+import numpy as np
+
+from boulder_sweep.answers.draws import threads
+from boulder_sweep.answers.trials import Judges, judges_of
+from boulder_sweep.columns import INPUT_COLUMNS, REASONS, VERDICTS
+from boulder_sweep.designs import block_of
+from boulder_sweep.drawing import draw
+from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.judged import FAIL, NO_CONTACT, PASS
+from boulder_sweep.settings.fields import EMBEDMENT
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from boulder_sweep.settings import Sweep
+
+MOST_CELLS = 20_000_000
+AT_ONCE = 2048
+WORSE_UPWARDS = ("impact_speed_m_s", "vehicle_mass_kg", "impact_height_m")
+"""Inputs of which small values pass."""
+UNKNOWN = -1
+FINENESS = 16
+"""Into so many parts of the distance of two values a change is located."""
+MOST_SPREAD = 4
+"""Values of each other axis on whose lines changes are located."""
+LEAST_DOUBT = 0.2
+"""Distance from an interpolated change, in distances of two values, within which designs are simulated at least."""
+BOUND_DOUBT = 0.05
+"""And more beside lines of which none or all pass, as a share of their length."""
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """The map of a grid. Made by `boundary`.
+
+    Attributes
+    ----------
+    sweep : Sweep
+        The grid.
+    verdict : ndarray of int8, shape (n,)
+        Code of the verdict of every design, in the order of the grid.
+    reason : ndarray of int8, shape (n,)
+        Code of its reason; of designs that were not simulated that of the nearest one along the line.
+    simulated : ndarray of bool, shape (n,)
+        Whether the design was simulated; the others are told from their neighbours.
+    simulations : int
+        Designs simulated, those between the values of the axis included.
+    """
+
+    sweep: Sweep
+    verdict: np.ndarray
+    reason: np.ndarray
+    simulated: np.ndarray
+    simulations: int
+
+    @property
+    def share(self) -> float:
+        """Simulations as a share of those of the whole grid."""
+        return self.simulations / len(self.verdict)
+
+    def counts(self) -> dict[str, int]:
+        """Return how many designs have which verdict."""
+        counts = np.bincount(self.verdict, minlength=len(VERDICTS))
+        return {verdict: int(count) for verdict, count in zip(VERDICTS, counts, strict=True)}
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """Inputs, verdict and reason of every design, and whether it was simulated."""
+        import pandas as pd
+
+        block = self.sweep.block(0, self.sweep.n_designs)
+        columns: dict[str, Any] = {"design_id": block.design_id()}
+        columns |= {name: block.columns[name].to_numpy() for name in INPUT_COLUMNS}
+        columns["verdict"] = pd.Categorical.from_codes(self.verdict, list(VERDICTS))
+        columns["reason"] = pd.Categorical.from_codes(self.reason, list(REASONS))
+        return pd.DataFrame(columns | {"simulated": self.simulated})
+
+    def write(self, path: str | Path) -> Path:
+        """Write the map to a Parquet file.
+
+        Raises
+        ------
+        QuestionError
+            It cannot be written.
+        """
+        import pyarrow as pa
+
+        from boulder_sweep.answers.tables import write_parquet
+
+        return write_parquet(pa.Table.from_pandas(self.frame, preserve_index=False), path)
+
+    def plot(self, path: str | Path, **shown: Any) -> None:
+        """Draw the map as ``sweep plot`` draws a result; keywords as of `boulder_sweep.views.verdict_map`.
+
+        Raises
+        ------
+        PictureError
+            It cannot be drawn.
+        """
+        draw("verdict_map", "draw_verdict_map", self.frame, path, title=self.sweep.name, **shown)
+
+
+def boundary(sweep: Sweep, *, jobs: int | None = None) -> Boundary:
+    """Map which designs of a grid pass, from few of them.
+
+    Parameters
+    ----------
+    sweep
+        A grid of at most 20 million designs.
+    jobs
+        Threads; all cores by default. The map does not depend on it.
+
+    Raises
+    ------
+    QuestionError
+        It is a list of designs, has no axis, or is too large.
+    """
+    sweep.require_values()
+    if sweep.table is not None or not sweep.axes:
+        raise QuestionError("a map needs a grid with at least one axis")
+    if sweep.n_designs > MOST_CELLS:
+        raise QuestionError(f"a map of {sweep.n_designs:,} designs is too large; at most {MOST_CELLS:,}")
+    judges = judges_of(sweep)
+    judges.own.warm_up()
+    lines = _Lines(sweep, judges, threads(jobs))
+    lines.fill()
+    return lines.map()
+
+
+class _Lines:
+    """The lines of a grid along its longest axis, and where along each of them designs begin to pass."""
+
+    def __init__(self, sweep: Sweep, judges: Judges, parallel: joblib.Parallel) -> None:
+        self.sweep, self.judges, self.parallel = sweep, judges, parallel
+        self.shape = sweep.plan.lengths
+        self.axis = int(np.argmax(self.shape))
+        self.length = self.shape[self.axis]
+        self.others = tuple(length for axis, length in enumerate(self.shape) if axis != self.axis)
+        self.count = math.prod(self.others)
+        self.name = sweep.axes[self.axis].name
+        self.upwards = self.name not in WORSE_UPWARDS
+        block = sweep.block(0, sweep.n_designs)
+        if block.reasons.any:
+            raise QuestionError("some designs of this grid cannot be computed; a run says which and why")
+        height, depth, bumper = (
+            block.columns[name].to_numpy() for name in ("boulder_height_m", "embedment_depth_m", "bumper_height_m")
+        )
+        over = self.by_line(height - depth <= bumper)
+        self.verdict = np.where(over, FAIL, UNKNOWN).astype(np.int8)
+        self.reason = np.where(over, NO_CONTACT, 0).astype(np.int8)
+        self.simulated = np.zeros(over.shape, dtype=bool)
+        # Buried ever deeper, a boulder passes until the truck passes over it.
+        self.over_is_beyond = self.name in EMBEDMENT
+        self.extra = 0
+        """Designs simulated between the values of the axis."""
+
+    def by_line(self, values: np.ndarray) -> np.ndarray:
+        """Return values of all designs by line and place along it, from what fails to what passes."""
+        moved = np.moveaxis(values.reshape(self.shape), self.axis, -1).reshape(self.count, self.length)
+        return np.ascontiguousarray(moved if self.upwards else moved[:, ::-1])
+
+    def by_number(self, values: np.ndarray) -> np.ndarray:
+        """Return what `by_line` was given."""
+        ordered = values if self.upwards else values[:, ::-1]
+        return np.moveaxis(ordered.reshape(*self.others, self.length), -1, self.axis).reshape(-1)
+
+    def simulate(self, lines: np.ndarray, places: np.ndarray) -> None:
+        """Simulate designs that are not known."""
+        new = np.unique(lines * self.length + places)
+        new = new[self.verdict.reshape(-1)[new] == UNKNOWN]
+        verdict, reason = self.judged(new // self.length, (new % self.length).astype(float))
+        self.verdict.reshape(-1)[new], self.reason.reshape(-1)[new] = verdict, reason
+        self.simulated.reshape(-1)[new] = True
+
+    def judged(self, lines: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Judge designs at places along lines, which may lie between the values of the axis."""
+        pieces = [slice(at, at + AT_ONCE) for at in range(0, len(lines), AT_ONCE)]
+        found = list(self.parallel(joblib.delayed(self._piece)(lines[own], places[own]) for own in pieces))
+        if not found:
+            return np.zeros(0, dtype=np.int8), np.zeros(0, dtype=np.int8)
+        return np.concatenate([own[0] for own in found]), np.concatenate([own[1] for own in found])
+
+    def _piece(self, lines: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        at: dict[int, np.ndarray] = {}
+        if self.others:
+            axes = (axis for axis in range(len(self.shape)) if axis != self.axis)
+            at = dict(zip(axes, np.unravel_index(lines, self.others), strict=True))
+        given = {}
+        for name, source in self.sweep.plan.given.items():
+            if self.axis in source.axes:
+                values = source.to_numpy() if self.upwards else source.to_numpy()[::-1]
+                whole = places.astype(np.int64)
+                part = places - whole
+                next_ = np.minimum(whole + 1, self.length - 1)
+                given[name] = np.where(part == 0.0, values[whole], (1.0 - part) * values[whole] + part * values[next_])
+            else:
+                place = np.zeros(len(lines), dtype=np.int64)
+                for axis in source.axes:
+                    place = place * self.shape[axis] + at[axis]
+                given[name] = source.to_numpy()[place]
+        judged = self.judges.own(block_of(given))
+        return judged.verdict.astype(np.int8), judged.reason.astype(np.int8)
+
+    def located(self, lines: np.ndarray) -> np.ndarray:
+        """Return where designs begin to pass along some lines, to a part of the distance of two values.
+
+        From -1, where all pass, to the number of values, where none does.
+        """
+        low, high = np.full(len(lines), -1.0), np.full(len(lines), float(self.length))
+        for _ in range(math.ceil(math.log2((self.length + 1) * FINENESS))):
+            middle = 0.5 * (low + high)
+            whole = high - low > 1.0
+            middle = np.where(whole, np.rint(middle), middle)
+            inside = (middle >= 0.0) & (middle <= self.length - 1)
+            holds = middle > self.length - 1
+            on_grid = inside & (middle == np.rint(middle))
+            places = middle[on_grid].astype(np.int64)
+            self.simulate(lines[on_grid], places)
+            holds[on_grid] = self.holds(lines[on_grid], places)
+            between = inside & ~on_grid
+            verdict, reason = self.judged(lines[between], middle[between])
+            self.extra += int(between.sum())
+            holds[between] = (verdict == PASS) | (self.over_is_beyond & (reason == NO_CONTACT))
+            high, low = np.where(holds, middle, high), np.where(holds, low, middle)
+        return 0.5 * (low + high)
+
+    def holds(self, lines: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return whether known designs pass, or lie beyond what can pass."""
+        verdict, reason = self.verdict[lines, places], self.reason[lines, places]
+        return (verdict == PASS) | (self.over_is_beyond & (reason == NO_CONTACT))
+
+    def fill(self) -> None:
+        """Find out all that cannot be told from its neighbours."""
+        chosen = [_spread(length) for length in self.others]
+        grids = np.meshgrid(*chosen, indexing="ij")
+        lines = (
+            np.ravel_multi_index([grid.reshape(-1) for grid in grids], self.others) if self.others else np.zeros(1, int)
+        )
+        at = self.located(lines).reshape([len(own) for own in chosen] or [1])
+        begins, doubt = self._interpolated(chosen, at)
+        place = np.arange(self.length)
+        near = np.abs(place - begins[:, None]) < doubt[:, None]
+        told = place >= begins[:, None]
+        while near.any():
+            self.simulate(*np.nonzero(near))
+            known = self.verdict != UNKNOWN
+            holds = (self.verdict == PASS) | (self.over_is_beyond & (self.reason == NO_CONTACT))
+            # A surprise is what is known and not as told; all beside it, on its line and those around it, is tried.
+            surprise = self.simulated & (holds != told)
+            told = np.where(known, holds, told)
+            near = _beside(surprise.reshape(*self.others, self.length)).reshape(surprise.shape) & ~known
+        self.told = told
+
+    def _interpolated(self, chosen: list[np.ndarray], at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where designs begin to pass on every line, and how far that may be off."""
+        smooth, plain = at, at
+        # Where none or all of a line pass, what is known of it is a bound, and its neighbours are told badly from it.
+        bound = ((at < 0.0) | (at > self.length - 1)).astype(float)
+        for axis, own in enumerate(chosen):
+            wanted = np.arange(self.others[axis])
+            smooth = _along(smooth, axis, own, wanted, smooth=True)
+            plain = _along(plain, axis, own, wanted, smooth=False)
+            bound = _along(bound, axis, own, wanted, smooth=False)
+        partly = (bound > 0.0) & (bound < 1.0)
+        doubt = LEAST_DOUBT + 2.0 * np.abs(smooth - plain) + BOUND_DOUBT * self.length * partly
+        return smooth.reshape(-1), doubt.reshape(-1)
+
+    def map(self) -> Boundary:
+        """Return the map with all designs that were not simulated told from the places of the lines."""
+        unknown = self.verdict == UNKNOWN
+        verdict = np.where(unknown, np.where(self.told, PASS, FAIL), self.verdict).astype(np.int8)
+        failed = self.reason[self.simulated & (self.verdict == FAIL)]
+        usual = int(np.bincount(failed).argmax()) if len(failed) else 0
+        reason = np.where(unknown & ~self.told, usual, self.reason).astype(np.int8)
+        return Boundary(
+            self.sweep,
+            self.by_number(verdict),
+            self.by_number(reason),
+            self.by_number(self.simulated),
+            int(self.simulated.sum()) + self.extra,
+        )
+
+
+def _spread(length: int) -> np.ndarray:
+    """Return some places of an axis, both ends among them."""
+    return np.unique(
+        np.rint(np.linspace(0, length - 1, min(length, MOST_SPREAD if length > 4 else 3))).astype(np.int64)
+    )
+
+
+def _along(values: np.ndarray, axis: int, known: np.ndarray, wanted: np.ndarray, *, smooth: bool) -> np.ndarray:
+    """Interpolate along one axis."""
+    from scipy.interpolate import PchipInterpolator, interp1d
+
+    if len(known) == 1:
+        return np.repeat(values, len(wanted), axis=axis)
+    if smooth and len(known) > 2:
+        return PchipInterpolator(known, values, axis=axis)(wanted)
+    return interp1d(known, values, axis=axis)(wanted)
+
+
+def _beside(cells: np.ndarray) -> np.ndarray:
+    """Return cells and their neighbours along every axis."""
+    found = cells.copy()
+    for axis in range(cells.ndim):
+        ahead, behind = [slice(None)] * cells.ndim, [slice(None)] * cells.ndim
+        ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
+        found[tuple(ahead)] |= cells[tuple(behind)]
+        found[tuple(behind)] |= cells[tuple(ahead)]
+    return found
