@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,15 +26,29 @@ PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
 
 
+COLD_START = "compiling kernels, once on this machine, about 40 s"
+
+
+def is_cold() -> bool:
+    """Whether the kernels are not compiled yet, or the compiled code cannot be kept."""
+    from pathlib import Path
+
+    from boulder_kernels._jit import CACHE_FOLDER
+
+    return CACHE_FOLDER is None or next(Path(CACHE_FOLDER).rglob("*.nbc"), None) is None
+
+
 @contextmanager
-def progress(quiet: bool, notes: Notes) -> Iterator[Callable[[Progress], None] | None]:
+def progress(quiet: bool, notes: Notes, cold: bool = False) -> Iterator[Callable[[Progress], None] | None]:
     """Give a function that shows progress and notes: a bar on a terminal, a line now and then elsewhere."""
     if quiet:
         yield None
     elif sys.stderr.isatty():
-        with _bar(notes) as show:
+        with _bar(notes, COLD_START if cold else "preparing") as show:
             yield show
     else:
+        if cold:
+            say(COLD_START)
         yield _PlainLines(notes)
 
 
@@ -70,16 +85,16 @@ class _PlainLines:
 
 
 @contextmanager
-def _bar(notes: Notes) -> Iterator[Callable[[Progress], None]]:
+def _bar(notes: Notes, beginning: str) -> Iterator[Callable[[Progress], None]]:
     # rich is for terminals only. It honours NO_COLOR by itself.
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[numbers]}"))
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[numbers]}"))
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         # Before the first block is done there is no progress to show; the bar pulses.
-        task = bars.add_task("preparing", total=None, numbers="(the first run compiles the kernels)")
+        task = bars.add_task(beginning, total=None, numbers="")
 
         def show(now: Progress) -> None:
             for note in notes.new(now.notes):
@@ -120,9 +135,9 @@ def _uncertain_lines(sweep: Sweep) -> list[str]:
 def summary_lines(name: str, summary: Summary) -> list[str]:
     """Return the result of a finished run, where it is and how to open it."""
     lines = [
-        f"{name}: {counted(summary.rows, 'design')}, {summary.rows_computed:,} simulated now in "
-        f"{duration_text(summary.seconds)} ({summary.rows_per_second:,.0f} per second, "
-        f"{counted(summary.jobs, 'worker')}, {summary.backend})",
+        f"{name}: {counted(summary.rows, 'design')}",
+        f"  {summary.rows_computed:,} simulated now in {duration_text(summary.seconds)}: "
+        f"{summary.rows_per_second:,.0f} per second, {counted(summary.jobs, 'worker')}, {summary.backend}",
         "",
     ]
     lines += verdict_lines(summary.reasons, summary.rows)
@@ -130,7 +145,10 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
         "",
         *accuracy_lines(summary.accuracy),
         f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
-        f"open   pandas.read_parquet({str(summary.out)!r}), or boulder_sweep.read({str(summary.out)!r})",
+        f"open   boulder_sweep.read({str(summary.out)!r})",
+        f"       pandas.read_parquet({str(summary.out)!r})",
+        f"       duckdb: FROM read_parquet('{summary.out}/*.parquet')",
+        f"share  {shlex.join(['sweep', 'report', str(summary.out)])}",
     ]
     return lines
 

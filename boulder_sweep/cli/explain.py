@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
+from typing import TYPE_CHECKING
 
 import click
 
 from boulder_sweep.cli.options import json_option
 from boulder_sweep.cli.output import say, show
+
+if TYPE_CHECKING:
+    from boulder_sweep.impact.explanation import Explanation
 
 EXAMPLES = """\b
 Examples:
@@ -23,14 +28,16 @@ Examples:
 @click.option("--trajectory", type=click.Path(), metavar="F.parquet", help="Write the time history.")
 @json_option
 def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, as_json: bool) -> int:
-    """Compute row DESIGN_ID of the result in OUT again, from the result alone.
+    """Compute row DESIGN_ID of the result in OUT again, from the result alone, and say what decided it.
 
     Says whether every outcome comes out the same to the last bit and, where not, what has changed since:
     versions, kernels, rules. The time history goes on beyond the rotation limit, as that of `sweep simulate`.
     """
-    from boulder_sweep.cli.console import value_lines
+    from boulder_sweep.cli.console import COLD_START, is_cold, value_lines
     from boulder_sweep.impact.explanation import explain as compute_again
 
+    if is_cold():
+        say(COLD_START)
     try:
         found = compute_again(out, design_id)
     except IndexError as problem:
@@ -45,7 +52,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     if as_json:
         show(json.dumps(found.as_dict()))
         return 0
-    show(*value_lines({"design": found.inputs, "outcome": found.stored}))
+    show(*value_lines({"design": found.inputs, "outcome": found.stored}), *why_lines(found))
     for name in found.unequal:
         show(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
     for line in found.changed:
@@ -53,3 +60,36 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     if not found.unequal:
         show("computed again: the same to the last bit")
     return 0
+
+
+def why_lines(found: Explanation) -> list[str]:
+    """Return what decided a row, and how near it came to every limit."""
+    from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
+    from boulder_sweep.views.wording import REASON_WORDS
+
+    row, history = found.stored, found.trajectory
+    reason = REASON_WORDS.get(row["reason"], row["reason"])
+    lines = ["why", f"  {row['verdict']}{f': {reason}' if reason else ''}"]
+    if history is None or row["max_rotation_deg"] is None:
+        return lines
+    limit = math.degrees(history.motion.control.theta_limit)
+    if row["time_to_limit_s"] is not None:
+        lines.append(
+            f"  rotation: the limit of {limit:g} deg is reached {1e3 * row['time_to_limit_s']:.1f} ms after contact"
+        )
+    else:
+        peak = history.motion.outcome.maxima
+        lines.append(
+            f"  rotation: {row['max_rotation_deg']:.4g} deg of {limit:g} deg allowed, "
+            f"{1 - row['max_rotation_deg'] / limit:.1%} below, {1e3 * peak.t_theta:.0f} ms after contact"
+        )
+        rating = history.settings["criterion"]["rating"]
+        lines.append(
+            f"  penetration: {row['penetration_m']:.4g} m, {rating} allows {PENETRATION_LIMITS_M[rating]:g} m "
+            f"beyond the far face"
+        )
+    if row["rotation_error_deg"] is not None:
+        lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
+    if row.get("validity"):
+        lines.append(f"  outside of what the model was tested on: {row['validity'].replace(';', ', ')}")
+    return lines

@@ -54,7 +54,7 @@ def run(
     from boulder_sweep.runner.sweeper import run as run_sweep
 
     notes = console.Notes()
-    with console.progress(quiet, notes) as shown:
+    with console.progress(quiet, notes, cold=not quiet and console.is_cold()) as shown:
         summary = run_sweep(
             sweep,
             target,

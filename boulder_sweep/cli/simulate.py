@@ -57,6 +57,8 @@ def simulate(
         say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design
 
+    if not quiet and console.is_cold():
+        say(console.COLD_START)
     result = simulate_design(sweep, number)
     # First of all: a picture may be impossible where nothing moved, a film takes its time.
     values = result.summary()
@@ -68,5 +70,10 @@ def simulate(
     if energy is not None:
         result.plot_energy(energy)
     if animate is not None:
+        if not quiet:
+            say(f"drawing {animate}, some tens of seconds for a long film")
         result.animate(animate)
+    for file in (plot, trajectory, energy, animate):
+        if file is not None and not quiet:
+            say(f"written  {file}")
     return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0
