@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -61,6 +63,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("quick")
 
 
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+NO_NETWORK = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+"""Arguments that keep a browser from asking anybody for anything."""
+
 Trajectories = dict[tuple[str, str], Trajectory]
 Command = Callable[..., tuple[int, str, str]]
 
@@ -69,6 +83,20 @@ Command = Callable[..., tuple[int, str, str]]
 def trajectories() -> Trajectories:
     """Both tests under both presets."""
     return {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """Give a headless browser, one for all tests."""
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.fail("these tests open pages in Chromium, which is not installed: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=NO_NETWORK)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """A result, its report, and a browser that opens pages from disk with every way to the network closed."""
 
-import shutil
-
 import pytest
 
 import boulder_sweep
@@ -23,16 +21,6 @@ soil:
   - {name: dense sand, density: 1900 kg/m^3, friction_angle: 42 deg, subgrade_reaction: 90 MN/m^3}
 vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
 """
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-NO_NETWORK = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 
 
 @pytest.fixture(scope="session")
@@ -49,20 +37,6 @@ def result(tmp_path_factory):
 def report(result):
     """Return the report of that run."""
     return write_report(result, result.with_name("report.html"), command="sweep report sizing.sweep")
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    """Return a headless browser for all tests."""
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
-        pytest.fail("these tests open pages in Chromium, which is not installed: apt-get install chromium")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, args=NO_NETWORK)
-        yield browser
-        browser.close()
 
 
 class Opened:

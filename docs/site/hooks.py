@@ -1,0 +1,89 @@
+"""Hooks of MkDocs: pages from outside the folder of the documentation, and links between all of them.
+
+The quick start is the README of the repository; benchmarks, changelog and contributing guide are taken from where
+they are. Reference pages are made from the code, tutorials from the notebooks with the output they were committed with.
+"""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from docs.site.notebooks import as_markdown
+from docs.site.reference import command_page, kernel_page, python_page
+
+if TYPE_CHECKING:
+    from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.files import Files
+    from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).parents[2]
+RENAMED = {"README.md": "quick_start.md"}
+"""Place in the site of files that would be in the way of others at their own."""
+TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "benchmarks/README.md")
+SHIM = "assets/iframe-worker.js"
+"""For the search on pages opened from disk; `mkdocs.yml` names it in place of one that the theme would fetch."""
+TAKEN_FOLDERS = ("benchmarks/figures", "configs")
+_LINK = re.compile(r"(?P<before>\]\(|\bsrc=\")(?!\w+:|#)(?P<target>[^)\s\"#]+)(?P<anchor>#[^)\s\"]*)?")
+_CODE = re.compile(r"(```.*?```|`[^`\n]*`)", re.DOTALL)
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that are not in the folder of the documentation."""
+    from mkdocs.structure.files import File
+
+    for name in taken():
+        files.append(File.generated(config, in_site(name), abs_src_path=str(ROOT / name)))
+    files.append(File.generated(config, SHIM, abs_src_path=str(Path(__file__).with_name("iframe-worker.js"))))
+    for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        files.append(File.generated(config, f"notebooks/{notebook.stem}.md", content=as_markdown(notebook)))
+    for name, page in (("commands", command_page), ("python", python_page), ("kernels", kernel_page)):
+        files.append(File.generated(config, f"reference/{name}.md", content=page()))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) -> str:
+    """Turn links between files of the repository into links between pages of the site."""
+    here = page.file.src_uri
+    source = next((name for name in taken() if in_site(name) == here), None)
+    if source is None and not here.startswith(("notebooks/", "reference/")):
+        source = f"docs/{here}"
+    if source is None:
+        return markdown
+    pieces = _CODE.split(markdown)
+    return "".join(piece if _CODE.fullmatch(piece) else relinked(piece, source) for piece in pieces)
+
+
+def taken() -> Iterator[str]:
+    """Yield the files from elsewhere that belong to the site, by their place in the repository."""
+    yield from TAKEN
+    for folder in TAKEN_FOLDERS:
+        yield from sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / folder).iterdir() if path.is_file())
+
+
+def in_site(name: str) -> str:
+    """Return the place in the site of a file of the repository."""
+    return RENAMED.get(name, name.removeprefix("docs/"))
+
+
+def relinked(text: str, source: str) -> str:
+    """Return text from a file of the repository with its links as they must be in the site.
+
+    Parameters
+    ----------
+    text
+        Markdown without code.
+    source
+        Place of the file in the repository.
+    """
+
+    def renewed(match: re.Match[str]) -> str:
+        target = posixpath.normpath(posixpath.join(posixpath.dirname(source), match["target"]))
+        path = os.path.relpath(in_site(target), posixpath.dirname(in_site(source)) or ".")
+        return f"{match['before']}{path}{match['anchor'] or ''}"
+
+    return _LINK.sub(renewed, text)
