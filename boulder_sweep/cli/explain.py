@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import json_option
+from boulder_sweep.cli.options import json_option, units_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -26,8 +26,9 @@ Examples:
 @click.argument("design_id", type=click.IntRange(min=0))
 @click.option("--plot", type=click.Path(), metavar="F.png", help="Draw rotation, displacements and forces over time.")
 @click.option("--trajectory", type=click.Path(), metavar="F.parquet", help="Write the time history.")
+@units_option
 @json_option
-def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, as_json: bool) -> int:
+def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, units: str, as_json: bool) -> int:
     """Compute row DESIGN_ID of the result in OUT again, from the result alone, and say what decided it.
 
     Says whether every outcome comes out the same to the last bit and, where not, what has changed since:
@@ -35,6 +36,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     """
     from boulder_sweep.cli.console import COLD_START, is_cold, value_lines
     from boulder_sweep.impact.explanation import explain as compute_again
+    from boulder_sweep.report.export import shown_values
 
     if is_cold():
         say(COLD_START)
@@ -52,7 +54,8 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     if as_json:
         show(json.dumps(found.as_dict()))
         return 0
-    show(*value_lines({"design": found.inputs, "outcome": found.stored}), *why_lines(found))
+    values = {"design": shown_values(found.inputs, units), "outcome": shown_values(found.stored, units)}
+    show(*value_lines(values), *why_lines(found))
     for name in found.unequal:
         show(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
     for line in found.changed:

@@ -7,7 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import SIMULATE_EXAMPLES, json_option, set_option, talk_options
+from boulder_sweep.cli.options import SIMULATE_EXAMPLES, json_option, set_option, talk_options, units_option
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 
@@ -24,6 +24,7 @@ from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
     help="Draw where the energy goes, and add its columns to the time history.",
 )
 @click.option("--animate", type=click.Path(), metavar="F.gif|.mp4|.html", help="Make a film of the side view.")
+@units_option
 @set_option
 @json_option
 @talk_options
@@ -34,6 +35,7 @@ def simulate(
     trajectory: str | None,
     energy: str | None,
     animate: str | None,
+    units: str,
     overrides: tuple[str, ...],
     as_json: bool,
     quiet: bool,
@@ -56,12 +58,13 @@ def simulate(
     if verbose:
         say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design
+    from boulder_sweep.report.export import shown_values
 
     if not quiet and console.is_cold():
         say(console.COLD_START)
     result = simulate_design(sweep, number)
     # First of all: a picture may be impossible where nothing moved, a film takes its time.
-    values = result.summary()
+    values = shown_values(result.summary(), units)
     show(*([json.dumps(values)] if as_json else console.value_lines(values)))
     if plot is not None:
         result.plot(plot)

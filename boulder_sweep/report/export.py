@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.columns import column_spec
+from boulder_sweep.columns import BY_NAME, column_spec
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import shown_unit
@@ -89,6 +89,18 @@ def shown_column(stored: str, units: str) -> Shown:
     unit, size = shown_unit(spec.unit, units)
     name = stored if size == 1.0 else stored.removesuffix(_suffix(spec.unit)) + _suffix(unit)
     return Shown(stored, name, unit, size, spec.meaning)
+
+
+def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
+    """Return values by names of columns in the units asked for; what is no column stays as it is."""
+    found = {}
+    for name, value in values.items():
+        if name not in BY_NAME:
+            found[name] = value
+            continue
+        column = shown_column(name, units)
+        found[column.name] = value / column.size if isinstance(value, float) else value
+    return found
 
 
 def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[str, str, str]]:

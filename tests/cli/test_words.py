@@ -1,5 +1,7 @@
 """Words on a terminal: what a cold start waits for, what was written, what decided a row."""
 
+import json
+
 import boulder_sweep
 
 
@@ -28,3 +30,16 @@ def test_a_cold_start_says_so_and_lines_fit_a_terminal(sweep, possible_grid, mon
     assert "FROM read_parquet('small-grid.sweep/*.parquet')" in out
     code, _, err = sweep("simulate", possible_grid, "--design", 1, "--trajectory", "one.parquet")
     assert err.splitlines()[-1] == "written  one.parquet"
+
+
+def test_values_are_shown_in_us_units_where_asked(sweep, possible_grid):
+    metric = json.loads(sweep("simulate", possible_grid, "--design", 1, "--json", "-q")[1])
+    code, out, _ = sweep("simulate", possible_grid, "--design", 1, "--json", "-q", "--units", "us")
+    us = json.loads(out)
+    assert code == 0
+    assert us["max_displacement_ft"] == metric["max_displacement_m"] / 0.3048
+    assert us["peak_force_kip"] == metric["peak_force_kN"] / 4.4482216152605
+    assert us["max_rotation_deg"] == metric["max_rotation_deg"]
+    assert us["verdict"] == metric["verdict"]
+    sweep("run", possible_grid, "-q")
+    assert "  impact_speed_mph" in sweep("explain", "small-grid.sweep", 0, "--units", "us")[1]
