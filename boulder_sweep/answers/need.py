@@ -179,6 +179,11 @@ def need(
     if least and most:
         raise QuestionError("ask for the least of one input or for the most of one, not for both")
     key = key_of(most or least or "embedment_depth", most=bool(most), tolerance=tolerance)
+    if key.name == "friction_angle_deg" and sweep.partial_factor != 1.0:
+        raise QuestionError(
+            "the friction angle is asked for, and partial_factor would not be applied to the answer; remove it from "
+            "the file, then multiply the tangent of the answer by it"
+        )
     least_margin = share(margin, "--margin")
     if not 0.0 <= least_margin < 1.0:
         raise QuestionError(f"--margin {margin}: must be 0 or more and less than 100 %")

@@ -110,7 +110,8 @@ def grid_lines(sweep: Sweep) -> list[str]:
     """Return a description of the designs: how many, and over which axes."""
     count = counted(sweep.n_designs, "design")
     if sweep.table is not None:
-        return [f"{sweep.name}: {count} from {sweep.table.file}", *_uncertain_lines(sweep)]
+        carried = f", with {', '.join(sweep.table.labels)}" if sweep.table.labels else ""
+        return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep)]
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
         unit = BY_NAME[axis.name].unit if axis.name in BY_NAME else "1"

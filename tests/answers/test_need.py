@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -216,6 +217,12 @@ def test_questions_that_make_no_sense_are_refused(question: dict, message: str) 
 def test_a_list_of_designs_has_no_bounds_for_the_mass() -> None:
     with pytest.raises(QuestionError, match="a list of designs has none"):
         need(random_designs(3), "mass")
+
+
+def test_a_partial_factor_on_the_angle_that_is_asked_for_is_refused() -> None:
+    factored = dataclasses.replace(site(), partial_factor=1.25)
+    with pytest.raises(QuestionError, match="multiply the tangent of the answer"):
+        need(factored, "friction_angle")
 
 
 def test_distributions_are_refused() -> None:

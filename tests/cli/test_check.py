@@ -59,3 +59,13 @@ def test_named_soils_are_listed(sweep, grid):
     code, out, _ = sweep("check", grid)
     assert code == 0
     assert [line.split(maxsplit=3) for line in out.splitlines()][-1] == ["soil", "2", "sets", "A, B 2"]
+
+
+def test_a_table_and_its_text_columns(sweep, grid):
+    grid.with_name("designs.csv").write_text("block_id,boulder_height_ft,remark\n1,11,a\n2,12,b\n")
+    text = grid.read_text().replace("height: [1.6, 2.6, 3.5] m, ", "").replace("[60, 95]", "60")
+    grid.write_text(text.replace("[0.9, 1.8, 2.6]", "1.8") + "table: designs.csv\n")
+    assert sweep("check", grid)[:2] == (
+        0,
+        "grid.yaml: valid\nsmall grid: 2 designs from designs.csv, with block_id, remark\n",
+    )
