@@ -14,7 +14,6 @@ from boulder_kernels.modes import (
     HELD,
     LIMITED_BACK,
     LIMITED_FORWARD,
-    RESTING,
     SEATED,
     TURNING_BACK,
     TURNING_FORWARD,
@@ -32,10 +31,9 @@ MODE_NAMES = {
     LIMITED_FORWARD: "limited",
     LIMITED_BACK: "limited",
     FREE: "free",
-    RESTING: "resting",
 }
 """Mode of rotation in words: gravity reading ``seated`` or ``turning``; printed reading ``held`` (the restoring
-moment equals the net moment), ``limited`` (it is at its limit), ``free`` (there is none), ``resting``."""
+moment equals the net moment), ``limited`` (it is at its limit), ``free`` (there is none)."""
 
 
 @dataclass(frozen=True, eq=False)

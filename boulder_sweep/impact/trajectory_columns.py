@@ -28,7 +28,7 @@ HISTORY: tuple[ColumnSpec, ...] = (
     _number("soil_force_N", "N", "sum of the soil's forces on the boulder (Eq 19)"),
     _number("soil_moment_N_m", "N*m", "sum of the soil's moments about the common centre of mass (Eq 20)"),
     _number("restoring_moment_N_m", "N*m", "restoring moment M_R of the boulder's weight (Eqs 37 to 39)"),
-    ColumnSpec("rotation_mode", "dictionary", "", "seated, turning, held, limited, free or resting"),
+    ColumnSpec("rotation_mode", "dictionary", "", "seated, turning, held, limited or free"),
     ColumnSpec("in_contact", "dictionary", "", "touching or coasting"),
 )
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ._jit import inlined, kernel
 from .design import Constants
 from .dynamics import State
-from .modes import FREE, HELD, LIMITED_FORWARD, RESTING, SEATED, TURNING_BACK, TURNING_FORWARD, Modes
+from .modes import FREE, HELD, LIMITED_FORWARD, SEATED, TURNING_BACK, TURNING_FORWARD, Modes
 from .restoring import signed_arm
 from .soil import soil_kinematics
 from .trigonometry import sine_versine
@@ -50,13 +50,13 @@ class GapFactors(NamedTuple):
     contact: float
     """Of the compression u."""
     rotation_0: float
-    rotation_M: float
-    """Of M."""
     rotation_abs_M: float
+    """Of the modulus of the net moment M."""
     rotation_theta: float
     rotation_omega: float
     couple_0: float
     couple_M: float
+    """Of M."""
     couple_abs_M: float
     couple_limit: float
     """Of the limit of the restoring moment."""
@@ -104,7 +104,7 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
     locate_yield
         Whether a step is cut where the soil at the top or the base reaches its ultimate resistance.
     """
-    rotation_0 = rotation_M = rotation_abs_M = rotation_theta = rotation_omega = 0.0
+    rotation_0 = rotation_abs_M = rotation_theta = rotation_omega = 0.0
     couple_0, couple_M, couple_abs_M, couple_limit = NEVER, 0.0, 0.0, 0.0
     corner_0, corner_theta = NEVER, 0.0
     arm_0, arm = NEVER, 0.0
@@ -121,13 +121,10 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
         if turning == FREE:
             rotation_omega = -1.0
         else:
-            if turning == RESTING:
-                rotation_M = 1.0
-            else:
-                rotation_omega = 1.0
+            rotation_omega = 1.0
             arm_0, arm = 0.0, modes.arm
             couple_0, couple_limit = 0.0, -1.0
-            if turning == HELD or turning == RESTING:
+            if turning == HELD:
                 couple_abs_M, couple_limit = -1.0, 1.0
             elif turning == LIMITED_FORWARD:
                 couple_M = 1.0
@@ -144,7 +141,6 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
         contact_0=CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v),
         contact=contact,
         rotation_0=rotation_0,
-        rotation_M=rotation_M,
         rotation_abs_M=rotation_abs_M,
         rotation_theta=rotation_theta,
         rotation_omega=rotation_omega,
@@ -198,7 +194,6 @@ def gaps_of(
     return Gaps(
         g.contact_0 + g.contact * u,
         g.rotation_0
-        + g.rotation_M * M
         + g.rotation_abs_M * abs(M)
         + g.rotation_theta * theta_b
         + g.rotation_omega * omega_b,

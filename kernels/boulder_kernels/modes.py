@@ -28,17 +28,13 @@ TURNING_FORWARD = 1
 TURNING_BACK = 2
 """Gravity reading: theta_b < 0."""
 HELD = 3
-"""Printed reading, omega > 0: the restoring moment equals the net moment (Eq 39)."""
+"""Printed reading, omega > 0, or come to rest: the restoring moment equals the net moment (Eq 39)."""
 LIMITED_FORWARD = 4
 """Printed reading, omega > 0: net moment over the limit, restoring moment at it (Eq 37)."""
 LIMITED_BACK = 5
 """Printed reading, omega > 0: net moment below minus the limit."""
 FREE = 6
-"""Printed reading, omega <= 0: no restoring moment (Eq 38)."""
-
-RESTING = 7
-"""Printed reading, omega = 0 and pushed forward by less than the limit: the restoring moment balances the net moment,
-and omega stays 0. As soon as the net moment points back, Eq 38 lets the boulder go."""
+"""Printed reading, omega < 0: no restoring moment (Eq 38)."""
 
 
 class Modes(NamedTuple):
@@ -78,7 +74,7 @@ def switches_of(modes: Modes, readings: Readings, c: Constants) -> Switches:
     """Factors of the right-hand side for the modes of a step (Eqs 37-39, 47)."""
     net, couple, couple_sin = 1.0, 0.0, 0.0
     turning = modes.turning
-    if turning == SEATED or turning == RESTING:
+    if turning == SEATED:
         net = 0.0
     elif turning == TURNING_FORWARD:
         couple, couple_sin = -1.0, c.C_sin

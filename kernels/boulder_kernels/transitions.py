@@ -11,7 +11,6 @@ from .modes import (
     HELD,
     LIMITED_BACK,
     LIMITED_FORWARD,
-    RESTING,
     SEATED,
     TURNING_BACK,
     TURNING_FORWARD,
@@ -28,26 +27,46 @@ SEATING_ANGLE = 1e-9
 
 @kernel
 def mode_at_rest(M: float, corner: float, sin: float, versin: float, c: Constants) -> int:
-    """Printed reading: mode of a boulder whose angular velocity is zero and about to change (Eqs 37-39)."""
+    """Printed reading: mode of a boulder whose angular velocity has come to zero (Eqs 37-39).
+
+    Parameters
+    ----------
+    M
+        Net moment of soil and truck [N m].
+    corner
+        Sign of sin(gamma_N + theta_b).
+    sin, versin
+        sin(theta_b) and 1 - cos(theta_b).
+    c
+        Constants of the design.
+
+    Notes
+    -----
+    At omega = 0 the printed moment jumps, and the equations have no solution in the classical sense while the net
+    moment is within the limit. Integrated literally, the boulder arrives at an omega just over zero, where Eq 39 cancels
+    every other moment up to the limit of Eq 37, whichever way it points. So it stays until the net moment is over the
+    limit, forwards or back. Where the corner has passed under the centre of mass, Eq 39 drives the boulder on instead of
+    holding it: it moves the way the net moment points.
+    """
     limit = holding_moment(sin, versin, c)
-    if M < 0.0:
-        return FREE
-    if limit < M:
+    if M > limit:
         return LIMITED_FORWARD
-    return RESTING if corner > 0.0 else HELD
+    if -limit > M or (corner < 0.0 and M < 0.0):
+        return FREE
+    return HELD
 
 
 @kernel
 def initial_modes(readings: Readings, c: Constants) -> Modes:
     """Modes at the instant of impact.
 
-    The truck touches and the boulder is seated. Under the printed rule the first moment decides: the blow turns
-    the boulder forward where it is over the centre of mass, else back.
+    The truck touches and the boulder is seated. Under the printed rule the first moment decides: a blow over the
+    centre of mass turns the boulder forward, and Eq 39 holds it; one below turns it back, and Eq 38 lets it go.
     """
     if readings.restoring_gravity:
         turning = SEATED
     else:
-        turning = RESTING if c.h >= 0.0 else FREE
+        turning = HELD if c.h >= 0.0 else FREE
     return Modes(turning, True, 1.0, 1.0, 0, 0)
 
 
@@ -94,16 +113,15 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
                 turning = TURNING_FORWARD if omega_b > 0.0 else TURNING_BACK
         else:
             omega_b = 0.0
-            turning = FREE if turning == RESTING else mode_at_rest(M, corner, sin, versin, c)
+            turning = mode_at_rest(M, corner, sin, versin, c)
     elif event == COUPLE:
-        if turning == HELD or turning == RESTING:
-            turning = LIMITED_FORWARD if M > 0.0 else LIMITED_BACK
+        if turning == HELD:
+            # Pushed back from rest it does not brake, it turns back: Eq 38 lets it go.
+            turning = LIMITED_FORWARD if M > 0.0 else LIMITED_BACK if omega_b > 0.0 else FREE
         else:
             turning = HELD
     elif event == CORNER:
         corner = -corner
-        if turning == RESTING:
-            turning = HELD
     elif event == ARM:
         arm = -arm
     elif event == YIELD_TOP or event == YIELD_BASE:

@@ -11,7 +11,6 @@ from boulder_kernels.modes import (
     HELD,
     LIMITED_BACK,
     LIMITED_FORWARD,
-    RESTING,
     SEATED,
     TURNING_BACK,
     TURNING_FORWARD,
@@ -26,7 +25,7 @@ from boulder_kernels.restoring import (
 from boulder_kernels.transitions import initial_modes, mode_at_rest
 from tests import oracle
 from tests.oracle.dynamics import Contact, Rotation, loads, rate
-from tests.oracle.events import rest_modes
+from tests.oracle.events import first_modes, rest_modes
 from tests.oracle.restoring import gravity_couple, gravity_hold, printed_forward, printed_limit, printed_sign
 
 from .samples import (
@@ -152,8 +151,9 @@ def test_right_hand_side_as_printed(readings: bk.Readings, elements: int) -> Non
 
 
 def test_at_rest_as_printed() -> None:
-    """With omega = 0 the mode to go on in is the one that the oracle finds, and a resting boulder does not turn."""
-    words = {FREE: "backward", RESTING: "held", HELD: "forward", LIMITED_FORWARD: "forward"}
+    """Come to omega = 0, the mode to go on in is the one that the oracle finds, and a held boulder does not turn."""
+    words = {(FREE, 1.0): "backward", (FREE, -1.0): "backward", (HELD, 1.0): "held", (HELD, -1.0): "forward"}
+    words |= {(LIMITED_FORWARD, 1.0): "forward", (LIMITED_FORWARD, -1.0): "forward"}
     rng = np.random.default_rng(45)
     met = set()
     for readings in (r for r in ALL_READINGS if not r.restoring_gravity):
@@ -168,23 +168,26 @@ def test_at_rest_as_printed() -> None:
                 found = mode_at_rest(M, here.corner, *sine_and_versine(y.theta_b), c)
                 before = oracle.Modes("backward", contact, here.corner)
                 known = rest_modes(problem, literal_state(y, c), before)
-                assert (words[found], here.corner) == (known.rotation, known.sign)
-                met.add(found)
-                if found == RESTING:
-                    check_rate(design, readings, 0, y, RESTING, touching, known)
-                    resting = modes_in(RESTING, touching, y.theta_b, readings, c)
-                    assert acceleration(*y, switches_of(resting, readings, c), c).alpha_b == 0.0
-    assert met == set(words)
+                assert (words[found, here.corner], here.corner) == (known.rotation, known.sign)
+                met.add((found, here.corner, np.sign(M)))
+                if known.rotation == "held":
+                    check_rate(design, readings, 0, y, HELD, touching, known)
+                    held = modes_in(HELD, touching, y.theta_b, readings, c)
+                    assert acceleration(*y, switches_of(held, readings, c), c).alpha_b == 0.0
+    assert {(mode, corner) for mode, corner, _ in met} == set(words)
+    assert {(HELD, 1.0, 1.0), (HELD, 1.0, -1.0)} <= met
 
 
 def test_modes_at_the_first_touch() -> None:
-    """The oracle holds the boulder either way; where the first blow is below the centre it lets go at once."""
+    """Held; as printed, a boulder struck below its centre is let go at once. The oracle says the same."""
     for readings in ALL_READINGS:
         for design in DESIGNS:
             c = constants_of(design, readings, 0)
             found = initial_modes(readings, c)
-            first = SEATED if readings.restoring_gravity else RESTING if c.h >= 0.0 else FREE
+            first = SEATED if readings.restoring_gravity else HELD if c.h >= 0.0 else FREE
             assert found == Modes(first, True, 1.0, 1.0, 0, 0)
+            known = first_modes(oracle.problem(inputs_of(design), oracle_readings(readings)))
+            assert known.rotation == ("backward" if first == FREE else "held")
 
 
 def test_couple_of_the_weight() -> None:
@@ -229,7 +232,7 @@ def test_printed_restoring_moment_in_each_mode() -> None:
 def test_no_motion_without_a_blow() -> None:
     """A truck that stands at the boulder moves nothing: every mode at rest has no acceleration."""
     for design in DESIGNS:
-        for readings, turning in ((bk.as_printed(), FREE), (bk.as_printed(), RESTING), (bk.corrected(), SEATED)):
+        for readings, turning in ((bk.as_printed(), FREE), (bk.as_printed(), HELD), (bk.corrected(), SEATED)):
             c = constants_of(design._replace(v_0=0.0), readings, 0)
             s = switches_of(modes_in(turning, True, 0.0, readings, c), readings, c)
             found = acceleration(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, s, c)

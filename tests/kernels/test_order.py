@@ -13,7 +13,6 @@ from boulder_kernels.modes import (
     HELD,
     LIMITED_BACK,
     LIMITED_FORWARD,
-    RESTING,
     SEATED,
     TURNING_FORWARD,
     Modes,
@@ -121,7 +120,7 @@ def printed_starts() -> dict[str, tuple[Start, float, set[int]]]:
     at_rest = start(State(0.0, 0.0, 0.0, 0.0, 0.0, 12.0), 0.1)
     return {
         "limit of the restoring moment passed at rest": (
-            at_rest._replace(modes=modes(RESTING, True)),
+            at_rest._replace(modes=modes(HELD, True)),
             0.05,
             {COUPLE},
         ),

@@ -35,8 +35,8 @@ class Modes:
     rotation : str
         Gravity reading: 'held' (upright at rest, the weight balances the other moments), 'clockwise' or
         'anticlockwise' (the side to which the boulder has turned). Printed reading: 'backward'
-        (omega <= 0, no restoring moment), 'forward' (omega > 0) or 'held' (omega = 0 between the two: any
-        turning forward is stopped by the restoring moment, any turning back reversed by its absence).
+        (omega < 0, no restoring moment), 'forward' (omega > 0) or 'held' (come to rest: at an omega just over
+        zero the restoring moment cancels every other moment up to its maximum, so that nothing moves).
     contact : str
         'touching'; 'coasting' (released reading: the vehicle moves freely until it returns); 'clipped'
         (printed reading: the boulder feels no force while the vehicle still obeys Eq 45).

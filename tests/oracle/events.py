@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .constants import impact_lever
 from .dynamics import Modes, Problem, Rotation, contact_displacement, loads, motion_of
 from .restoring import gravity_hold, printed_limit, printed_sign
 
@@ -34,22 +35,29 @@ class Watch:
 
 
 def first_modes(impact: Problem) -> Modes:
-    """Modes at the first touch: at rest without any moment, the boulder is held under either reading."""
-    return Modes("held", "touching", printed_sign(impact.constants, 0.0))
+    """Modes at the first touch: held, unless the printed rule lets go of a boulder struck below its centre (Eq 38)."""
+    struck_below = impact_lever(impact.constants, 0.0) < 0
+    free = impact.readings.restoring == "printed" and struck_below
+    return Modes("backward" if free else "held", "touching", printed_sign(impact.constants, 0.0))
 
 
 def rest_modes(impact: Problem, y: Array, modes: Modes) -> Modes:
-    """Modes of a boulder with omega = 0 under the printed rule: what either side of omega = 0 would do."""
+    """Modes of a boulder that has come to omega = 0 under the printed rule.
+
+    It comes from omega > 0 or stays beside it, where Eqs 37 and 39 make the restoring moment equal and opposite to the
+    sum of all others until its maximum is reached: what is within the maximum, either way, cannot move the boulder.
+    What is left over moves it on; what points back beyond the maximum turns it back, and Eq 38 lets it go. With the
+    corner left of the centre (sign < 0) the moment of Eq 39 has the sign of the net moment and holds nothing.
+    """
     theta = float(y[2])
     sign = printed_sign(impact.constants, theta)
     net = loads(impact, y, replace(modes, rotation="backward")).net
+    limit = printed_limit(impact.constants, theta)
     rotation: Rotation
-    if net < 0:
-        rotation = "backward"  # Eq 38: nothing restrains it
-    elif sign > 0 and net <= printed_limit(impact.constants, theta):
-        rotation = "held"  # Eq 39 balances it as soon as omega > 0
+    if sign > 0 and abs(net) <= limit:
+        rotation = "held"
     else:
-        rotation = "forward"
+        rotation = "forward" if net >= 0 else "backward"
     return replace(modes, rotation=rotation, sign=sign)
 
 
@@ -87,6 +95,9 @@ def _printed_watches(impact: Problem, modes: Modes) -> list[Watch]:
         stopped[3] = 0.0
         return rest_modes(impact, stopped, modes), stopped
 
+    def released(y: Array) -> tuple[Modes, Array]:
+        return replace(modes, rotation="forward" if net(y) > 0 else "backward"), y
+
     def net(y: Array) -> float:
         return loads(impact, y, modes).net
 
@@ -97,8 +108,8 @@ def _printed_watches(impact: Problem, modes: Modes) -> list[Watch]:
         return [Watch("stop", lambda y: -float(y[3]), at_rest)]
     if modes.rotation == "held":
         return [
-            Watch("release backward", net, at_rest),
-            Watch("release forward", lambda y: limit(y) - net(y), at_rest),
+            Watch("release backward", lambda y: limit(y) + net(y), released),
+            Watch("release forward", lambda y: limit(y) - net(y), released),
         ]
 
     def sign_now(y: Array) -> float:
