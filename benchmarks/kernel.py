@@ -54,7 +54,7 @@ def measure(rounds: int = ROUNDS) -> Table:
         {
             "peak": peak,
             "attempt": lambda: loops.attempt_often(ws, ATTEMPTS),
-            "look": lambda: loops.look_often(scratch, looked_at, HORIZON, ATTEMPTS),
+            "look": lambda: loops.look_often(scratch, looked_at, ATTEMPTS),
             "copy": lambda: loops.copy_often(scratch, looked_at, ATTEMPTS),
             "sums": lambda: loops.sum_elements_often(lines, with_elements, SUMS),
             "closed": lambda: loops.integrate_often(lines, closed, CLOSED_FORMS),

@@ -31,7 +31,7 @@ def filled_workspace(table: DesignTable, readings: Readings, control: Control, s
         start_lane(ws, lane, table, lane, readings, control)
     for _ in range(steps):
         attempt_steps(ws)
-        take_over_steps(ws, control.horizon)
+        take_over_steps(ws)
         for lane in range(LANES):
             if field(ws, ATTENTION, lane) != 0.0:
                 attend(ws, lane, readings, control)
@@ -46,11 +46,11 @@ def attempt_often(ws: np.ndarray, times: int) -> None:
 
 
 @_compiled
-def look_often(ws: np.ndarray, before: np.ndarray, horizon: float, times: int) -> None:
+def look_often(ws: np.ndarray, before: np.ndarray, times: int) -> None:
     """Check the outcome of the same attempt repeatedly; copying the workspace back costs little in comparison."""
     for _ in range(times):
         ws[:] = before
-        take_over_steps(ws, horizon)
+        take_over_steps(ws)
 
 
 @_compiled
@@ -98,7 +98,7 @@ def count_attempts(table: DesignTable, readings: Readings, control: Control, out
         attempts += LANES
         in_use += running
         attempt_steps(ws)
-        take_over_steps(ws, control.horizon)
+        take_over_steps(ws)
         for lane in range(LANES):
             if field(ws, ATTENTION, lane) != 0.0 and rows[lane] != EMPTY:
                 attended += 1

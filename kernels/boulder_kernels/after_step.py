@@ -18,7 +18,7 @@ from .gaps import COUPLE, LIMIT, ROTATION, GapFactors, gap_factors, gaps_at
 from .modes import Modes, Switches, switches_of
 from .outcomes import Maxima, Status, updated_maxima
 from .readings import Readings
-from .settling import barrier_energy, boulder_energy, inside_maxima
+from .settling import barrier_energy, boulder_energy, inside_maxima, stays_below
 from .transitions import change_mode, initial_modes
 
 RUNNING = -1
@@ -50,6 +50,23 @@ class Kept(NamedTuple):
     """Maxima up to there."""
     barrier: float
     """Energy below which the motion has settled from there on [J]."""
+    horizon: float
+    """Time at which the simulation ends from there on [s]."""
+
+
+class Ending(NamedTuple):
+    """What ends the simulation of a design, and what would prove that it may end."""
+
+    theta_limit: float
+    """Limit of rotation [rad]."""
+    extension: float
+    """A simulation that ends without a proof goes on for so long at a time [s]."""
+    longest: float
+    """Longest simulated time [s]."""
+    stopping: bool
+    """Whether it may end before the horizon, at the limit or settled."""
+    provable: bool
+    """Whether the energy argument of `boulder_kernels.settling` holds."""
 
 
 @kernel
@@ -65,11 +82,21 @@ def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
 
 
 @kernel
-def horizon_status(y: State, m: Maxima) -> int:
-    """Status of a design that reached the horizon: outward where a maximum is still being set there."""
+def is_growing(y: State, m: Maxima) -> bool:
+    """Whether a maximum of rotation or truck is just being set."""
     turning_out = y.theta_b * y.omega_b > 0.0 and abs(y.theta_b) >= m.theta
     driving_on = y.v_v > 0.0 and y.x_v >= m.x_v
-    return Status.OUTWARD.value if turning_out or driving_on else Status.HORIZON.value
+    return turning_out or driving_on
+
+
+@kernel
+def horizon_status(y: State, m: Maxima, ending: Ending, c: Constants) -> int:
+    """Status of a design that reached a horizon, if it ends there."""
+    if ending.provable and m.theta < ending.theta_limit and stays_below(ending.theta_limit, y, c):
+        return Status.BELOW_LIMIT.value
+    if is_growing(y, m):
+        return Status.OUTWARD.value
+    return Status.HORIZON.value if ending.provable else Status.UNPROVABLE.value
 
 
 @inlined
@@ -182,8 +209,8 @@ def keep_step(
     switches: Switches,
     m: Maxima,
     barrier: float,
-    proving: bool,
     horizon: float,
+    ending: Ending,
     c: Constants,
 ) -> Kept:
     """Keep a step up to its first event, and decide whether the simulation ends there.
@@ -198,30 +225,32 @@ def keep_step(
         The step.
     m, barrier
         Maxima before it, and the energy below which the motion has settled [J].
-    proving
-        Whether the energy argument of `boulder_kernels.settling` holds for this simulation.
     horizon
-        Longest simulated time [s].
+        Time at which the simulation ends [s], unless there is a reason to go on.
+    ending
+        What ends it.
     """
     if not is_finite(y_end):
-        return Kept(Status.UNSTABLE.value, -1, 1.0, t, y, m, barrier)
+        return Kept(Status.UNSTABLE.value, -1, 1.0, t, y, m, barrier, horizon)
     event, tau, y_kept, m = keep_up_to_event(t, h, y, k.M, y_end, k_end.M, dense, factors, switches, m, c)
     if event == SHORTEN:
-        return Kept(RUNNING, event, tau, t, y, m, barrier)
+        return Kept(RUNNING, event, tau, t, y, m, barrier, horizon)
     last = h >= horizon - t
     t = horizon if last and event < 0 else t + tau * h
     status = RUNNING
     if event == LIMIT:
         status = Status.LIMIT.value
-        m = Maxima(factors.limit, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v)
-    elif t >= horizon:
-        status = horizon_status(y_kept, m)
-    elif proving and y_kept.v_v <= 0.0:
+        m = Maxima(factors.limit, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v, m.crush, m.t_crush)
+    elif ending.stopping and ending.provable and y_kept.v_v <= 0.0:
         if turned_back(y, y_kept):
             barrier = barrier_energy(m, c)
         if inside_maxima(y_kept, m) and boulder_energy(y_kept, c) < barrier:
             status = Status.SETTLED.value
-    return Kept(status, event, tau, t, y_kept, m, barrier)
+    if status == RUNNING and t >= horizon:
+        status = horizon_status(y_kept, m, ending, c)
+        if t < ending.longest and (status != Status.BELOW_LIMIT.value or is_growing(y_kept, m)):
+            status, horizon = RUNNING, min(horizon + ending.extension, ending.longest)
+    return Kept(status, event, tau, t, y_kept, m, barrier, horizon)
 
 
 @inlined

@@ -193,10 +193,7 @@ def gaps_of(
     base = A - slope_x
     return Gaps(
         g.contact_0 + g.contact * u,
-        g.rotation_0
-        + g.rotation_abs_M * abs(M)
-        + g.rotation_theta * theta_b
-        + g.rotation_omega * omega_b,
+        g.rotation_0 + g.rotation_abs_M * abs(M) + g.rotation_theta * theta_b + g.rotation_omega * omega_b,
         g.couple_0 + g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm),
         g.corner_0 + g.corner_theta * theta_b,
         g.arm_0 + g.arm * arm,

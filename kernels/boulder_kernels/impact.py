@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .after_step import RUNNING, SHORTEN, cross_event, keep_step, start_motion
+from .after_step import RUNNING, SHORTEN, Ending, cross_event, keep_step, start_motion
 from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
@@ -33,7 +33,7 @@ class Control(NamedTuple):
     h: float
     """Step [s]; shortened where a design needs it, see `boulder_kernels.stability`."""
     horizon: float
-    """Longest simulated time [s]."""
+    """Simulated time [s], unless a design ends before or has reason to go on."""
     theta_limit: float
     """Limit of rotation [rad]."""
     elements: int
@@ -48,6 +48,9 @@ class Control(NamedTuple):
     halved: bool = False
     """Whether the step of every design is halved, after any shortening: the finer of the two solutions that the error
     is estimated from."""
+    longest_horizon: float = 0.0
+    """Simulated time [s] up to which a design goes on that reaches the horizon without proof that it stays below its
+    limits; not beyond the horizon where it is shorter, or where nothing stops at the limit."""
 
 
 class Record(NamedTuple):
@@ -134,6 +137,16 @@ def first_step(control: Control, theta_stop: float, c: Constants) -> tuple[float
 
 
 @kernel
+def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
+    """What ends the simulation of a design by steps of a given length [s]; no design takes more than MOST_STEPS."""
+    most = (2 if control.halved else 1) * MOST_STEPS * h_full
+    longest = control.horizon
+    if control.stop_at_limit:
+        longest = max(longest, min(control.longest_horizon, most))
+    return Ending(control.theta_limit, control.horizon, longest, control.stop_at_limit, proof_is_possible(readings))
+
+
+@kernel
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact with a fixed time step, each step cut where a mode changes.
 
@@ -186,7 +199,8 @@ def simulate_by_steps(
     record: Record,
 ) -> Outcome:
     """Simulate one impact with a given time step [s]; see `simulate_design`."""
-    budget = attempt_budget(h_full, control.horizon)
+    ending = ending_of(control, readings, h_full)
+    budget = attempt_budget(h_full, ending.longest)
     y, modes, switches, factors, k1 = start_motion(readings, theta_stop, control.locate_yield, c)
     m = no_maxima()
     exchanged = nothing_exchanged()
@@ -195,20 +209,19 @@ def simulate_by_steps(
     t, t_limit = 0.0, np.nan
     attempts = 0
     h_next = h_full
-    barrier = NO_PROOF
-    proving = control.stop_at_limit and control.elements == 0 and proof_is_possible(readings)
+    barrier, horizon = NO_PROOF, control.horizon
     while attempts < budget:
         attempts += 1
-        h = min(h_next, control.horizon - t)
+        h = min(h_next, horizon - t)
         y_end, k_end = step(y, k1, h, switches, c)
         dense = dense_output(y, k1, y_end, k_end, h)
-        kept = keep_step(t, h, y, k1, y_end, k_end, dense, factors, switches, m, barrier, proving, control.horizon, c)
+        kept = keep_step(t, h, y, k1, y_end, k_end, dense, factors, switches, m, barrier, horizon, ending, c)
         if kept.status == Status.UNSTABLE.value:
             return failed(kept.status)
         if kept.event == SHORTEN:
             h_next = kept.tau * h
             continue
-        h_next, m, barrier = h_full, kept.m, kept.barrier
+        h_next, m, barrier, horizon = h_full, kept.m, kept.barrier, kept.horizon
         if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
             gap_start, gap = control.theta_limit - abs(y.theta_b), control.theta_limit - m.theta
             t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, (m.t_theta - t) / h)

@@ -17,12 +17,12 @@ from .design import Constants, DesignTable, constants_of, design_at, is_computab
 from .dormand_prince import step
 from .dynamics import Acceleration, State
 from .gaps import GapFactors, gaps_of
-from .impact import Control, attempt_budget, first_step
+from .impact import Control, attempt_budget, ending_of, first_step
 from .modes import Modes, Switches
 from .outcomes import Maxima, OutcomeTable, Status, compression_at, compression_of, highest_compression, no_maxima
 from .readings import Readings
 from .restoring import signed_arm
-from .settling import NO_PROOF, boulder_energy, proof_is_possible
+from .settling import NO_PROOF, boulder_energy
 from .soil import soil_kinematics
 from .stability import ACCEPTED, MOST_STEPS, RETRY
 from .trigonometry import sine_versine
@@ -35,6 +35,7 @@ from .workspace import (
     END,
     END_STATE,
     FACTORS,
+    HORIZON,
     LANES,
     MAXIMA,
     MODES,
@@ -71,8 +72,8 @@ def attempt_steps(ws: np.ndarray) -> None:
 
 
 @kernel
-def take_over_steps(ws: np.ndarray, horizon: float) -> None:
-    """Accept the steps that meet no event, turn nowhere and do not reach the horizon [s]; mark the others."""
+def take_over_steps(ws: np.ndarray) -> None:
+    """Accept the steps that meet no event, turn nowhere and do not reach the horizon; mark the others."""
     for lane in range(LANES):
         c = load(ws, CONSTANTS, lane)
         s = load(ws, SWITCHES, lane)
@@ -92,7 +93,7 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
             signed_arm(sin, versin, c),
             load(ws, FACTORS, lane),
         )
-        t, h = field(ws, TIME, lane), field(ws, STEP, lane)
+        t, h, horizon = field(ws, TIME, lane), field(ws, STEP, lane), field(ws, HORIZON, lane)
         # A comparison with NaN is false, so a state that is not a number is marked, too.
         plain = (
             (gaps.contact >= 0.0)
@@ -106,6 +107,7 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
             & (y.omega_b * y_end.omega_b >= 0.0)
             & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
             & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
+            & ((start.crush_rate <= 0.0) | (end.crush_rate >= 0.0))
             & (h < horizon - t)
             & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, lane)))
         )
@@ -121,8 +123,9 @@ def take_over_steps(ws: np.ndarray, horizon: float) -> None:
             put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t_next))
             m = load(ws, MAXIMA, lane)
             theta, x_b, x_v = max(m.theta, abs(y_end.theta_b)), max(m.x_b, y_end.x_b), max(m.x_v, y_end.x_v)
-            F_v = max(m.F_v, s.k_contact * u)
-            store(ws, MAXIMA, lane, Maxima(theta, m.t_theta, x_b, m.t_x_b, x_v, m.t_x_v, F_v, m.t_F_v))
+            F_v, crush = max(m.F_v, s.k_contact * u), max(m.crush, end.crush)
+            m = Maxima(theta, m.t_theta, x_b, m.t_x_b, x_v, m.t_x_v, F_v, m.t_F_v, crush, m.t_crush)
+            store(ws, MAXIMA, lane, m)
 
 
 @kernel
@@ -167,8 +170,9 @@ def start_lane(
     store(ws, CONSTANTS, lane, c)
     store(ws, MAXIMA, lane, no_maxima())
     put(ws, STEP_FULL, lane, h_full)
-    put(ws, ATTEMPTS_LEFT, lane, attempt_budget(h_full, control.horizon))
+    put(ws, ATTEMPTS_LEFT, lane, attempt_budget(h_full, ending_of(control, readings, h_full).longest))
     put(ws, BARRIER, lane, NO_PROOF)
+    put(ws, HORIZON, lane, control.horizon)
     set_modes(ws, lane, modes, switches, factors)
     set_motion(ws, lane, 0.0, y, k1, switches, c, control.horizon)
     return RUNNING
@@ -230,8 +234,8 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
         switches,
         load(ws, MAXIMA, lane),
         field(ws, BARRIER, lane),
-        proof_is_possible(readings),
-        control.horizon,
+        field(ws, HORIZON, lane),
+        ending_of(control, readings, field(ws, STEP_FULL, lane)),
         c,
     )
     if kept.event == SHORTEN:
@@ -239,6 +243,7 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
         return RUNNING
     put(ws, TIME, lane, kept.t)
     put(ws, BARRIER, lane, kept.barrier)
+    put(ws, HORIZON, lane, kept.horizon)
     store(ws, MAXIMA, lane, kept.m)
     if kept.status != RUNNING:
         return kept.status
@@ -255,7 +260,7 @@ def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> i
             c,
         )
         set_modes(ws, lane, modes, switches, factors)
-    set_motion(ws, lane, kept.t, y, k1, switches, c, control.horizon)
+    set_motion(ws, lane, kept.t, y, k1, switches, c, kept.horizon)
     return RUNNING
 
 
@@ -268,7 +273,7 @@ def write_lane(ws: np.ndarray, lane: int, status: int, out: OutcomeTable, row: i
     m = load(ws, MAXIMA, lane)
     t = field(ws, TIME, lane)
     out.theta_max[row], out.x_b_max[row] = m.theta, m.x_b
-    out.x_v_max[row], out.F_v_max[row] = m.x_v, m.F_v
+    out.x_v_max[row], out.F_v_max[row], out.crush_max[row] = m.x_v, m.F_v, m.crush
     out.t_end[row] = t
     if status == Status.LIMIT.value:
         out.t_limit[row] = t
@@ -327,7 +332,7 @@ def simulate_lanes(table: DesignTable, readings: Readings, control: Control, out
         running += rows[lane] != EMPTY
     while running > 0:
         attempt_steps(ws)
-        take_over_steps(ws, control.horizon)
+        take_over_steps(ws)
         for lane in range(LANES):
             if field(ws, ATTENTION, lane) != 0.0 and rows[lane] != EMPTY:
                 status = attend(ws, lane, readings, control)

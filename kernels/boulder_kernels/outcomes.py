@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .dense_output import DenseOutput, Track, displacement_at, slope_at
+from .dense_output import DenseOutput, Track, displacement_at, slope_at, state_at
 from .design import Constants
 from .dynamics import State
 from .modes import Switches
@@ -28,9 +28,9 @@ class Status(IntEnum):
     SETTLED = 2
     """It is proved that nothing that is reported can still grow."""
     HORIZON = 3
-    """The horizon was reached with no maximum still growing."""
+    """The longest horizon was reached, and nothing is proved of later times."""
     OUTWARD = 4
-    """The horizon was reached with rotation or truck at its maximum so far and still moving outward."""
+    """The same, with rotation or truck at its maximum and still growing."""
     UNSTABLE = 5
     """The state became non-finite."""
     STEP_BUDGET = 6
@@ -47,6 +47,23 @@ class Status(IntEnum):
     """The same: the drag of the soil slows the boulder too fast."""
     LITTLE_INERTIA = 12
     """The same: the boulder has too little inertia for the forces that turn it."""
+    BELOW_LIMIT = 13
+    """A horizon was reached, and it is proved that the rotation can never reach its limit and that the truck is as far as
+    it will come. Rotation and displacement of the boulder are the largest up to then: they may still grow a little."""
+    UNPROVABLE = 14
+    """The longest horizon was reached below the limit. The restoring moment or the separation is read as printed: such
+    forces feed energy, and nothing can be proved of later times."""
+
+
+SIMULATED = (
+    Status.LIMIT,
+    Status.SETTLED,
+    Status.BELOW_LIMIT,
+    Status.UNPROVABLE,
+    Status.HORIZON,
+    Status.OUTWARD,
+)
+"""How a simulation ends that has maxima to report."""
 
 
 class Maxima(NamedTuple):
@@ -64,6 +81,9 @@ class Maxima(NamedTuple):
     F_v: float
     """Largest contact force [N]."""
     t_F_v: float
+    crush: float
+    """Largest crush of the truck's front, x_v less the displacement of the contact point [m]."""
+    t_crush: float
 
 
 class Outcome(NamedTuple):
@@ -92,6 +112,8 @@ class OutcomeTable(NamedTuple):
     """Largest x_v [m]."""
     F_v_max: np.ndarray
     """Largest contact force [N]."""
+    crush_max: np.ndarray
+    """Largest crush of the truck's front [m]."""
     t_limit: np.ndarray
     """Time at which the rotation reached its limit [s]."""
     t_end: np.ndarray
@@ -99,19 +121,19 @@ class OutcomeTable(NamedTuple):
     theta_error: np.ndarray
     """Estimated numerical error of theta_max [rad]."""
     x_error: np.ndarray
-    """Estimated numerical error of x_b_max and x_v_max, the larger [m]."""
+    """Estimated numerical error of x_b_max, x_v_max and crush_max, the largest [m]."""
 
 
 @kernel
 def no_maxima() -> Maxima:
     """Maxima before the first step."""
-    return Maxima(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Maxima(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
 def undefined_maxima() -> Maxima:
     """Maxima of a design that was not simulated."""
-    return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
+    return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 
 
 PEAK_TOLERANCE = 1e-4
@@ -133,25 +155,30 @@ def turning_point(q: Track, tau_end: float) -> float:
 
 
 class Compression(NamedTuple):
-    """Compression of the vehicle's spring."""
+    """Compression of the vehicle's spring, and of its whole front."""
 
     u: float
-    """Compression [m]."""
+    """Compression of the spring [m]."""
     rate: float
     """Its rate [m/s]; the contact force peaks where it is zero."""
+    crush: float
+    """Crush of the front: spring and damper together [m]."""
+    crush_rate: float
+    """Its rate [m/s]."""
 
 
 @inlined
 def compression_of(y: State, sin: float, versin: float, s: Switches, c: Constants) -> Compression:
-    """Compression of the vehicle's spring at a state with these sine and versine."""
-    u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
-    rate = y.v_v - y.v_b - y.omega_b * contact_lever(sin, versin, c) - c.tau_v * s.k_truck * u
-    return Compression(u, rate)
+    """Compression of the vehicle's front at a state with these sine and versine."""
+    x_c = contact_displacement(y.x_b, sin, versin, c)
+    u = spring_compression(y.x_v, y.v_v, x_c, c)
+    crush_rate = y.v_v - y.v_b - y.omega_b * contact_lever(sin, versin, c)
+    return Compression(u, crush_rate - c.tau_v * s.k_truck * u, y.x_v - x_c, crush_rate)
 
 
 @inlined
 def compression_at(y: State, s: Switches, c: Constants) -> Compression:
-    """Compression of the vehicle's spring at a state."""
+    """Compression of the vehicle's front at a state."""
     sin, versin = sine_versine(y.theta_b)
     return compression_of(y, sin, versin, s, c)
 
@@ -174,6 +201,31 @@ def highest_compression(start: Compression, end: Compression, h: float) -> tuple
     # The root of c_1 + 2 c_2 tau + 3 c_3 tau^2 at which the slope changes from plus to minus.
     tau = c_1 / (math.sqrt(max(c_2 * c_2 - 3.0 * c_3 * c_1, 0.0)) - c_2) if peaks else 1.0
     return (start.u + tau * (c_1 + tau * (c_2 + tau * c_3)) if peaks else end.u), tau
+
+
+@kernel
+def highest_crush(
+    start: Compression, end: Compression, dense: DenseOutput, tau_end: float, s: Switches, c: Constants
+) -> tuple[float, float]:
+    """Largest crush of the front in a step up to the fraction tau_end, by the dense output.
+
+    Returns
+    -------
+    crush, tau
+        The crush [m] and the fraction of the step at which it is reached: inside where the rate goes from positive to
+        negative, else at the end.
+    """
+    if not start.crush_rate > 0.0 > end.crush_rate:
+        return end.crush, tau_end
+    bracket = Bracket(0.0, start.crush_rate, tau_end, end.crush_rate, 0)
+    tau = tau_end
+    for _ in range(ITERATIONS):
+        before = tau
+        tau = next_guess(bracket)
+        if abs(tau - before) < PEAK_TOLERANCE:
+            break
+        bracket = narrowed(bracket, tau, compression_at(state_at(dense, tau), s, c).crush_rate)
+    return compression_at(state_at(dense, tau), s, c).crush, tau
 
 
 @inlined
@@ -225,6 +277,9 @@ def updated_maxima(
         tau = turning_point(dense.truck, tau_end)
         x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
     part = tau_end * h
-    u, tau = highest_compression(compression_at(y, s, c), compression_at(y_end, s, c), part)
+    start, end = compression_at(y, s, c), compression_at(y_end, s, c)
+    u, tau = highest_compression(start, end, part)
     F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + tau * part)
-    return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v)
+    deepest, tau = highest_crush(start, end, dense, tau_end, s, c)
+    crush, t_crush = grown(m.crush, m.t_crush, deepest, t + tau * h)
+    return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v, crush, t_crush)

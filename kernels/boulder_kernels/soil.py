@@ -176,7 +176,7 @@ class Potential(NamedTuple):
 
 
 @inlined
-def soil_potential(A: float, slope_x: float, c: Constants) -> Potential:
+def closed_potential(A: float, slope_x: float, c: Constants) -> Potential:
     """Elastic energy of the soil for N -> infinity, a convex function of the two numbers that fix its displacement.
 
     The springs are elastic also beyond their limit: a spring holds u^2/2 up to the yield displacement y and
@@ -208,17 +208,33 @@ def soil_potential(A: float, slope_x: float, c: Constants) -> Potential:
 
 
 @kernel
-def soil_energy(k: Kinematics, c: Constants) -> float:
-    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces."""
-    if c.elements == 0:
-        return soil_potential(k.A, k.slope_x, c).V
-    total = 0.0
+def summed_potential(A: float, slope_x: float, c: Constants) -> Potential:
+    """Elastic energy of N soil elements, as convex as that of their limit; see `closed_potential`."""
+    V = V_A = V_X = 0.0
     for n in range(c.elements):
         ratio = (n + 0.5) / c.elements
-        u = abs(k.A - k.slope_x * ratio)
-        over = max(u - c.x_yield, 0.0)
-        total += ratio * 0.5 * (u * u - over * over)
-    return c.K_soil * total / c.elements
+        displacement = A - slope_x * ratio
+        over = max(abs(displacement) - c.x_yield, 0.0)
+        pressed = ratio * min(max(displacement, -c.x_yield), c.x_yield)
+        V += ratio * 0.5 * (displacement * displacement - over * over)
+        V_A += pressed
+        V_X -= ratio * pressed
+    share = c.K_soil / c.elements
+    return Potential(share * V, share * V_A, share * V_X)
+
+
+@inlined
+def soil_potential(A: float, slope_x: float, c: Constants) -> Potential:
+    """Elastic energy of the soil by the same representation as the forces, a convex function of both displacements."""
+    if c.elements > 0:
+        return summed_potential(A, slope_x, c)
+    return closed_potential(A, slope_x, c)
+
+
+@kernel
+def soil_energy(k: Kinematics, c: Constants) -> float:
+    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces."""
+    return soil_potential(k.A, k.slope_x, c).V
 
 
 @kernel

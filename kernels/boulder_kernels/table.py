@@ -17,6 +17,8 @@ more of all designs, and for those that are not stopped at the limit of rotation
 SAFETY_PRINTED = 10.0
 """The same where the restoring moment is read as printed: two of its jumps can come and go within a step of either
 solution, and both then miss them alike."""
+LEAST_ROTATION = 1e-4
+"""Rotation that an error of the truck may stand for even where the boulder turns less [rad]."""
 
 
 @kernel
@@ -24,6 +26,7 @@ def empty_outcomes(n: int) -> OutcomeTable:
     """Return a table for n outcomes, all of them NaN and INVALID until they are written."""
     return OutcomeTable(
         np.full(n, Status.INVALID.value, np.int8),
+        np.full(n, np.nan),
         np.full(n, np.nan),
         np.full(n, np.nan),
         np.full(n, np.nan),
@@ -43,6 +46,7 @@ def write_outcome(out: OutcomeTable, row: int, o: Outcome) -> None:
     out.x_b_max[row] = o.maxima.x_b
     out.x_v_max[row] = o.maxima.x_v
     out.F_v_max[row] = o.maxima.F_v
+    out.crush_max[row] = o.maxima.crush
     out.t_limit[row] = o.t_limit
     out.t_end[row] = o.t_end
 
@@ -83,8 +87,11 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
     The difference of two solutions is nearly the error of the coarser, many times that of the finer. It can be small
     by chance, where two errors cross zero, but hardly in all that is reported at once. So the largest difference
     counts: displacements and angles compared over the embedment depth, or half the height of the boulder where that is
-    more, and times over the speed of impact. Where only one of the two reached the limit of rotation, or failed, no
-    estimate could be trusted: the error is infinite. Where both did, the rotation is the limit itself.
+    more, and times over the speed of impact. A boulder that hardly turns owes its rotation no more than that rotation
+    itself to an error of the truck (LEAST_ROTATION where it is less), however small the boulder: beyond it only the
+    difference of the rotations counts.
+    Where only one of the two reached the limit of rotation, or failed, no estimate could be trusted: the error is
+    infinite. Where both did, the rotation is the limit itself.
     """
     limit = Status.LIMIT.value
     for row in range(fine.status.size):
@@ -94,13 +101,15 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
             fine.theta_error[row] = fine.x_error[row] = np.inf
             continue
         arm = max(table.d[row], 0.5 * table.H[row])
+        turn = abs(coarse.theta_max[row] - fine.theta_max[row])
         x = max(abs(coarse.x_b_max[row] - fine.x_b_max[row]), abs(coarse.x_v_max[row] - fine.x_v_max[row]))
-        x = max(x, arm * abs(coarse.theta_max[row] - fine.theta_max[row]))
+        x = max(x, arm * turn)
         if fine.status[row] == limit:
             x = max(x, table.v_0[row] * abs(coarse.t_limit[row] - fine.t_limit[row]))
             fine.theta_error[row] = 0.0
         else:
-            fine.theta_error[row] = safety * x / arm
+            fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
+        x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
         fine.x_error[row] = safety * x
 
 
@@ -135,6 +144,7 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
         control.stop_at_limit,
         control.locate_yield,
         True,
+        control.longest_horizon,
     )
     fine = simulate_once(table, readings, half)
     estimate_errors(out, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)

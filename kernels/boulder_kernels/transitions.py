@@ -49,7 +49,7 @@ def mode_at_rest(M: float, corner: float, sin: float, versin: float, c: Constant
     holding it: it moves the way the net moment points.
     """
     limit = holding_moment(sin, versin, c)
-    if M > limit:
+    if limit < M:
         return LIMITED_FORWARD
     if -limit > M or (corner < 0.0 and M < 0.0):
         return FREE

@@ -49,6 +49,7 @@ _LAYOUT: dict[str, Any] = {
     "step_full": Number,
     "time": Number,
     "barrier": Number,
+    "horizon": Number,
     "attention": Number,
     "attempts_left": Number,
 }
@@ -84,6 +85,8 @@ TIME = _place("time")
 """Start of the next step [s]."""
 BARRIER = _place("barrier")
 """Energy below which the motion has settled [J], see `boulder_kernels.settling`."""
+HORIZON = _place("horizon")
+"""Time at which the simulation ends, unless there is a reason to go on [s]."""
 ATTENTION = _place("attention")
 """1.0 where a step cannot simply be accepted."""
 ATTEMPTS_LEFT = _place("attempts_left")

@@ -63,7 +63,7 @@ def step_code() -> str:
 
 @pytest.fixture(scope="module")
 def take_over_code() -> str:
-    return assembly(take_over_steps, np.zeros(SIZE), 1.0)
+    return assembly(take_over_steps, np.zeros(SIZE))
 
 
 def test_steps_are_vectorised(step_code: str) -> None:
