@@ -107,7 +107,7 @@ def take_over_steps(ws: np.ndarray) -> None:
             & (y.omega_b * y_end.omega_b >= 0.0)
             & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
             & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
-            & ((start.crush_rate <= 0.0) | (end.crush_rate >= 0.0))
+            & ((y.v_v <= 0.0) | (start.crush_rate <= 0.0) | (end.crush_rate >= 0.0))
             & (h < horizon - t)
             & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, lane)))
         )
@@ -123,7 +123,7 @@ def take_over_steps(ws: np.ndarray) -> None:
             put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t_next))
             m = load(ws, MAXIMA, lane)
             theta, x_b, x_v = max(m.theta, abs(y_end.theta_b)), max(m.x_b, y_end.x_b), max(m.x_v, y_end.x_v)
-            F_v, crush = max(m.F_v, s.k_contact * u), max(m.crush, end.crush)
+            F_v, crush = max(m.F_v, s.k_contact * u), max(m.crush, end.crush if y_end.v_v > 0.0 else 0.0)
             m = Maxima(theta, m.t_theta, x_b, m.t_x_b, x_v, m.t_x_v, F_v, m.t_F_v, crush, m.t_crush)
             store(ws, MAXIMA, lane, m)
 

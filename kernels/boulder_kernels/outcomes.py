@@ -48,8 +48,8 @@ class Status(IntEnum):
     LITTLE_INERTIA = 12
     """The same: the boulder has too little inertia for the forces that turn it."""
     BELOW_LIMIT = 13
-    """A horizon was reached, and it is proved that the rotation can never reach its limit and that the truck is as far as
-    it will come. Rotation and displacement of the boulder are the largest up to then: they may still grow a little."""
+    """A horizon was reached, and it is proved that the rotation can never reach its limit, and that truck and crush are
+    what they will ever be. Rotation, displacement and force are the largest up to then: they may still grow."""
     UNPROVABLE = 14
     """The longest horizon was reached below the limit. The restoring moment or the separation is read as printed: such
     forces feed energy, and nothing can be proved of later times."""
@@ -82,7 +82,9 @@ class Maxima(NamedTuple):
     """Largest contact force [N]."""
     t_F_v: float
     crush: float
-    """Largest crush of the truck's front, x_v less the displacement of the contact point [m]."""
+    """Largest crush of the truck's front while it drives forward, x_v less the displacement of the contact point [m]:
+    final once the truck has stopped. What the boulder may add as it swings back, in soil that springs back whole, is
+    not counted."""
     t_crush: float
 
 
@@ -113,7 +115,7 @@ class OutcomeTable(NamedTuple):
     F_v_max: np.ndarray
     """Largest contact force [N]."""
     crush_max: np.ndarray
-    """Largest crush of the truck's front [m]."""
+    """Largest crush of the truck's front while it drives forward [m]."""
     t_limit: np.ndarray
     """Time at which the rotation reached its limit [s]."""
     t_end: np.ndarray
@@ -204,17 +206,21 @@ def highest_compression(start: Compression, end: Compression, h: float) -> tuple
 
 
 @kernel
-def highest_crush(
-    start: Compression, end: Compression, dense: DenseOutput, tau_end: float, s: Switches, c: Constants
+def deepest_crush(
+    start: Compression, y_end: State, dense: DenseOutput, tau_end: float, s: Switches, c: Constants
 ) -> tuple[float, float]:
-    """Largest crush of the front in a step up to the fraction tau_end, by the dense output.
+    """Largest crush of the truck's front in a step that starts with the truck driving forward, by the dense output.
 
     Returns
     -------
     crush, tau
-        The crush [m] and the fraction of the step at which it is reached: inside where the rate goes from positive to
-        negative, else at the end.
+        The crush [m] and the fraction of the step at which it is reached: inside where its rate goes from positive to
+        negative, else where the truck stops or the step ends.
     """
+    end = compression_at(y_end, s, c)
+    if y_end.v_v < 0.0:
+        tau_end = turning_point(dense.truck, tau_end)
+        end = compression_at(state_at(dense, tau_end), s, c)
     if not start.crush_rate > 0.0 > end.crush_rate:
         return end.crush, tau_end
     bracket = Bracket(0.0, start.crush_rate, tau_end, end.crush_rate, 0)
@@ -280,6 +286,8 @@ def updated_maxima(
     start, end = compression_at(y, s, c), compression_at(y_end, s, c)
     u, tau = highest_compression(start, end, part)
     F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + tau * part)
-    deepest, tau = highest_crush(start, end, dense, tau_end, s, c)
-    crush, t_crush = grown(m.crush, m.t_crush, deepest, t + tau * h)
+    crush, t_crush = m.crush, m.t_crush
+    if dense.truck.x1 > 0.0:
+        deepest, tau = deepest_crush(start, y_end, dense, tau_end, s, c)
+        crush, t_crush = grown(crush, t_crush, deepest, t + tau * h)
     return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v, crush, t_crush)

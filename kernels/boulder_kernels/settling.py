@@ -13,9 +13,9 @@ finder place the tangent well; the bound is a proof wherever they end.
 
 Where soil rings long after the impact, that proof can wait for seconds. The verdict needs less, and at the horizon less
 is asked: that E is below the least potential energy on theta = +-theta_limit, wherever x_b. Then the boulder can never
-reach the limit. The truck, which does not move forward any more, never will again, since contact only pushes it back: its
-displacement is final, and with it the penetration. Rotation and displacement of the boulder may still exceed what they
-have been, the rotation by nothing that reaches the limit.
+reach the limit. The truck, which does not move forward any more, never will again, since contact only pushes it back:
+its displacement is final, and with it the penetration and the crush. Rotation and displacement of the boulder may still
+grow, the rotation never to its limit.
 
 As printed neither holds, and no other proof can: a restoring moment that brakes a boulder turning forward and lets it
 turn back freely, and a truck that the air pulls on, feed energy. It does happen: of the random designs of

@@ -43,10 +43,10 @@ def mode_at_rest(M: float, corner: float, sin: float, versin: float, c: Constant
     Notes
     -----
     At omega = 0 the printed moment jumps, and the equations have no solution in the classical sense while the net
-    moment is within the limit. Integrated literally, the boulder arrives at an omega just over zero, where Eq 39 cancels
-    every other moment up to the limit of Eq 37, whichever way it points. So it stays until the net moment is over the
-    limit, forwards or back. Where the corner has passed under the centre of mass, Eq 39 drives the boulder on instead of
-    holding it: it moves the way the net moment points.
+    moment is within the limit. Integrated literally, the boulder arrives at an omega just over zero, where Eq 39
+    cancels every other moment up to the limit of Eq 37, whichever way it points. So it stays until the net moment is
+    over the limit, forwards or back. Where the corner has passed under the centre of mass, Eq 39 drives the boulder on
+    instead of holding it: it moves the way the net moment points.
     """
     limit = holding_moment(sin, versin, c)
     if limit < M:

@@ -10,7 +10,7 @@ import numpy as np
 
 GRAVITY = 9.80665
 NODE = 0.5 / sqrt(3.0)
-"""Gauss's rule with two points, 0.5 -+ NODE on 0 ... 1, is exact to the third degree, and no integrand here has more."""
+"""Gauss's rule with two points, 0.5 -+ NODE on 0 ... 1, is exact to the third degree, that of every integrand here."""
 CREEP = 1e-12
 """An angular velocity just over zero [rad/s]: what the literal equations arrive at when a turn back has ended."""
 
@@ -44,7 +44,10 @@ class Body(NamedTuple):
 
 
 class Result(NamedTuple):
-    """Largest values over the time followed, and when the rotation first reached the limit (infinite: never)."""
+    """Largest values over the time followed, and when the rotation first reached the limit (infinite: never).
+
+    The crush is x_v less the displacement of the contact point, as long as the truck drives forward.
+    """
 
     theta: float
     x_b: float
@@ -229,7 +232,12 @@ def follow(b: Body, h: float, horizon: float, limit: float) -> Result:
                 coasting = False
             if coasting:
                 y = (y[0], y[1], y[2], y[3], y[4], y[5], 0.0)
-        theta, x_b, x_v, crush = max(theta, abs(y[2])), max(x_b, y[0]), max(x_v, y[4]), max(crush, gap)
+        theta, x_b, x_v, crush = (
+            max(theta, abs(y[2])),
+            max(x_b, y[0]),
+            max(x_v, y[4]),
+            max(crush, gap if y[5] > 0.0 else 0.0),
+        )
         if not abs(y[2]) < limit:
             return Result(theta, x_b, x_v, crush, n * h)
     return Result(theta, x_b, x_v, crush, np.inf)
