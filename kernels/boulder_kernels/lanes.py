@@ -19,7 +19,7 @@ from .dynamics import Acceleration, State
 from .gaps import GapFactors, gaps_of
 from .impact import Control, attempt_budget, ending_of, first_step
 from .modes import Modes, Switches
-from .outcomes import Maxima, OutcomeTable, Status, compression_at, compression_of, highest_compression, no_maxima
+from .outcomes import Maxima, OutcomeTable, Status, compression_at, compression_of, highest, no_maxima
 from .readings import Readings
 from .restoring import signed_arm
 from .settling import NO_PROOF, boulder_energy
@@ -107,11 +107,11 @@ def take_over_steps(ws: np.ndarray) -> None:
             & (y.omega_b * y_end.omega_b >= 0.0)
             & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
             & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
-            & ((y.v_v <= 0.0) | (start.crush_rate <= 0.0) | (end.crush_rate >= 0.0))
             & (h < horizon - t)
             & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, lane)))
         )
-        u, _ = highest_compression(start, end, h)
+        u, _ = highest(start.u, start.rate, end.u, end.rate, h)
+        deepest, _ = highest(start.crush, start.crush_rate, end.crush, end.crush_rate, h)
         t_next = t + h
         put(ws, ATTENTION, lane, 0.0 if plain else 1.0)
         put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
@@ -123,7 +123,7 @@ def take_over_steps(ws: np.ndarray) -> None:
             put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t_next))
             m = load(ws, MAXIMA, lane)
             theta, x_b, x_v = max(m.theta, abs(y_end.theta_b)), max(m.x_b, y_end.x_b), max(m.x_v, y_end.x_v)
-            F_v, crush = max(m.F_v, s.k_contact * u), max(m.crush, end.crush if y_end.v_v > 0.0 else 0.0)
+            F_v, crush = max(m.F_v, s.k_contact * u), max(m.crush, deepest if y.v_v > 0.0 else 0.0)
             m = Maxima(theta, m.t_theta, x_b, m.t_x_b, x_v, m.t_x_v, F_v, m.t_F_v, crush, m.t_crush)
             store(ws, MAXIMA, lane, m)
 

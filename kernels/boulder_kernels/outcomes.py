@@ -186,52 +186,28 @@ def compression_at(y: State, s: Switches, c: Constants) -> Compression:
 
 
 @inlined
-def highest_compression(start: Compression, end: Compression, h: float) -> tuple[float, float]:
-    """Largest compression in a step of length h [s], by the cubic through both of its ends.
+def highest(x: float, rate: float, x_end: float, rate_end: float, h: float) -> tuple[float, float]:
+    """Largest value in a step of length h [s], by the cubic through both of its ends.
+
+    Parameters
+    ----------
+    x, rate, x_end, rate_end
+        Value [m] and rate [m/s] at its ends.
 
     Returns
     -------
-    u, tau
-        The compression [m] and the fraction of the step at which it is reached: inside where the rate goes
-        from positive to negative, else at the end. No branch, so that a loop over lanes stays vectorised.
+    x, tau
+        The value [m] and the fraction of the step at which it is reached: inside where the rate goes from positive to
+        negative, else at the end. No branch, so that a loop over lanes stays vectorised.
     """
-    c_1, slope_end = h * start.rate, h * end.rate
-    rise = end.u - start.u
+    c_1, slope_end = h * rate, h * rate_end
+    rise = x_end - x
     c_2 = 3.0 * rise - 2.0 * c_1 - slope_end
     c_3 = c_1 + slope_end - 2.0 * rise
-    peaks = (start.rate > 0.0) & (end.rate < 0.0)
+    peaks = (rate > 0.0) & (rate_end < 0.0)
     # The root of c_1 + 2 c_2 tau + 3 c_3 tau^2 at which the slope changes from plus to minus.
     tau = c_1 / (math.sqrt(max(c_2 * c_2 - 3.0 * c_3 * c_1, 0.0)) - c_2) if peaks else 1.0
-    return (start.u + tau * (c_1 + tau * (c_2 + tau * c_3)) if peaks else end.u), tau
-
-
-@kernel
-def deepest_crush(
-    start: Compression, y_end: State, dense: DenseOutput, tau_end: float, s: Switches, c: Constants
-) -> tuple[float, float]:
-    """Largest crush of the truck's front in a step that starts with the truck driving forward, by the dense output.
-
-    Returns
-    -------
-    crush, tau
-        The crush [m] and the fraction of the step at which it is reached: inside where its rate goes from positive to
-        negative, else where the truck stops or the step ends.
-    """
-    end = compression_at(y_end, s, c)
-    if y_end.v_v < 0.0:
-        tau_end = turning_point(dense.truck, tau_end)
-        end = compression_at(state_at(dense, tau_end), s, c)
-    if not start.crush_rate > 0.0 > end.crush_rate:
-        return end.crush, tau_end
-    bracket = Bracket(0.0, start.crush_rate, tau_end, end.crush_rate, 0)
-    tau = tau_end
-    for _ in range(ITERATIONS):
-        before = tau
-        tau = next_guess(bracket)
-        if abs(tau - before) < PEAK_TOLERANCE:
-            break
-        bracket = narrowed(bracket, tau, compression_at(state_at(dense, tau), s, c).crush_rate)
-    return compression_at(state_at(dense, tau), s, c).crush, tau
+    return (x + tau * (c_1 + tau * (c_2 + tau * c_3)) if peaks else x_end), tau
 
 
 @inlined
@@ -284,10 +260,13 @@ def updated_maxima(
         x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
     part = tau_end * h
     start, end = compression_at(y, s, c), compression_at(y_end, s, c)
-    u, tau = highest_compression(start, end, part)
+    u, tau = highest(start.u, start.rate, end.u, end.rate, part)
     F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + tau * part)
     crush, t_crush = m.crush, m.t_crush
     if dense.truck.x1 > 0.0:
-        deepest, tau = deepest_crush(start, y_end, dense, tau_end, s, c)
-        crush, t_crush = grown(crush, t_crush, deepest, t + tau * h)
+        if y_end.v_v < 0.0:  # up to where the truck stops
+            tau_end = turning_point(dense.truck, tau_end)
+            part, end = tau_end * h, compression_at(state_at(dense, tau_end), s, c)
+        deepest, tau = highest(start.crush, start.crush_rate, end.crush, end.crush_rate, part)
+        crush, t_crush = grown(crush, t_crush, deepest, t + tau * part)
     return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v, crush, t_crush)

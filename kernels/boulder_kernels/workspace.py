@@ -24,8 +24,8 @@ LANES = 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
 more of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
 
-KNOWN: dict[str, object] = {"elements": 0}
-"""Fields that are the same in every lane, and so are not kept: lanes know the closed form of the soil only."""
+KNOWN: dict[str, object] = {"elements": 0} | {name: 0.0 for name in Maxima._fields if name.startswith("t_")}
+"""Fields that are not kept: lanes know the closed form of the soil only, and no times of maxima."""
 
 
 class Number(NamedTuple):
@@ -75,7 +75,7 @@ END = _place("end")
 COMPRESSION = _place("compression")
 """Compression of the vehicle's spring at the start of the step."""
 MAXIMA = _place("maxima")
-"""Largest values so far; lanes leave their times alone."""
+"""Largest values so far."""
 MODES = _place("modes")
 STEP = _place("step")
 """Length of the next step [s]."""
