@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from boulder_kernels import OutcomeTable, Status
+from boulder_kernels import SIMULATED, OutcomeTable, Status
 from boulder_sweep.columns import OUTCOMES, RATINGS, REASONS, Rows
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import (
@@ -125,7 +125,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
     no_contact = status == Status.NO_CONTACT
-    simulated = np.isin(status, (Status.LIMIT, Status.SETTLED, Status.HORIZON, Status.OUTWARD))
+    simulated = np.isin(status, SIMULATED)
     finite = np.ones(status.shape, dtype=bool)
     for maximum in (outcomes.theta_max, outcomes.x_b_max, outcomes.x_v_max, outcomes.F_v_max, outcomes.t_end):
         finite &= np.isfinite(maximum)

@@ -8,11 +8,12 @@ subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, 
 from ._jit import source_hash
 from .design import Constants, Design, DesignTable, constants_of
 from .impact import Control, Record, no_record, simulate_design
-from .outcomes import Maxima, Outcome, OutcomeTable, Status
+from .outcomes import SIMULATED, Maxima, Outcome, OutcomeTable, Status
 from .readings import Readings, as_printed, corrected
 from .table import simulate_table
 
 __all__ = [
+    "SIMULATED",
     "Constants",
     "Control",
     "Design",

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boulder_kernels import OutcomeTable, Status
+from boulder_kernels import SIMULATED, OutcomeTable, Status
 from boulder_sweep.columns import OUTCOME_COLUMNS, RATINGS, REASONS, VERDICTS
 from boulder_sweep.judge.judged import Judged
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, Limits, judge
@@ -27,6 +27,7 @@ def outcome(status: Status, **values: float) -> OutcomeTable:
         "x_b_max": 0.2,
         "x_v_max": 1.0,
         "F_v_max": 1e6,
+        "crush_max": 0.6,
         "t_limit": NAN,
         "t_end": 0.3,
         "theta_error": NAN,
@@ -39,7 +40,7 @@ def outcome(status: Status, **values: float) -> OutcomeTable:
 
 def not_simulated(status: Status) -> OutcomeTable:
     """One row without values."""
-    return OutcomeTable(np.array([status], dtype=np.int8), *(np.array([NAN]) for _ in range(8)))
+    return OutcomeTable(np.array([status], dtype=np.int8), *(np.array([NAN]) for _ in range(9)))
 
 
 def judged(outcomes: OutcomeTable, rating: str = "P1") -> Judged:
@@ -57,7 +58,7 @@ def test_outcome_columns_are_those_of_the_register():
     assert tuple(PENETRATION_LIMITS_M) == RATINGS
 
 
-@pytest.mark.parametrize("status", [Status.SETTLED, Status.HORIZON])
+@pytest.mark.parametrize("status", [Status.SETTLED, Status.BELOW_LIMIT, Status.UNPROVABLE, Status.HORIZON])
 def test_pass(status):
     row = judged(outcome(status))
     assert only(row) == ("pass", "")
@@ -151,7 +152,7 @@ def test_designs_that_the_kernels_gave_up_are_errors_with_a_reason(status):
 
 
 def test_every_status_is_either_computed_or_has_its_reason():
-    computed = {Status.NO_CONTACT, Status.LIMIT, Status.SETTLED, Status.HORIZON, Status.OUTWARD}
+    computed = {Status.NO_CONTACT, *SIMULATED}
     assert computed | set(STATUS_REASONS) == set(Status)
 
 
@@ -192,6 +193,7 @@ rows = st.fixed_dictionaries(
         "x_b_max": st.floats(-0.1, 2.0),
         "x_v_max": st.floats(0.0, 50.0),
         "F_v_max": st.floats(0.0, 1e8),
+        "crush_max": st.floats(0.0, 50.0),
         "t_end": st.floats(0.0, 1.0),
         "theta_error": st.one_of(st.just(NAN), st.floats(0.0, 0.5)),
         "x_error": st.one_of(st.just(NAN), st.floats(0.0, 50.0)),

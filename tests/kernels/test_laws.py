@@ -183,7 +183,7 @@ def test_counterexamples(design: Design, name: str, least: float) -> None:
 def test_a_truck_that_stands_moves_nothing(readings: bk.Readings) -> None:
     design = design_of(oracle.RWG)._replace(v_0=np.float64(0.0))
     found = bk.simulate_design(design, readings, control(1e-2, 0.2, stop_at_limit=True), bk.no_record())
-    assert found.status == Status.HORIZON
+    assert found.status in (Status.BELOW_LIMIT, Status.UNPROVABLE)
     assert (found.maxima.theta, found.maxima.x_b, found.maxima.x_v, found.maxima.F_v) == (0.0, 0.0, 0.0, 0.0)
 
 

@@ -115,9 +115,9 @@ def test_the_bounds_are_not_idle() -> None:
 def test_no_proof_without_a_barrier() -> None:
     """A boulder that never turned, or that has been past its tipping angle in soft soil, has none."""
     c = constants_of(design_of(oracle.RWG), CORRECTED, 0)
-    assert barrier_energy(Maxima(0.0, 0.0, 0.1, 0.0, 0.1, 0.0, 1e6, 0.0), c) == NO_PROOF
+    assert barrier_energy(Maxima(0.0, 0.0, 0.1, 0.0, 0.1, 0.0, 1e6, 0.0, 0.5, 0.0), c) == NO_PROOF
     soft = constants_of(design_of(oracle.ABG)._replace(beta=np.float64(1e-3)), CORRECTED, 0)
-    assert barrier_energy(Maxima(1.2, 0.0, 0.1, 0.0, 0.1, 0.0, 1e6, 0.0), soft) == NO_PROOF
+    assert barrier_energy(Maxima(1.2, 0.0, 0.1, 0.0, 0.1, 0.0, 1e6, 0.0, 0.5, 0.0), soft) == NO_PROOF
     tipped = State(0.0, 0.0, 1.5, 0.0, -9.0, 0.0)
     assert not boulder_energy(tipped, soft) < NO_PROOF
 
@@ -129,7 +129,7 @@ def check_settled(designs: list[Design], limit: float) -> int:
     settled = np.flatnonzero(found.status == Status.SETTLED)
     rest = bk.DesignTable(*(column[settled] for column in table))
     later = bk.simulate_table(rest, CORRECTED, control(2e-3, 4.0, limit))
-    for name in ("theta_max", "x_b_max", "x_v_max", "F_v_max"):
+    for name in ("theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max"):
         grown = getattr(later, name) / getattr(found, name)[settled] - 1.0
         assert np.max(grown, initial=0.0) <= 1e-9, designs[settled[int(np.argmax(grown))]]
     assert np.all(found.t_end[settled] < 1.0)

@@ -60,6 +60,7 @@ def differences(found: bk.Outcome, known: oracle.Impact) -> dict[str, float]:
         "rotation": (m.theta - known.max_rotation.value) / ROTATION,
         "x_b": (m.x_b - known.max_displacement.value) / LENGTH,
         "x_v": (m.x_v - known.max_vehicle_displacement.value) / LENGTH,
+        "crush": (m.crush - known.max_crush.value) / LENGTH,
         "F_v": (m.F_v / known.peak_force.value - 1.0) / FORCE,
     }
     if found.status == bk.Status.LIMIT:

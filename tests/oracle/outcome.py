@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import OdeSolution
 from scipy.optimize import brentq, minimize_scalar
 
-from .dynamics import Modes, Problem
+from .dynamics import Modes, Problem, contact_displacement
 from .energy import Ledger, ledger
 
 Array = NDArray[np.float64]
@@ -96,6 +96,29 @@ class Impact:
     def max_vehicle_displacement(self) -> Peak:
         """Largest x_v [m]."""
         return self._peak(lambda t: self.states(t)[4])
+
+    @property
+    def max_crush(self) -> Peak:
+        """Largest x_v less the displacement of the point struck [m] while the vehicle drives forward."""
+
+        def crush(t: float) -> float:
+            y = self.states(t)[:, 0]
+            return float(y[4]) - contact_displacement(self.problem, y)
+
+        def speed(t: float) -> float:
+            return float(self.states(t)[5, 0])
+
+        samples = self.samples
+        forward = np.flatnonzero(self.states(samples)[5] > 0)
+        if forward.size == 0:
+            return Peak(0.0, 0.0)
+        best = int(forward[np.argmax([crush(float(t)) for t in samples[forward]])])
+        low, high = samples[max(best - 1, 0)], samples[min(best + 1, samples.size - 1)]
+        if speed(high) < 0:
+            high = brentq(speed, samples[best], high, xtol=1e-14)
+        inside = minimize_scalar(lambda t: -crush(t), bounds=(low, high), method="bounded", options={"xatol": 1e-10})
+        time = max((float(samples[best]), float(high), float(inside.x)), key=crush)
+        return Peak(crush(time), time)
 
     @property
     def peak_force(self) -> Peak:

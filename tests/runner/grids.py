@@ -72,6 +72,7 @@ def plausible(table: DesignTable, readings: Readings, control: Control) -> Outco
         x_b_max=kept(share * 0.3),
         x_v_max=kept(1.0 + 6.0 * share),
         F_v_max=kept(1e6 * (0.5 + share)),
+        crush_max=kept(0.3 + 0.5 * share),
         t_limit=np.where(status == Status.LIMIT, 0.1 + share, np.nan),
         t_end=kept(0.3 + share),
         theta_error=kept(1e-4 * share),
