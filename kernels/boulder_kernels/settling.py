@@ -12,10 +12,10 @@ energy of the soil is convex, so a tangent plane bounds it from below wherever i
 finder place the tangent well; the bound is a proof wherever they end.
 
 Where soil rings long after the impact, that proof can wait for seconds. The verdict needs less, and at the horizon less
-is asked: that E is below the least potential energy on theta = +-theta_limit, wherever x_b. Then the boulder can never
-reach the limit. The truck, which does not move forward any more, never will again, since contact only pushes it back:
-its displacement is final, and with it the penetration and the crush. Rotation and displacement of the boulder may still
-grow, the rotation never to its limit.
+is asked: that E is below the least potential energy, wherever x_b, on theta = +-theta_limit or at a smaller angle that
+the boulder has to pass first, as that at which it would tip over. Then it never reaches the limit. The truck, which does
+not move forward any more, never will again, since contact only pushes it back: its displacement is final, and with it
+the penetration and the crush. Rotation and displacement of the boulder may still grow, the rotation never to its limit.
 
 As printed neither holds, and no other proof can: a restoring moment that brakes a boulder turning forward and lets it
 turn back freely, and a truck that the air pulls on, feed energy. It does happen: of the random designs of
@@ -23,6 +23,8 @@ turn back freely, and a truck that the air pulls on, feed energy. It does happen
 """
 
 from __future__ import annotations
+
+import math
 
 from ._jit import inlined, kernel
 from .design import Constants
@@ -40,6 +42,8 @@ PLACING_STEPS = 6
 """Steps of the root finder that places a tangent."""
 CAUTION = 1.0 - 1e-6
 """The energy must be below the barrier by the integrator's own error, and more."""
+LEAST_ANGLE = 1e-9
+"""No smaller angle is looked at [rad]."""
 CAUTION_AT_LIMIT = 0.99
 """The same at the limit: there no later step looks again, and steps may be long."""
 
@@ -167,9 +171,20 @@ def stays_below(theta_limit: float, y: State, c: Constants) -> bool:
         The state, within the limit.
     c
         Constants of a design whose readings allow a proof, see `proof_is_possible`.
+
+    Notes
+    -----
+    Of the angles to be passed some are tried, each half of the one before.
     """
-    to_turn = energy_to_turn(theta_limit, c)
-    return bool(y.v_v <= 0.0 < to_turn and boulder_energy(y, c) < CAUTION_AT_LIMIT * to_turn)
+    if y.v_v > 0.0:
+        return False
+    E = boulder_energy(y, c)
+    angle = min(theta_limit, 0.5 * math.pi)
+    while angle > max(abs(y.theta_b), LEAST_ANGLE):
+        if CAUTION_AT_LIMIT * energy_to_turn(angle, c) > E:
+            return True
+        angle *= 0.5
+    return False
 
 
 @inlined
