@@ -87,7 +87,6 @@ def locate(
         if gap_low <= 0.0:
             return low
     exact = event == CORNER or (event == ROTATION and not needs_moment(g))
-    exact = exact or (event == COUPLE and g.couple_abs_M != 0.0)  # held at rest, and let go back at the limit
     tolerance = JUMP_TOLERANCE if exact else KINK_TOLERANCE
     bracket = Bracket(low, gap_low, 1.0, gap_end, 0)
     tau = 1.0

@@ -13,9 +13,10 @@ finder place the tangent well; the bound is a proof wherever they end.
 
 Where soil rings long after the impact, that proof can wait for seconds. The verdict needs less, and at the horizon less
 is asked: that E is below the least potential energy, wherever x_b, on theta = +-theta_limit or at a smaller angle that
-the boulder has to pass first, as that at which it would tip over. Then it never reaches the limit. The truck, which does
-not move forward any more, never will again, since contact only pushes it back: its displacement is final, and with it
-the penetration and the crush. Rotation and displacement of the boulder may still grow, the rotation never to its limit.
+the boulder has to pass first, as that at which it would tip over. Then it never reaches the limit. The truck, which
+does not move forward any more, never will again, since contact only pushes it back: its displacement is final, and with
+it the penetration and the crush. Rotation and displacement of the boulder may still grow, the rotation never to its
+limit.
 
 As printed neither holds, and no other proof can: a restoring moment that brakes a boulder turning forward and lets it
 turn back freely, and a truck that the air pulls on, feed energy. It does happen: of the random designs of

@@ -65,12 +65,12 @@ def test_the_same_motion_of_many(preset: str) -> None:
 
 def wild_tables() -> dict[str, DesignTable]:
     """Families of designs far from usual ones."""
-    usual = random_table(6000, 31)
+    usual = random_table(3000, 31)
     turn = np.random.default_rng(32).uniform
     return {
-        "usual": random_table(20_000, 33),
-        "slender in weak soil": table_of(weak_designs(12_000, seed=34)),
-        "soil of any stiffness": usual._replace(beta=np.exp(turn(np.log(0.2), np.log(300.0), 6000))),
+        "usual": random_table(9000, 33),
+        "slender in weak soil": table_of(weak_designs(2500, seed=34)),
+        "soil of any stiffness": usual._replace(beta=np.exp(turn(np.log(0.2), np.log(300.0), 3000))),
         "soft truck": usual._replace(k_v=0.1 * usual.k_v, c_v=0.5 * usual.c_v),
         "light boulder": usual._replace(rho_b=0.3 * usual.rho_b, v_0=0.4 * usual.v_0),
         "hardly buried": usual._replace(d=0.3 * usual.d, v_0=0.15 * usual.v_0),
@@ -79,10 +79,10 @@ def wild_tables() -> dict[str, DesignTable]:
 
 def check_proved(table: DesignTable) -> int:
     """Follow what is proved for ten seconds by Runge-Kutta steps; return how many designs that were."""
-    found = by_kernels(table, "corrected", 8e-3, longest=10.0)
+    found = by_kernels(table, "corrected", 5e-4, longest=10.0)
     proved = np.isin(found.status, PROVED)
     later = by_runge_kutta(rows(table, proved), "corrected", 2e-4, 10.0)
-    # A step of 8 ms turns by 0.01 deg too much or too little: what it stops below the limit by less is not looked at.
+    # Errors of either method decide what turns to the limit within them.
     clear = LIMIT - found.theta_max[proved] > np.radians(0.05)
     assert np.all(np.isinf(later.t_limit[clear]))
     assert np.max((later.x_v - found.x_v_max[proved])[clear], initial=0.0) < 0.01
