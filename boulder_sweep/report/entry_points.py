@@ -35,6 +35,7 @@ DESIGN = Design._fields
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
 SETTINGS = (*Readings._fields, *Control._fields)
 """How it is simulated, in this order; a truth is 0 or 1."""
+SETTINGS_COUNT = len(SETTINGS)
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
 HISTORY = (
@@ -63,7 +64,7 @@ def readings_from(s: np.ndarray) -> Readings:
 @inlined
 def control_from(s: np.ndarray, halved: bool) -> Control:
     """Return the control, which stands behind them, its step halved or not."""
-    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved)
+    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved, s[13])
 
 
 @inlined
@@ -75,7 +76,7 @@ def table_from(t: np.ndarray) -> DesignTable:
 @inlined
 def outcomes_from(t: np.ndarray) -> OutcomeTable:
     """Return the rows of an array as the columns of a table."""
-    return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8])
+    return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9])
 
 
 @kernel
@@ -95,10 +96,10 @@ def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at:
     coarse_at
         Room for as many again, the coarser solution.
     """
-    s = carray(settings_at, (13,))
+    s = carray(settings_at, (SETTINGS_COUNT,))
     readings, estimated = readings_from(s), s[9] > 0.0
     table = table_from(carray(designs_at, (15, n)))
-    fine, coarse = outcomes_from(carray(fine_at, (9, n))), outcomes_from(carray(coarse_at, (9, n)))
+    fine, coarse = outcomes_from(carray(fine_at, (10, n))), outcomes_from(carray(coarse_at, (10, n)))
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)))
     for row in range(n):
@@ -155,7 +156,7 @@ def history(
     centre_at
         Where c_x and c_y go, the common centre of mass of boulder and soil (Eqs 3, 4).
     """
-    s = carray(settings_at, (13,))
+    s = carray(settings_at, (SETTINGS_COUNT,))
     readings, control = readings_from(s), control_from(s, s[9] > 0.0)
     design = design_at(table_from(carray(design_from, (15, 1))), 0)
     out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
