@@ -32,8 +32,8 @@ MAX_TEXT = 200
 """Longest text that is carried along, in characters."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(\s.*)?")
 
-Origin = Callable[[int], Place]
-"""From the number of a cell in its row to its place."""
+Origin = tuple[int, str]
+"""Where a row stands: number of the line, and its text where that is needed to find a cell."""
 
 
 class Alike:
@@ -83,8 +83,9 @@ def converted(values: np.ndarray, column: TableColumn) -> np.ndarray:
 class _Rows:
     """Turns rows of text into columns of numbers, a chunk at a time."""
 
-    def __init__(self, path: Path, problems: ProblemList) -> None:
+    def __init__(self, path: Path, problems: ProblemList, place: Callable[[Origin, int], Place]) -> None:
         self.path = path
+        self.place = place
         self.label = str(path)
         self.problems = problems
         self.before = len(problems.problems)
@@ -99,7 +100,7 @@ class _Rows:
 
     def header(self, names: list[str], origin: Origin) -> None:
         """Take the column names."""
-        self.places = [origin(index) for index in range(len(names))]
+        self.places = [self.place(origin, index) for index in range(len(names))]
         self.columns = read_header(names, self.places, self.problems)
 
     def take(self, row: list[str], origin: Origin, hint: str = "") -> None:
@@ -107,7 +108,7 @@ class _Rows:
         if len(row) != len(self.columns):
             message = f"has {len(row)} cell{'' if len(row) == 1 else 's'}; the first line has {len(self.columns)}"
             message += hint if len(row) > len(self.columns) else ""
-            self.alike.add("lines", origin(0), "", message)
+            self.alike.add("lines", self.place(origin, 0), "", message)
             return
         self.count += 1
         if self.count > MAX_TABLE_ROWS:
@@ -143,7 +144,7 @@ class _Rows:
             values = converted(self.convert(cells, index, column), column)
             for row, message in check_values(values, column.field):
                 if not np.isnan(values[row]):  # those have been reported as they were read
-                    self.alike.add("cells", self.origins[row](index), column.name, message)
+                    self.alike.add("cells", self.place(self.origins[row], index), column.name, message)
             self.numbers.setdefault(column.field.name, []).append(values)
         self.rows.clear()
         self.origins.clear()
@@ -160,7 +161,7 @@ class _Rows:
         for row, cell in enumerate(cells):
             if _DECIMAL_COMMA.fullmatch(cell):
                 message = f"'{shorten(cell)}' has a decimal comma; save the file with decimal points"
-                self.alike.add("", self.origins[row](index), "", message, most=1)
+                self.alike.add("", self.place(self.origins[row], index), "", message, most=1)
                 continue
             try:
                 number, unit = split_number(cell, column.field.unit)
@@ -168,7 +169,7 @@ class _Rows:
                     raise NumberError(f"'{shorten(cell)}' has a unit; units belong in the column's name")
                 values[row] = float(number)
             except (NumberError, OverflowError) as error:
-                self.alike.add("cells", self.origins[row](index), column.name, str(error))
+                self.alike.add("cells", self.place(self.origins[row], index), column.name, str(error))
         return values
 
 
@@ -217,33 +218,31 @@ def read_csv(path: Path, problems: ProblemList) -> DesignList:
     label = str(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            return _read_lines(_Lines(stream), _Rows(path, problems))
+            return _read_lines(_Lines(stream), path, problems)
     except UnicodeDecodeError:
         raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
     except OSError as error:
         raise refuse(label, f"cannot be read ({error.strerror})") from None
 
 
-def _read_lines(source: _Lines, rows: _Rows) -> DesignList:
+def _read_lines(source: _Lines, path: Path, problems: ProblemList) -> DesignList:
     """Take the lines of a CSV file."""
+    label = str(path)
     lines = iter(source)
     header = next((line for line in lines if line.strip()), None)
     if header is None:
-        raise refuse(rows.label, "is empty; the first line must hold the column names")
+        raise refuse(label, "is empty; the first line must hold the column names")
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
     hint = " (numbers need a decimal point, and text with a comma needs quotation marks)" if delimiter == "," else ""
-
-    def origin() -> Origin:
-        line, text = source.number, source.text
-        return lambda index: _place(rows.label, line, text.split(delimiter), index)
-
+    rows = _Rows(path, problems, lambda origin, index: _place(label, origin[0], origin[1].split(delimiter), index))
     try:
-        rows.header([cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))], origin())
+        names = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]
+        rows.header(names, (source.number, header))
         for row in csv.reader(lines, delimiter=delimiter):
             if row and (len(row) > 1 or row[0].strip()):
-                rows.take(row, origin(), hint)
+                rows.take(row, (source.number, source.text), hint)
     except csv.Error as error:
-        raise refuse(rows.label, f"cannot be read as CSV ({error})", source.number, 1) from None
+        raise refuse(label, f"cannot be read as CSV ({error})", source.number, 1) from None
     return rows.finish()
 
 
@@ -274,7 +273,7 @@ def read_xlsx(path: Path, problems: ProblemList) -> DesignList:
         from openpyxl import load_workbook  # an extra, for tables in this format only
     except ImportError:
         raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
-    rows = _Rows(path, problems)
+    rows = _Rows(path, problems, lambda origin, index: Place(label, origin[0], index + 1))
     try:
         with zipfile.ZipFile(path) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > MAX_UNPACKED_BYTES:
@@ -282,7 +281,7 @@ def read_xlsx(path: Path, problems: ProblemList) -> DesignList:
         book = load_workbook(path, read_only=True, data_only=True)
         for number, cells in enumerate(book.worksheets[0].iter_rows(values_only=True), 1):
             texts = ["" if cell is None else str(cell) for cell in cells]
-            origin = _cell_of(label, number)
+            origin = (number, "")
             if not any(text.strip() for text in texts):
                 continue
             if rows.columns:
@@ -295,10 +294,6 @@ def read_xlsx(path: Path, problems: ProblemList) -> DesignList:
     if not rows.columns:
         raise refuse(label, "is empty; the first row must hold the column names")
     return rows.finish()
-
-
-def _cell_of(label: str, row: int) -> Origin:
-    return lambda index: Place(label, row, index + 1)
 
 
 def _filled(texts: list[str]) -> int:
