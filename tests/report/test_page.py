@@ -74,7 +74,7 @@ def test_the_page_forbids_the_network(report, opened):
 def test_random_designs_come_out_as_the_command_line_has_them(explorer, opened):
     page = opened(explorer)
     designs = list(random_designs())
-    code = "(designs) => designs.map((one) => { page.take(one); return page.judged([page.design], false)[0]; })"
+    code = "(designs) => designs.map((one) => { page.take(one); return page.simulator.whole(page.design).judged; })"
     found = page.evaluate(code, designs)
     verdicts = set()
     for design, ours in zip(designs, found, strict=True):
@@ -96,7 +96,7 @@ def test_maps_come_out_as_a_sweep_has_them(report, result, opened):
     table = boulder_sweep.read(result)
     page = opened(report)
     inputs = table.iloc[:, 1:18].to_dict("records")
-    found = page.evaluate("(designs) => page.judged(designs, true)", inputs)
+    found = page.evaluate("(designs) => page.simulator.rows(designs)", inputs)
     assert [one["verdict"] for one in found] == table.verdict.tolist()
     for name in ("max_rotation_deg", "max_vehicle_displacement_m", "peak_force_kN", "end_time_s", "margin"):
         ours = np.array([math.nan if one[name] is None else one[name] for one in found])

@@ -1,20 +1,17 @@
 // @ts-check
 "use strict";
 
-const SAMPLES = 400;
 const AROUND = 40;
 const SPREAD = 0.25;
 /** Width of a sheet of A4 between its margins [px]. */
 const PAPER = 680;
-/** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
-const BEFORE_THE_END = 1 - 1e-14;
 
 /** The whole page: what the reader does, and what is simulated and shown for it. */
 class Page {
   /** @param {any} data @param {Kernel} kernel @param {Plots} plots @param {Uint8Array} codes */
   constructor(data, kernel, plots, codes) {
     this.data = data;
-    this.kernel = kernel;
+    this.simulator = new Simulator(data, kernel);
     this.plots = plots;
     this.codes = codes;
     this.units = new Units(data.unit, data.units);
@@ -29,67 +26,10 @@ class Page {
     this.held = {};
     /** @type {Record<string, {scene: Scene, motion: Motion}>} */
     this.motions = {};
-    const horizon = data.settings[data.layout.settings.indexOf("horizon")];
-    this.times = Float64Array.from({ length: SAMPLES + 1 }, (_, k) => ((horizon * k) / SAMPLES) * BEFORE_THE_END);
     this.waiting = 0;
     this.printing = false;
     /** @type {Record<string, Cell[]>} */
     this.cells = {};
-  }
-
-  /** @param {boolean} stop whether at the limit of rotation @returns {number[]} settings of the kernel */
-  settings(stop) {
-    const settings = [...this.data.settings];
-    settings[this.data.layout.settings.indexOf("stop_at_limit")] = stop ? 1 : 0;
-    return settings;
-  }
-
-  /**
-   * A design in the kernel's terms.
-   * @param {Record<string, number>} inputs by the columns of the table
-   * @returns {KernelDesign}
-   */
-  kernelDesign(inputs) {
-    const { layout } = this.data;
-    return Object.fromEntries(
-      layout.design.map((/** @type {string} */ field) => {
-        const value = inputs[layout.columns[field]];
-        return [field, field === "phi" ? value / DEGREES : value];
-      }),
-    );
-  }
-
-  /**
-   * Fill in what follows from the other inputs, and say what cannot be.
-   * @param {Record<string, number>} inputs
-   * @returns {{inputs: Record<string, number>, refusal: string}}
-   */
-  completed(inputs) {
-    const exposed = inputs.boulder_height_m - inputs.embedment_depth_m;
-    const [bumper, hood] = [inputs.bumper_height_m, inputs.hood_height_m];
-    const impact = this.data.face ? 0.5 * (Math.min(exposed, hood) + bumper) : inputs.impact_height_m;
-    let refused = 0;
-    if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
-    if (hood < bumper) refused = 2;
-    if (exposed <= 0) refused = 1;
-    return { inputs: { ...inputs, impact_height_m: impact }, refusal: this.data.refusals[refused] };
-  }
-
-  /**
-   * Simulate and judge designs.
-   * @param {Record<string, number>[]} designs
-   * @param {boolean} stop
-   * @returns {Judged[]}
-   */
-  judged(designs, stop) {
-    const complete = designs.map((design) => this.completed(design));
-    const outcomes = this.kernel.outcomes(complete.map((one) => this.kernelDesign(one.inputs)), this.settings(stop));
-    return complete.map(({ inputs, refusal }, row) => {
-      const found = judge(outcomes, row, inputs.boulder_length_m, inputs.bed_offset_m, this.data.rules);
-      if (refusal === "") return found;
-      const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
-      return { ...nothing, verdict: "error", reason: refusal, rating: null };
-    });
   }
 
   /**
@@ -98,9 +38,7 @@ class Page {
    * @param {Record<string, number>} design
    */
   show(panel, design) {
-    const { inputs, refusal } = this.completed(design);
-    const [found] = this.judged([design], false);
-    const motion = this.kernel.history(this.kernelDesign(inputs), this.settings(false), refusal === "" ? this.times : new Float64Array(0));
+    const { judged: found, motion, inputs } = this.simulator.whole(design);
     this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found);
     const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
     table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
@@ -167,7 +105,7 @@ class Page {
   /** Simulate the design of the controls, at once; the designs around it, as soon as the reader pauses. */
   update() {
     this.show("live", this.design);
-    this.controls.show(this.completed(this.design).inputs);
+    this.controls.show(this.simulator.completed(this.design).inputs);
     byId("yaml").value = yamlOf(this.data, this.design);
     clearTimeout(this.waiting);
     this.waiting = setTimeout(() => this.showAround(), 150);
@@ -185,7 +123,7 @@ class Page {
     };
     const places = line(across).flatMap((x) => line(up).map((y) => ({ x, y })));
     const designs = places.map(({ x, y }) => ({ ...this.design, [across]: x, [up]: y }));
-    const found = this.judged(designs, true);
+    const found = this.simulator.rows(designs);
     const cells = places.map(({ x, y }, k) => ({
       x, y, margin: found[k].margin, pick: () => ({ [across]: x, [up]: y }),
       name: found[k].reason === "" ? found[k].verdict : `${found[k].verdict}: ${found[k].reason}`,
@@ -234,11 +172,11 @@ class Page {
     const columns = [...this.data.outcomes, ...this.inputs];
     byId("list").hidden = this.list.length === 0;
     byId("list-head").replaceChildren(...["verdict", ...columns.map((one) => this.units.title(one.label, one.unit))].map((words) => element("th", words)));
-    const found = this.judged(this.list, false);
+    const found = this.list.map((design) => this.simulator.whole(design).judged);
     byId("list-rows").replaceChildren(
       ...this.list.map((design, k) => {
         const line = document.createElement("tr");
-        const known = { ...this.completed(design).inputs, ...found[k] };
+        const known = { ...this.simulator.completed(design).inputs, ...found[k] };
         const values = columns.map((one) => this.units.bare(known[one.name], one.unit));
         line.append(...[`${found[k].verdict} ${found[k].reason}`, ...values].map((words) => element("td", words)));
         return line;
@@ -248,9 +186,9 @@ class Page {
 
   /** @returns {string} the list with the names and units of the table */
   csv() {
-    const found = this.judged(this.list, false);
+    const found = this.list.map((design) => this.simulator.whole(design).judged);
     const names = [...this.inputs.map((input) => input.name), ...Object.keys(found[0] ?? {})];
-    return csvOf(names, this.list.map((design, k) => ({ ...this.completed(design).inputs, ...found[k] })));
+    return csvOf(names, this.list.map((design, k) => ({ ...this.simulator.completed(design).inputs, ...found[k] })));
   }
 
   /** Show everything anew, in other units or colours. */
@@ -413,7 +351,7 @@ class Page {
     /** @param {number} now */
     const tick = (now) => {
       // Five times as slow as it is.
-      const sample = Math.min(Math.floor(((now - begun) / 5000) * (last / this.times[last])), last);
+      const sample = Math.min(Math.floor(((now - begun) / 5000) * (last / this.simulator.times[last])), last);
       slider.value = String(Math.max(sample, 0));
       this.showScene(panel);
       if (sample < last) requestAnimationFrame(tick);

@@ -1,0 +1,96 @@
+// @ts-check
+"use strict";
+
+const SAMPLES = 400;
+/** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
+const BEFORE_THE_END = 1 - 1e-14;
+/** Columns that `sweep simulate`, which goes on beyond the limit, takes from a row of `sweep run`, which stops there. */
+const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s"];
+
+/** Designs by the columns of the table in, judged rows and motions out. */
+class Simulator {
+  /** @param {any} data of the page @param {Kernel} kernel */
+  constructor(data, kernel) {
+    this.data = data;
+    this.kernel = kernel;
+    const horizon = data.settings[data.layout.settings.indexOf("horizon")];
+    this.times = Float64Array.from({ length: SAMPLES + 1 }, (_, k) => ((horizon * k) / SAMPLES) * BEFORE_THE_END);
+  }
+
+  /** @param {Record<string, number>} changed by name @returns {number[]} settings of the kernel */
+  settings(changed) {
+    const { settings } = this.data.layout;
+    return this.data.settings.map((/** @type {number} */ value, /** @type {number} */ k) => changed[settings[k]] ?? value);
+  }
+
+  /**
+   * A design in the kernel's terms.
+   * @param {Record<string, number>} inputs by the columns of the table
+   * @returns {KernelDesign}
+   */
+  kernelDesign(inputs) {
+    const { layout } = this.data;
+    return Object.fromEntries(
+      layout.design.map((/** @type {string} */ field) => {
+        const value = inputs[layout.columns[field]];
+        return [field, field === "phi" ? value / DEGREES : value];
+      }),
+    );
+  }
+
+  /**
+   * Fill in what follows from the other inputs, and say what cannot be.
+   * @param {Record<string, number>} inputs
+   * @returns {{inputs: Record<string, number>, refusal: string}}
+   */
+  completed(inputs) {
+    const exposed = inputs.boulder_height_m - inputs.embedment_depth_m;
+    const [bumper, hood] = [inputs.bumper_height_m, inputs.hood_height_m];
+    const impact = this.data.face ? 0.5 * (Math.min(exposed, hood) + bumper) : inputs.impact_height_m;
+    let refused = 0;
+    if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
+    if (hood < bumper) refused = 2;
+    if (exposed <= 0) refused = 1;
+    return { inputs: { ...inputs, impact_height_m: impact }, refusal: this.data.refusals[refused] };
+  }
+
+  /**
+   * Simulate and judge designs as `sweep run` does its rows, up to the limit.
+   * @param {Record<string, number>[]} designs
+   * @returns {Judged[]}
+   */
+  rows(designs) {
+    return this.judged(designs, { stop_at_limit: 1 });
+  }
+
+  /**
+   * Simulate and judge one design as `sweep simulate` does, beyond the limit.
+   * @param {Record<string, number>} design
+   * @returns {{judged: Judged, motion: Motion, inputs: Record<string, number>}}
+   */
+  whole(design) {
+    const { inputs, refusal } = this.completed(design);
+    const [decided] = this.rows([design]);
+    const beyond = { stop_at_limit: 0 };
+    const [judged] = this.judged([design], beyond);
+    for (const name of DECIDED) judged[name] = decided[name];
+    const times = refusal === "" ? this.times : new Float64Array(0);
+    return { judged, motion: this.kernel.history(this.kernelDesign(inputs), this.settings(beyond), times), inputs };
+  }
+
+  /**
+   * @param {Record<string, number>[]} designs
+   * @param {Record<string, number>} changed settings
+   * @returns {Judged[]}
+   */
+  judged(designs, changed) {
+    const complete = designs.map((design) => this.completed(design));
+    const outcomes = this.kernel.outcomes(complete.map((one) => this.kernelDesign(one.inputs)), this.settings(changed));
+    return complete.map(({ inputs, refusal }, row) => {
+      const found = judge(outcomes, row, inputs.boulder_length_m, inputs.bed_offset_m, this.data.rules);
+      if (refusal === "") return found;
+      const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
+      return { ...nothing, verdict: "error", reason: refusal, rating: null };
+    });
+  }
+}
