@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Control, Readings, Status
+from boulder_kernels import SIMULATED, Control, Readings, Status
 from boulder_sweep.columns import INPUTS, OUTCOMES
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
@@ -138,6 +138,7 @@ def _rules(rotation: float, rating: str) -> dict[str, Any]:
         "penetration": PENETRATION_LIMITS_M[rating],
         "ratings": list(PENETRATION_LIMITS_M.items()),
         "status": {status.name: status.value for status in Status},
+        "simulated": [status.value for status in SIMULATED],
         "why": {str(status.value): words for status, words in STATUS_REASONS.items()},
     }
 

@@ -8,6 +8,7 @@
  * @property {number} penetration largest penetration of the required rating [m]
  * @property {[string, number][]} ratings every rating and its largest penetration [m], the best first
  * @property {Record<string, number>} status how a simulation can end, by name
+ * @property {number[]} simulated those that have maxima to report
  * @property {Record<string, string>} why the reason of each status that leaves a design without a result
  */
 
@@ -33,7 +34,7 @@ function judge(outcomes, row, length, bedOffset, rules) {
   const { status } = rules;
   const ended = of("status");
   const [theta, x_b, x_v, F_v, end] = ["theta_max", "x_b_max", "x_v_max", "F_v_max", "t_end"].map(of);
-  const simulated = [status.LIMIT, status.SETTLED, status.HORIZON, status.OUTWARD].includes(ended);
+  const simulated = rules.simulated.includes(ended);
   const valid = simulated && [theta, x_b, x_v, F_v, end].every(Number.isFinite);
   const overturned = valid && (ended === status.LIMIT || theta >= rules.rotation);
   const standing = valid && !overturned;
