@@ -50,10 +50,10 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) 
     """Turn links between files of the repository into links between pages of the site."""
     here = page.file.src_uri
     source = next((name for name in taken() if in_site(name) == here), None)
-    if source is None and not here.startswith(("notebooks/", "reference/")):
-        source = f"docs/{here}"
-    if source is None:
+    if here.startswith("reference/"):
         return markdown
+    if source is None:
+        source = here if here.startswith("notebooks/") else f"docs/{here}"
     pieces = _CODE.split(markdown)
     return "".join(piece if _CODE.fullmatch(piece) else relinked(piece, source) for piece in pieces)
 
