@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import posixpath
 import re
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 RENAMED = {"README.md": "quick_start.md"}
 """Place in the site of files that would be in the way of others at their own."""
-TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "benchmarks/README.md")
+TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
+"""Pages from outside the folder of the documentation."""
 SHIM = "assets/iframe-worker.js"
 """For the search on pages opened from disk; `mkdocs.yml` names it in place of one that the theme would fetch."""
-TAKEN_FOLDERS = ("benchmarks/figures", "configs")
 _LINK = re.compile(r"(?P<before>\]\(|\bsrc=\")(?!\w+:|#)(?P<target>[^)\s\"#]+)(?P<anchor>#[^)\s\"]*)?")
 _CODE = re.compile(r"(```.*?```|`[^`\n]*`)", re.DOTALL)
 
@@ -58,11 +58,19 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) 
     return "".join(piece if _CODE.fullmatch(piece) else relinked(piece, source) for piece in pieces)
 
 
-def taken() -> Iterator[str]:
-    """Yield the files from elsewhere that belong to the site, by their place in the repository."""
-    yield from TAKEN
-    for folder in TAKEN_FOLDERS:
-        yield from sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / folder).iterdir() if path.is_file())
+@cache
+def taken() -> tuple[str, ...]:
+    """Return files from elsewhere that belong to the site, as placed in the repository: pages, and what is linked."""
+    pages = [*TAKEN, *(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").glob("*.md"))]
+    linked = {
+        posixpath.normpath(posixpath.join(posixpath.dirname(page), match["target"]))
+        for page in pages
+        for match in _LINK.finditer(_CODE.sub("", (ROOT / page).read_text(encoding="utf-8")))
+    }
+    elsewhere = sorted(
+        name for name in linked if (ROOT / name).is_file() and not name.startswith(("docs/", "notebooks/"))
+    )
+    return tuple(dict.fromkeys([*TAKEN, *elsewhere]))
 
 
 def in_site(name: str) -> str:
