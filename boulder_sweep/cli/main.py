@@ -146,6 +146,9 @@ def _report(error: Exception, verbose: bool) -> int:
         import traceback
 
         traceback.print_exception(error)
+    if isinstance(error, MemoryError):
+        say("error: there is not enough memory")
+        return EXIT_INTERNAL
     if isinstance(error, OSError):  # a place that cannot be read or written
         place = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
         say(f"error: {place}")

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,9 +20,11 @@ import numpy as np
 
 from boulder_sweep.settings.numbers import NumberError, split_number
 from boulder_sweep.settings.problems import Place, Problem, ProblemList, SettingsError, did_you_mean, shorten
+from boulder_sweep.settings.source import check_regular_file
 from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
 
-MOST_ROWS = 2_000_000
+MOST_ROWS, MOST_COLUMNS = 2_000_000, 1000
+MAX_BYTES = 500_000_000
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
 _SUFFIXES = {"m_s2": "m/s^2", "ft_s2": "ft/s^2", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s"}
 _PLAIN_SUFFIXES = ("s", "ms", "m", "mm", "cm", "in", "ft", "deg", "rad", "mph", "g")
@@ -97,6 +100,8 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     rows, delimiter = _rows(file)
     problems = ProblemList()
     line, header = rows[0]
+    if len(header) > MOST_COLUMNS:
+        raise _refusal(str(file), f"has {len(header):,} columns; at most {MOST_COLUMNS:,} are read")
     columns = [_column(cell, Place(str(file), line), wanted, problems) for cell in header]
     named = [column.signal.name for column in columns if column is not None]
     for name in sorted({name for name in named if named.count(name) > 1}):
@@ -125,16 +130,17 @@ class _Column(NamedTuple):
 def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], str]:
     """Return the lines that hold something, each with its number, cut into cells."""
     label = str(file)
+    check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
-            lines = [(number, text) for number, text in enumerate(stream, 1) if _holds_something(text)]
+            lines = list(islice(_filled_lines(stream), MOST_ROWS + 2))
     except UnicodeDecodeError:
         raise _refusal(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
     except OSError as error:
         raise _refusal(label, f"cannot be read ({error.strerror})") from None
     if len(lines) < 3:
         raise _refusal(label, "must hold a line of names and at least two rows of numbers")
-    if len(lines) > MOST_ROWS:
+    if len(lines) > MOST_ROWS + 1:
         raise _refusal(label, f"has more than {MOST_ROWS:,} rows")
     delimiter = next((sign for sign in ",;\t" if sign in lines[0][1]), ",")
     try:
@@ -142,6 +148,11 @@ def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], str]:
         return [(number, row) for (number, _), row in zip(lines, cells, strict=True)], delimiter
     except (csv.Error, ValueError):
         raise _refusal(label, "cannot be read as CSV: a cell runs over the end of its line") from None
+
+
+def _filled_lines(stream: Iterable[str]) -> Iterator[tuple[int, str]]:
+    """Yield the lines that hold something, each with its number."""
+    return ((number, text) for number, text in enumerate(stream, 1) if _holds_something(text))
 
 
 def _holds_something(text: str) -> bool:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boulder_sweep.designs import Label
 from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, shorten
 from boulder_sweep.settings.source import check_regular_file, refuse
 from boulder_sweep.settings.sweep import DesignList
-from boulder_sweep.settings.table_header import check_numbers, read_header
+from boulder_sweep.settings.table_header import check_count, check_numbers, read_header
 from boulder_sweep.settings.table_rows import (
     MAX_TABLE_ROWS,
     Alike,
@@ -21,6 +23,9 @@ from boulder_sweep.settings.table_rows import (
     read_xlsx,
 )
 from boulder_sweep.settings.tree import Scalar
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 MAX_TABLE_BYTES = 2_000_000_000
 
@@ -80,6 +85,7 @@ def _read_parquet(path: Path, problems: ProblemList) -> DesignList:
         if rows == 0:
             raise refuse(label, "has no rows")
         names = list(file.schema_arrow.names)
+        check_count(names, label)
         for name, column in zip(names, read_header(names, [place] * len(names), problems), strict=True):
             if column is None:
                 continue
@@ -87,8 +93,7 @@ def _read_parquet(path: Path, problems: ProblemList) -> DesignList:
             numeric = pa.types.is_floating(cells.type) or pa.types.is_integer(cells.type)
             if column.field is None:
                 if not numeric or check_numbers(column, place, problems):
-                    texts = ["" if cell is None else str(cell) for cell in cells.to_pylist()]
-                    found.labels[name] = label_of(texts)
+                    found.labels[name] = _label(cells)
                 continue
             if not numeric:
                 problems.add(place, name, f"holds {cells.type}, not numbers")
@@ -100,10 +105,24 @@ def _read_parquet(path: Path, problems: ProblemList) -> DesignList:
             for row, message in check_values(values, column.field):
                 alike.add("rows", place, name, f"row {row + 1}: {message}")
             found.columns[column.field.name] = np.ascontiguousarray(values)
-    except (pa.ArrowException, OSError) as error:
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, MemoryError) as error:
+        # Of a damaged file, pyarrow raises almost anything.
         raise refuse(label, f"cannot be read as Parquet ({shorten(str(error), 100)})") from None
     alike.finish()
     return found
+
+
+def _label(cells: pa.ChunkedArray) -> Label:
+    """Return a text column; every word is looked at once, however often it stands in the file."""
+    import pyarrow as pa
+
+    if not pa.types.is_dictionary(cells.type):
+        if pa.types.is_nested(cells.type):
+            return label_of(["" if cell is None else str(cell) for cell in cells.to_pylist()])
+        cells = cells.dictionary_encode()
+    array = cells.unify_dictionaries().combine_chunks()
+    words = label_of(["", *("" if word is None else str(word) for word in array.dictionary.to_pylist())])
+    return Label(words.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], words.words)
 
 
 _READERS: dict[str, Callable[[Path, ProblemList], DesignList]] = {

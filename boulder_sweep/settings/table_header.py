@@ -10,8 +10,10 @@ from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
 from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.settings.fields import INPUTS, Field
 from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
+from boulder_sweep.settings.source import refuse
 from boulder_sweep.settings.units import UnitError, factor
 
+MAX_COLUMNS = 1000
 _ID = re.compile(r"(.*_)?(id|no|nr|number|name|label|comment|note)", re.IGNORECASE)
 """Names of unknown columns that may hold numbers: those of others could be a misspelled input."""
 _LABEL = re.compile(r"\w[\w .+/()#-]{0,79}")
@@ -42,6 +44,12 @@ def _suffix(unit: str) -> str:
 
 _STEMS: dict[str, Field] = {field.name.removesuffix(_suffix(field.unit)): field for field in INPUTS}
 """Inputs by the name of the column without its unit."""
+
+
+def check_count(names: list[str], label: str) -> None:
+    """Refuse more columns than a table of designs can have, before any is looked at."""
+    if len(names) > MAX_COLUMNS:
+        raise refuse(label, f"has {len(names):,} columns; a table takes at most {MAX_COLUMNS:,}")
 
 
 def read_header(names: list[str], places: list[Place], problems: ProblemList) -> list[TableColumn | None]:

@@ -19,7 +19,7 @@ from boulder_sweep.settings.numbers import NumberError, split_number
 from boulder_sweep.settings.problems import Place, ProblemList, shorten
 from boulder_sweep.settings.source import refuse
 from boulder_sweep.settings.sweep import DesignList
-from boulder_sweep.settings.table_header import TableColumn, check_numbers, read_header
+from boulder_sweep.settings.table_header import TableColumn, check_count, check_numbers, read_header
 
 MAX_TABLE_ROWS = 20_000_000
 MAX_UNPACKED_BYTES = 1_000_000_000
@@ -100,6 +100,7 @@ class _Rows:
 
     def header(self, names: list[str], origin: Origin) -> None:
         """Take the column names."""
+        check_count(names, self.label)
         self.places = [self.place(origin, index) for index in range(len(names))]
         self.columns = read_header(names, self.places, self.problems)
 

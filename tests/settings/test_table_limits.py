@@ -1,0 +1,201 @@
+"""Tables and measured curves from anywhere: an answer in seconds and bounded memory, and never a traceback."""
+
+from __future__ import annotations
+
+import io
+import os
+import random
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from boulder_sweep.crash_tests.measured import PULSE_SIGNALS, TEST_SIGNALS, read_history
+from boulder_sweep.settings import SettingsError, load_text
+
+SETTINGS = """\
+name: t
+table: {file}
+boulder: {{length: 1.65 m, width: 1.68 m, density: 2596 kg/m^3}}
+site: {{embedment_ratio: 0.5}}
+soil: {{density: 1859.9 kg/m^3, friction_angle: 43.2 deg, subgrade_reaction: 60 MN/m^3}}
+vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}}
+"""
+HEIGHT = "boulder_height_m"
+TABLE = f'{HEIGHT},friction_angle_deg,vehicle_mass_lb,note\n2.5,40,15000,a\n2.6,41,15000,b\n3,42,14000,"c, d"\n'
+PULSE = "time [ms], displacement [mm], acceleration [g]\n0,0,0\n1,13,-1\n2,26,-2\n3,38,-3\n4,50,\n5,61,-4\n"
+TOKENS = [
+    *(b"nan", b"inf", b"-1e999", b"1" * 400, b"\0", b"\x1b[31m", b'"', b"'", b",", b";", b"\t", b"\n", b"\r", b"#"),
+    *(b"\xff", b"\xef\xbb\xbf", "１２".encode(), "−1".encode(), b"0x1f", b"1_0", b"=cmd()", b"[", b"]", b"design_id"),
+    *(b"verdict", HEIGHT.encode(), b"time [s]", b"-", b" ", b"e", b"."),
+]  # fmt: skip
+
+
+def parquet(**columns: object) -> bytes:
+    sink = io.BytesIO()
+    pq.write_table(pa.table(columns), sink, compression="zstd")
+    return sink.getvalue()
+
+
+def read(path: Path) -> None:
+    """Read a table, or a measured curve if its name says so; all that may be raised is a list of mistakes."""
+    try:
+        if path.name.startswith("pulse"):
+            read_history(path, PULSE_SIGNALS if path.name == "pulse.csv" else TEST_SIGNALS)
+        else:
+            assert load_text(SETTINGS.format(file=path.name), path.parent / "grid.yaml").n_designs > 0
+    except SettingsError as refused:
+        if not refused.problems or not all(map(str, refused.problems)):
+            raise AssertionError("refused without a word") from refused
+
+
+def mutated(content: bytes, chance: random.Random) -> bytes:
+    """Change some bytes: one by one, by pieces that are moved or lost, or by words that mean something."""
+    changed = bytearray(content)
+    for _ in range(chance.randint(1, 4)):
+        place = chance.randrange(len(changed) + 1)
+        how = chance.random()
+        if how < 0.3 and place < len(changed):
+            changed[place] = chance.randrange(256)
+        elif how < 0.6:
+            changed[place:place] = chance.choice(TOKENS)
+        elif how < 0.8:
+            del changed[place : place + chance.randint(1, 30)]
+        else:
+            other = chance.randrange(len(changed) + 1)
+            changed[place:place] = changed[other : other + chance.randint(1, 60)]
+    return bytes(changed)
+
+
+def fuzz(folder: Path, inputs: int, seed: int) -> None:
+    """Read so many files that are wrong in some way."""
+    chance = random.Random(seed)
+    note = pa.array(["a", "b", "a"]).dictionary_encode()
+    files = {
+        "table.csv": TABLE.encode(),
+        "pulse.csv": PULSE.encode(),
+        "pulse-test.csv": b"time [s]; rotation [deg]\n0;0\n0.1;2\n0.2;3\n",
+        "table.parquet": parquet(**{HEIGHT: [2.5, 2.6, 3.0], "friction_angle_deg": [40, 41, 42], "note": note}),
+    }
+    for number in range(inputs):
+        name = chance.choice(list(files))
+        content = mutated(files[name], chance)
+        path = folder / name
+        path.write_bytes(content)
+        try:
+            read(path)
+        except Exception as problem:
+            (folder / f"failing-{name}").write_bytes(content)
+            raise AssertionError(f"seed {seed}, input {number}: {content!r:.300}") from problem
+
+
+@pytest.fixture(scope="module")
+def seed():
+    return int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
+
+
+def test_a_thousand_wrong_files_are_refused_in_words(tmp_path, seed):
+    fuzz(tmp_path, 1000, seed)
+
+
+@pytest.mark.slow
+def test_many_wrong_files_are_refused_in_words(tmp_path, seed):
+    fuzz(tmp_path, 10_000, seed + 1)
+
+
+def test_columns_of_every_type(tmp_path):
+    columns = {
+        "list": pa.array([[2.0], [3.0]]),
+        "struct": pa.array([{"a": [1]}, {"a": None}]),
+        "map": pa.array([[("k", 1)], []], type=pa.map_(pa.string(), pa.int64())),
+        "bytes": pa.array([b"\xff\x1b", None]),
+        "day": pa.array([1, 2], type=pa.date32()),
+        "time": pa.array([1, None], type=pa.timestamp("ns")),
+        "decimal": pa.array([1, 2], type=pa.decimal128(10, 2)),
+        "truth": pa.array([True, None]),
+        "nothing": pa.nulls(2),
+        "half": pa.array(np.array([2.0, 2.5], dtype=np.float16)),
+        "unsigned": pa.array([2, 2**64 - 1], type=pa.uint64()),
+        "text": pa.array(["2.5", "=cmd()"]),
+        "words": pa.array(["a", None]).dictionary_encode(),
+    }
+    for kind, values in columns.items():
+        for name in (HEIGHT, f"{kind}_name"):
+            path = tmp_path / "table.parquet"
+            path.write_bytes(parquet(**{HEIGHT: pa.array([2.0, 2.5]), name: values}))
+            read(path)
+
+
+@pytest.mark.parametrize("values", [[2.0, float("nan")], [2.0, float("inf")], [2.0, None], [2.0, -1.0]])
+def test_numbers_that_are_none(tmp_path, values):
+    path = tmp_path / "table.parquet"
+    path.write_bytes(parquet(**{HEIGHT: pa.array(values)}))
+    with pytest.raises(SettingsError, match=HEIGHT):
+        load_text(SETTINGS.format(file=path.name), tmp_path / "grid.yaml")
+
+
+@pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
+def test_a_named_pipe_is_not_waited_for(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    begun = time.monotonic()
+    read(tmp_path / name)
+    assert time.monotonic() - begun < 5
+
+
+@pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
+def test_more_columns_than_a_table_has(tmp_path, name):
+    names = [f"c{place} [s]" for place in range(5000)]
+    text = (",".join(names) + "\n" + ",".join("1" * len(names)) + "\n").encode()
+    (tmp_path / name).write_bytes(parquet(**{name: [1.0] for name in names}) if name.endswith("parquet") else text * 2)
+    begun = time.monotonic()
+    read(tmp_path / name)
+    assert time.monotonic() - begun < 20
+
+
+def large(folder: Path) -> dict[str, Path]:
+    """Files made to take time or memory."""
+    rows = 20_000_000
+    words = pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), pa.array(["y" * 1000]))
+    made = {
+        "columns.csv": (",".join(f"c{place}" for place in range(10**6)) + "\n1\n").encode(),
+        "line.csv": f"{HEIGHT},note\n2,".encode() + b"x" * 200_000_000,
+        "quoted.csv": f'{HEIGHT},note\n2,"'.encode() + b"x\n" * 100_000_000,
+        "zeros.csv": f"{HEIGHT}\n".encode() + bytes(200_000_000),
+        "repeated.parquet": parquet(**{HEIGHT: np.full(rows, 2.0), "note": words}),
+        "long.parquet": parquet(**{HEIGHT: np.full(1000, 2.0), "note": pa.array(["y" * 1_000_000] * 1000)}),
+        "pulse-columns.csv": (",".join(f"c{place} [s]" for place in range(10**6)) + "\n1\n2\n").encode(),
+        "pulse-rows.csv": b"time [s], acceleration [g]\n" + b"1,1\n" * 6_000_000,
+        "pulse-line.csv": b"time [s], acceleration [g]\n0," + b"1" * 200_000_000 + b"\n1,1\n",
+    }
+    for name, content in made.items():
+        (folder / name).write_bytes(content)
+    return {name: folder / name for name in made}
+
+
+@pytest.mark.slow
+def test_large_files_are_answered_in_seconds_and_two_gigabytes(tmp_path):
+    """20 million designs may be read; everything else is refused."""
+    for name, path in large(tmp_path).items():
+        (tmp_path / "grid.yaml").write_text(SETTINGS.format(file=name))
+        words = ["fit-vehicle", path, "--mass", "6800 kg"] if name.startswith("pulse") else ["check", "grid.yaml"]
+        begun = time.monotonic()
+        done = subprocess.run(
+            [sys.executable, "-m", "boulder_sweep", *map(str, words)],
+            cwd=tmp_path,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (2_000_000_000, 2_000_000_000)),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert time.monotonic() - begun < 60, name
+        assert done.returncode == (0 if name == "repeated.parquet" else 2), (name, done.stderr)
+        assert "Traceback" not in done.stderr
+        assert "internal error" not in done.stderr
+        path.unlink()
