@@ -10,12 +10,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from . import accuracy, kernel, named, rates, single_precision, sweep
+from . import accuracy, answers, kernel, named, rates, single_precision, sweep
 from .designs import DESIGNS
 from .peers.__main__ import measure_with
 from .report import Table, write_between_markers
 
-NAMES = ("kernel", "rates", "accuracy", "named", "single-precision", "sweep", "peers")
+NAMES = ("kernel", "rates", "accuracy", "named", "single-precision", "sweep", "answers", "peers")
 
 
 def _accuracy() -> list[Table]:
@@ -37,6 +37,7 @@ def main() -> None:
         "named": lambda: [named.measure()],
         "single-precision": lambda: [single_precision.measure()],
         "sweep": lambda: sweep.measure(large=arguments.large),
+        "answers": lambda: [answers.measure()],
         "peers": lambda: [measure_with(arguments.peers_python, write=True)],
     }
     for name in arguments.only or works:
