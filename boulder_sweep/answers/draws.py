@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import joblib
 import numpy as np
+from scipy.special import ndtr
 
 from boulder_sweep.answers.trials import Judges, Rows
 from boulder_sweep.designs import block_of
@@ -40,12 +41,20 @@ class Draws:
         How designs are judged.
     parallel
         Threads.
+    variants
+        Judges of which the last number of each point chooses one, all alike probable; without any, `judges` judges all.
     """
 
     rows: Rows
     spread: Spread
     judges: Judges
     parallel: joblib.Parallel
+    variants: tuple[Judges, ...] = ()
+
+    @property
+    def dimensions(self) -> int:
+        """Numbers of a point."""
+        return len(self.spread.names) + bool(self.variants)
 
     def distance(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
         """Return how far designs are from failing: positive where they pass, shape (m,).
@@ -84,23 +93,34 @@ class Draws:
 
     def _piece(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> np.ndarray:
         given = self.given(index, z, inputs)
-        judged = self.judges.quick(block_of(given))
-        found = self._distance_of(judged)
-        if self.judges.quick is not self.judges.own:
-            margin = judged["margin"] - self.judges.least_margin
-            near = np.flatnonzero(np.abs(margin) < NEAR)
-            if len(near):
-                again = self.judges.own(block_of({name: values[near] for name, values in given.items()}))
-                found[near] = self._distance_of(again)
+        if not self.variants:
+            return self._distances(given, self.judges)
+        count = len(self.variants)
+        chosen = np.minimum((ndtr(z[:, -1]) * count).astype(np.int64), count - 1)
+        found = np.empty(len(index))
+        for place, judges in enumerate(self.variants):
+            own = np.flatnonzero(chosen == place)
+            if len(own):
+                found[own] = self._distances({name: values[own] for name, values in given.items()}, judges)
         return found
 
-    def _distance_of(self, judged: Judged) -> np.ndarray:
-        margin, time = judged["margin"] - self.judges.least_margin, judged["time_to_limit_s"]
-        found = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
-        # On a limit, or undecided: neither on the side of passing.
-        passes = self.judges.holds(judged)
-        smallest = np.finfo(float).tiny
-        return np.where(passes, np.maximum(found, smallest), np.minimum(found, -smallest))
+    def _distances(self, given: Rows, judges: Judges) -> np.ndarray:
+        judged = judges.quick(block_of(given))
+        found = _distance_of(judged, judges)
+        if judges.quick is not judges.own:
+            near = np.flatnonzero(np.abs(judged["margin"] - judges.least_margin) < NEAR)
+            if len(near):
+                again = judges.own(block_of({name: values[near] for name, values in given.items()}))
+                found[near] = _distance_of(again, judges)
+        return found
+
+
+def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:
+    margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
+    found = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
+    # On a limit, or undecided: neither on the side of passing.
+    smallest = np.finfo(float).tiny
+    return np.where(judges.holds(judged), np.maximum(found, smallest), np.minimum(found, -smallest))
 
 
 def threads(jobs: int | None) -> joblib.Parallel:

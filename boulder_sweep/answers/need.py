@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import joblib
 
+from boulder_sweep.answers.doubts import every_reading
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, share
 from boulder_sweep.answers.lightest import SIDES, LightestQuestion
 from boulder_sweep.answers.questions import ProbabilityQuestion, Question
@@ -130,6 +131,7 @@ def need(
     margin: str | float = 0.0,
     probability: str | float | None = None,
     seed: int = 0,
+    open_readings: bool = False,
     between: Ends = None,
     tolerance: str | float | None = None,
     both_readings: bool = True,
@@ -151,6 +153,9 @@ def need(
         Chance of passing that is asked for, ``0.95`` or ``"95 %"``, where inputs have distributions.
     seed
         Seed of the designs drawn for it.
+    open_readings
+        Whether every design drawn for a probability takes one of the 32 combinations of the readings, all alike
+        probable, in place of those of the sweep.
     between
         Range to be searched, in place of the axis or of what is usual.
     tolerance
@@ -187,8 +192,11 @@ def need(
     least_margin = share(margin, "--margin")
     if not 0.0 <= least_margin < 1.0:
         raise QuestionError(f"--margin {margin}: must be 0 or more and less than 100 %")
-    sweeps = [sweep, other_readings(sweep)] if both_readings else [sweep]
-    asked = [_question(one, key, between, judges_of(one, least_margin), probability, seed) for one in sweeps]
+    if open_readings and probability is None:
+        raise QuestionError("readings are left open for a probability; give one")
+    variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep)) if open_readings else ()
+    sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings else [sweep]
+    asked = [_question(one, key, between, judges_of(one, least_margin), probability, seed, variants) for one in sweeps]
     asked[0].judges.own.warm_up()
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
     tables, simulated, done = [], 0, 0
@@ -206,7 +214,13 @@ def need(
 
 
 def _question(
-    sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: str | float | None, seed: int
+    sweep: Sweep,
+    key: Key,
+    between: Ends,
+    judges: Judges,
+    probability: str | float | None,
+    seed: int,
+    variants: tuple[Judges, ...],
 ) -> Question | LightestQuestion:
     """Return the question of the kind that is asked."""
     if probability is None:
@@ -218,7 +232,7 @@ def _question(
     chance = share(probability, "--probability")
     if not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
-    return ProbabilityQuestion(sweep, key, between, judges, chance, seed)
+    return ProbabilityQuestion(sweep, key, between, judges, chance, seed, variants)
 
 
 def other_readings(sweep: Sweep) -> Sweep:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import BOULDER_MASS
@@ -13,6 +14,7 @@ from boulder_sweep.settings.fields import BY_NAME
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from boulder_sweep.answers.doubts import Doubt
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
     from boulder_sweep.answers.reserves import Reserves
@@ -113,6 +115,20 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     if count == 1:
         lines += ["", *_index_lines(found, width)]
     return lines
+
+
+def doubt_lines(found: Sequence[Doubt], width: int = WIDTH) -> list[str]:
+    """Return the shares of doubts as lines."""
+    columns: list[Column] = [
+        (("doubt about the margin", ""), lambda row: str(row["cause"])),
+        (("alone", ""), lambda row: _share(row["alone"])),
+        (("with all it", "acts upon"), lambda row: _share(row["total"])),
+    ]
+    return table_lines(columns, [asdict(own) for own in found], width)
+
+
+def _share(value: float) -> str:
+    return f"{value:.1%}" if value >= 5e-4 else "< 0.05%"
 
 
 def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:

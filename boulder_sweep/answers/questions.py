@@ -135,6 +135,8 @@ class ProbabilityQuestion(Question):
         The chance of passing that is asked for.
     seed
         Seed of the points.
+    variants
+        Readings of which every design drawn takes one.
 
     Raises
     ------
@@ -145,10 +147,20 @@ class ProbabilityQuestion(Question):
     rows_at_once = 4
     cells = 6
 
-    def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float, seed: int) -> None:
+    def __init__(
+        self,
+        sweep: Sweep,
+        key: Key,
+        between: Ends,
+        judges: Judges,
+        probability: float,
+        seed: int,
+        variants: tuple[Judges, ...] = (),
+    ) -> None:
         super().__init__(sweep, key, between, judges)
         self.spread, self.probability, self.seed = Spread(sweep), probability, seed
-        points = Points(len(self.spread.names), seed).upto(DRAWN // SCRAMBLINGS)
+        self.variants = variants
+        points = Points(len(self.spread.names) + bool(variants), seed).upto(DRAWN // SCRAMBLINGS)
         self.points = points.reshape(DRAWN, -1)
 
     def trial(self, rows: Rows) -> Trial:
@@ -204,7 +216,7 @@ class ProbabilityTrial(Trial):
     def __init__(self, asked: ProbabilityQuestion, rows: Rows) -> None:
         super().__init__(asked.key, asked.judges, rows)
         self.asked = asked
-        self.draws = Draws(rows, asked.spread, asked.judges, threads(1))
+        self.draws = Draws(rows, asked.spread, asked.judges, threads(1), asked.variants)
 
     def chances(self, places: np.ndarray) -> Chance:
         """Return the chances of passing at some values, by the points of the search and by more where needed."""
@@ -214,7 +226,7 @@ class ProbabilityTrial(Trial):
             self.simulated += len(index)
             return self.draws.passes(index, z, **{self.key.name: values[index]})
 
-        points = Points(len(self.asked.spread.names), self.asked.seed)
+        points = Points(self.draws.dimensions, self.asked.seed)
         return chance(event, len(places), points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
 
     def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:

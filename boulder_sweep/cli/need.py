@@ -27,6 +27,9 @@ Examples:
 @click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 @click.option("--probability", metavar="P", help="Chance of passing, 0.95, where inputs have distributions.")
 @click.option(
+    "--open-readings", is_flag=True, help="With a probability: any reading of the paper may be the right one."
+)
+@click.option(
     "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
 )
 @click.option("--tolerance", metavar="T", help="Distance of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
@@ -43,6 +46,7 @@ def need(
     most: str | None,
     margin: str,
     probability: str | None,
+    open_readings: bool,
     between: tuple[str, str] | None,
     tolerance: str | None,
     own_readings: bool,
@@ -79,6 +83,7 @@ def need(
         most=most,
         margin=margin,
         probability=probability,
+        open_readings=open_readings,
         between=between,
         tolerance=tolerance,
         both_readings=not own_readings,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 
 import click
 
@@ -15,6 +16,7 @@ Examples:
   sweep uncertainty configs/uncertain_site.yaml
   sweep uncertainty configs/uncertain_site.yaml -o chances.parquet --plot chances.png
   sweep uncertainty configs/rwg.yaml --rare --set soil.friction_angle='{mean: 43.2 deg, cov: 5 %}'
+  sweep uncertainty configs/uncertain_site.yaml --doubts
   sweep uncertainty --published
 """
 
@@ -34,6 +36,7 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Share of intervals that hold the chance [95 %].")
 @click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 @click.option("--rare", is_flag=True, help="Small chances, too, by subset simulation.")
+@click.option("--doubts", is_flag=True, help="Part the doubt of one design among inputs, readings and numerical error.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
 @click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
 @click.option(
@@ -42,7 +45,7 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
 @click.option(
     "--plot", "picture", type=click.Path(), metavar="F.png", help="Picture (.png, .svg or .pdf) of one design."
 )
-@click.option("--design", default=0, metavar="ID", help="The design that is drawn [0].")
+@click.option("--design", default=0, metavar="ID", help="The design of --plot and --doubts [0].")
 @click.option(
     "--published",
     is_flag=True,
@@ -60,6 +63,7 @@ def uncertainty(
     confidence: str,
     margin: str,
     rare: bool,
+    doubts: bool,
     seed: int,
     jobs: int | None,
     out: str | None,
@@ -74,7 +78,7 @@ def uncertainty(
     An input takes a distribution in place of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Designs are drawn
     until the interval of the chance is narrow enough.
     """
-    from boulder_sweep.answers.printing import uncertainty_lines
+    from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
     from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
     from boulder_sweep.cli.console import counted
@@ -90,10 +94,15 @@ def uncertainty(
     found = estimate(
         sweep, half_width=half_width, confidence=confidence, margin=margin, seed=seed, rare=rare, jobs=jobs
     )
+    parts = []
+    if doubts:
+        from boulder_sweep.answers.doubts import doubts as part
+
+        parts = part(sweep, design=design, seed=seed, jobs=jobs)
     if as_json:
-        show(json.dumps(found.to_dict()))
+        show(json.dumps(found.to_dict() | ({"doubts": [asdict(own) for own in parts]} if doubts else {})))
     else:
-        show(*uncertainty_lines(found))
+        show(*uncertainty_lines(found), *(["", *doubt_lines(parts)] if doubts else []))
     if not quiet:
         drawn = sum(found.arrow["p_pass_designs"].to_pylist())
         say(f"{counted(len(found), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {seed}")

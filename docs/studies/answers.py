@@ -6,14 +6,19 @@ from pathlib import Path
 
 from boulder_sweep import load, need, uncertainty
 from boulder_sweep.answers.boundary import boundary
-from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
+from boulder_sweep.answers.doubts import doubts
+from boulder_sweep.answers.printing import doubt_lines, need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.published import PUBLISHED
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.crash_tests.tables import Table
+from boulder_sweep.settings import Sweep
+from boulder_sweep.settings.distributions import Distribution
+from boulder_sweep.settings.sweep import DesignList
 
 SITE = Path("configs/site.yaml")
 GRID = Path("configs/m30_sizing.yaml")
 UNCERTAIN = Path("configs/uncertain_site.yaml")
+FACTORS = (1.0, 1.05, 1.1, 1.15, 1.2, 1.25)
 SPREADS = (
     "soil.friction_angle={{mean: {friction_angle_deg} deg, cov: 5 %}}",
     "soil.density={{mean: {soil_density_kg_m3} kg/m^3, cov: 5 %}}",
@@ -66,6 +71,42 @@ def uncertainty_of_site(root: Path) -> str:
 def need_with_probability(root: Path) -> str:
     """Return the depth for a chance of 95 % as a terminal shows it."""
     return _fenced(need_lines(need(load(root / UNCERTAIN), probability=0.95)))
+
+
+def doubts_of_site(root: Path) -> str:
+    """Return what share of the doubt about the uncertain site each cause has."""
+    return _fenced(doubt_lines(doubts(load(root / UNCERTAIN))))
+
+
+def open_readings_words(root: Path) -> str:
+    """Return the depths for a chance of 95 % with the readings of the file, and with the readings left open."""
+    sweep = load(root / UNCERTAIN)
+    closed = need(sweep, probability=0.95, both_readings=False).frame.passes_at[0]
+    open_ = need(sweep, probability=0.95, open_readings=True).frame.passes_at[0]
+    return (
+        f"A chance of 95 % needs {closed:.2f} m by the corrected readings, {open_:.2f} m with the readings left open."
+    )
+
+
+def partial_factors(root: Path) -> str:
+    """Return what chance of passing designs have whose depth is just enough with a partial factor on their soil."""
+    table = Table(("partial factor on tan φ′", "designs", "mean P(pass)", "least", "largest"))
+    grid = (
+        *("boulder.height=[2.8, 3.2, 3.6] m", "boulder.width=[1.6, 2.0, 2.4] m", "site.embedment_depth=2 m"),
+        "soil.subgrade_reaction=63 MN/m^3",
+    )
+    unfactored = load(root / GRID, grid)
+    for factor in FACTORS:
+        frame = need(load(root / GRID, [*grid, f"partial_factor.friction_angle={factor}"]), both_readings=False).frame
+        found = (frame.found == "found").to_numpy()
+        rows = {name: values[found] for name, values in unfactored.plan.given_rows(0, unfactored.n_designs).items()}
+        rows["embedment_depth_m"] = frame.passes_at.to_numpy()[found]
+        spread = {"friction_angle_deg": Distribution("normal", 1.0, 60.0, cov=0.05)}
+        sweep = Sweep("factor", None, (), {}, DesignList("designs", rows), distributions=spread)
+        chances = uncertainty(sweep).frame.p_pass
+        shown = (f"{own:.3f}" for own in (chances.mean(), chances.min(), chances.max()))
+        table.add(f"{factor:g}", f"{found.sum()}", *shown)
+    return table.markdown()
 
 
 def uncertainty_of_cases(root: Path) -> str:

@@ -161,6 +161,9 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "uncertainty-site": answers.uncertainty_of_site,
     "uncertainty-cases": answers.uncertainty_of_cases,
     "need-probability": answers.need_with_probability,
+    "doubts-site": answers.doubts_of_site,
+    "open-readings": answers.open_readings_words,
+    "partial-factors": answers.partial_factors,
     "published-spreads": answers.published_spreads,
 }
 """Function of every block by its name."""

@@ -44,3 +44,11 @@ def test_published_spreads_have_sources(sweep):
     assert code == 0
     assert "JCSS" in out
     assert out.count("as quoted by others") == 4
+
+
+def test_doubts(sweep):
+    code, out, _ = sweep("uncertainty", CONFIG, "--doubts", "-q")
+    assert code == 0
+    assert "readings of the paper" in out
+    assert all(len(line) <= 80 for line in out.splitlines())
+    assert len(json.loads(sweep("uncertainty", CONFIG, "--doubts", "--json", "-q")[1])["doubts"]) == 4

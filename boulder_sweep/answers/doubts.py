@@ -1,0 +1,131 @@
+"""Three doubts in one table: the spread of the inputs, how the paper is to be read, and the numerical error.
+
+Every design drawn is simulated by all 32 combinations of the five readings, and by two laws of the ultimate resistance
+of the soil: the paper's, K_p^2 times the vertical stress, and that of Broms (1964), 3 K_p times it. The variance of the
+margin is then parted among its causes. The laws differ by the factor 3 / K_p, which acts where the strain rate factor
+does (Eq 27).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.answers.chance import SCRAMBLINGS, Points
+from boulder_sweep.answers.draws import Draws, threads
+from boulder_sweep.answers.spread import Spread
+from boulder_sweep.answers.trials import Judges, Rows, judges_of
+from boulder_sweep.designs import block_of
+from boulder_sweep.settings.model import PRINTED, SWITCHES, Model, ReadingChoice
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+DRAWN = 512
+"""Designs drawn, each simulated by every reading and law."""
+INPUTS, READINGS, LAW, NUMERICAL = "uncertain inputs", "readings of the paper", "K_p² or 3 K_p", "numerical error"
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One cause of doubt.
+
+    Attributes
+    ----------
+    cause : str
+        What is in doubt.
+    alone : float
+        Share of the variance of the margin that knowing it alone would take away.
+    total : float
+        Share that would be left if all others were known.
+    """
+
+    cause: str
+    alone: float
+    total: float
+
+
+def every_reading(sweep: Sweep) -> list[Sweep]:
+    """Return a sweep with every combination of the five readings."""
+    choices = itertools.product(*((PRINTED, corrected) for corrected in SWITCHES.values()))
+    readings = (ReadingChoice(**dict(zip(SWITCHES, own, strict=True))) for own in choices)
+    return [replace(sweep, model=Model(own, sweep.model.soil_elements)) for own in readings]
+
+
+def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = None) -> list[Doubt]:
+    """Part the variance of the margin of one design among its causes.
+
+    Parameters
+    ----------
+    sweep
+        A sweep with uncertain inputs.
+    design
+        Number of the design.
+    seed
+        Seed of the designs drawn.
+    jobs
+        Threads; all cores by default.
+
+    Returns
+    -------
+    list of Doubt
+        Uncertain inputs, readings (all combinations alike probable), law of the resistance (both alike), and numerical
+        error, of which the square of the estimated error of the margin counts.
+
+    Raises
+    ------
+    QuestionError
+        No input has a distribution.
+    IndexError
+        There is no such design.
+    """
+    spread = Spread(sweep)
+    z = Points(len(spread.names), seed).upto(DRAWN // SCRAMBLINGS).reshape(DRAWN, -1)
+    rows = sweep.plan.given_rows(design, design + 1)
+    index = np.zeros(DRAWN, dtype=np.int64)
+    margins = np.empty((2 ** len(SWITCHES), 2, DRAWN))
+    for place, own in enumerate(every_reading(sweep)):
+        for law in range(2):
+            judges = judges_of(own)
+            draws = Draws(rows, _Law(spread, bool(law)), judges, threads(jobs))
+            margins[place, law] = draws.distance(index, z)
+    return [*parted(margins), Doubt(NUMERICAL, *(2 * [_numerical(sweep, spread, rows, z, judges_of(sweep), margins)]))]
+
+
+def parted(margins: np.ndarray) -> list[Doubt]:
+    """Part the variance of values by reading, law and design drawn, shape (r, l, n), among the three."""
+    variance = margins.var()
+    found = []
+    for cause, axis in ((INPUTS, 2), (READINGS, 0), (LAW, 1)):
+        others = tuple(other for other in range(3) if other != axis)
+        alone, total = margins.mean(axis=others).var(), margins.var(axis=axis).mean()
+        found.append(Doubt(cause, *(float(own / variance) if variance > 0.0 else 0.0 for own in (alone, total))))
+    return found
+
+
+class _Law(Spread):
+    """Uncertain inputs with the resistance of the soil by one of two laws."""
+
+    def __init__(self, spread: Spread, broms: bool) -> None:
+        self.distributions, self.correlation = spread.distributions, spread.correlation
+        self.broms = broms
+
+    def filled(self, given: Rows, z: np.ndarray) -> Rows:
+        """Return designs with their uncertain inputs drawn, and the factor on the resistance of the soil."""
+        found = super().filled(given, z)
+        if self.broms:
+            K_p = np.tan(math.pi / 4.0 + np.radians(found["friction_angle_deg"]) / 2.0) ** 2
+            found["strain_rate_factor"] = found["strain_rate_factor"] * 3.0 / K_p
+        return found
+
+
+def _numerical(sweep: Sweep, spread: Spread, rows: Rows, z: np.ndarray, judges: Judges, margins: np.ndarray) -> float:
+    """Return the mean square of the estimated error of the margin as a share of the variance."""
+    given = spread.filled({name: np.repeat(values, len(z)) for name, values in rows.items()}, z)
+    error = judges.own(block_of(given))["rotation_error_deg"] / sweep.criterion.max_rotation_deg
+    error = error[np.isfinite(error)]
+    return float((error**2).mean() / margins.var()) if len(error) and margins.var() > 0.0 else 0.0
