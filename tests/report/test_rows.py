@@ -1,10 +1,13 @@
 """What a page takes from a table: every verdict, the designs worth naming, and what is left out of large ones."""
 
+import json
+
 import numpy as np
 import pytest
 
 import boulder_sweep
 from boulder_sweep.report.answers import Quantity, answer_of
+from boulder_sweep.report.contents import table_data
 from boulder_sweep.report.rows import NOT_YET, read_rows, thinned
 from tests.report.conftest import SETS
 
@@ -109,3 +112,19 @@ def test_named_soils_are_one_axis_that_gives_all_their_inputs(tmp_path):
         column = table.embedment_depth_m / table.boulder_height_m if name == "embedment_ratio" else table[name]
         np.testing.assert_allclose(np.broadcast_to(rows.inputs[name], rows.shape).ravel(), column)
     assert "all 2 soils" in str(answer_of(rows).sentences) or "every soil" in str(answer_of(rows).sentences)
+
+
+def test_the_largest_map_takes_little_of_a_page(rows):
+    """Random verdicts, which no packing makes small, on a grid of as many designs as a map may show."""
+    axes = {
+        "boulder_height_m": np.linspace(1.5, 4.0, 150),
+        "embedment_ratio": np.linspace(0.35, 0.75, 100),
+        "friction_angle_deg": np.linspace(27.0, 49.0, 100),
+    }
+    codes = np.random.default_rng(3).integers(0, 4, 1_500_000).astype(np.uint8)
+    names = ("pass", "fail: overturns", "fail: penetration", "undecided: error", NOT_YET)
+    large = type(rows)(rows.folder, rows.finished, names, codes, axes, {}, {})
+    kept = thinned(large)
+    assert kept.words == ""
+    assert len(json.dumps(table_data(large, kept))) < 1_000_000
+    assert thinned(large, most_cells=1_400_000).words == "75 of 150 values of boulder_height_m, spread evenly"
