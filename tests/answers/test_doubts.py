@@ -44,6 +44,7 @@ def test_readings_outweigh_the_numerical_error() -> None:
     assert all(own.alone <= own.total + 1e-12 for own in parts.values())
 
 
+@pytest.mark.slow
 def test_open_readings_need_another_depth() -> None:
     sweep = site(**UNCERTAIN)
     closed = need(sweep, probability=0.9).frame.iloc[0]

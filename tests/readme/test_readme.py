@@ -43,6 +43,10 @@ def test_the_main_job_counts_what_the_readme_shows(m30: tuple[Path, str]) -> Non
     assert shown in m30[1]
 
 
+def test_the_first_answer() -> None:
+    assert sweep("need", "configs/site.yaml").rstrip() == marked("need")
+
+
 def test_the_number_of_designs(m30: tuple[Path, str]) -> None:
     assert len(boulder_sweep.read(m30[0])) == 107_008
     assert "107 008 designs" in README
