@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pystra
 import pytest
 from scipy.special import ndtr
 from scipy.stats import sobol_indices, uniform
@@ -100,6 +101,33 @@ def test_small_probability_of_a_linear_limit_state(dimensions: int) -> None:
     for row, exact in enumerate((1e-6, 1e-3)):
         assert found.low[row] <= exact <= found.high[row]
         assert found.high[row] < 2.5 * found.low[row]
+
+
+@pytest.mark.parametrize("curvature", [0.05, -0.03])
+def test_small_probability_of_a_curved_limit_state_is_that_of_pystra(curvature: float) -> None:
+    """Second order reliability method of pystra: another method, another package."""
+
+    def limit_state(X1, X2):
+        return 6.8 - X1 - X2 + curvature * (X1 - X2) ** 2
+
+    model = pystra.StochasticModel()
+    for name in ("X1", "X2"):
+        model.addVariable(pystra.Normal(name, 0.0, 1.0))
+    options = pystra.AnalysisOptions()
+    options.setPrintOutput(False)
+    arguments = {
+        "stochastic_model": model,
+        "limit_state": pystra.LimitState(limit_state),
+        "analysis_options": options,
+    }
+    first = pystra.Form(**arguments)
+    first.run()
+    second = pystra.Sorm(**arguments, form=first)
+    second.run()
+    known = float(np.squeeze(second.pf2_breitung_m))
+    found = subset_simulation(lambda row, z: limit_state(z[:, 0], z[:, 1]), 1, 2, seed=1)
+    assert 1e-8 < known < 1e-5
+    assert 0.95 * found.low[0] <= known <= 1.05 * found.high[0]
 
 
 def test_what_cannot_happen_has_an_upper_end_only() -> None:
