@@ -15,10 +15,10 @@ from typing import Any, Literal
 import numpy as np
 
 ColumnType = Literal["int64", "float64", "dictionary"]
-Rows = Literal["computed", "standing", "overturned"]
+Rows = Literal["all", "judged", "computed", "rated", "overturned"]
 
 VERDICTS = ("pass", "fail", "undecided", "error")
-REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error")
+REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override")
 """The reasons of every verdict but ``error``, which has reasons of its own."""
 RATINGS = ("P1", "P2", "P3")
 """Penetration ratings of ASTM F2656, the best first."""
@@ -55,8 +55,9 @@ class OutcomeColumn(ColumnSpec):
     value : callable
         From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
         (n,): numbers in `unit`, or codes.
-    rows : {'computed', 'standing', 'overturned'}
-        Which rows have a number; null elsewhere. *Standing* are those computed that did not overturn.
+    rows : {'all', 'judged', 'computed', 'rated', 'overturned'}
+        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* those simulated, *rated*
+        those whose penetration counts: neither overturned nor left undecided by anything but the numerical error.
     words : tuple of str
         What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
     """
@@ -97,15 +98,17 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "",
         "pass, fail, undecided or error",
         lambda facts: facts.verdict,
+        rows="all",
         words=VERDICTS,
     ),
     OutcomeColumn(
         "reason",
         "dictionary",
         "",
-        "why: empty for a pass, no_contact, overturns, penetration, horizon, error, "
-        "or why the row could not be computed",
+        "why: empty for a pass; no_contact, overturns or penetration for a fail; horizon, error, crush or override "
+        "where undecided; or why the row could not be computed",
         lambda facts: facts.reason,
+        rows="all",
         words=REASONS,
     ),
     OutcomeColumn(
@@ -113,36 +116,36 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "float64",
         "1",
         "least distance to a limit as a fraction of that limit, positive where the design passes; "
-        "null where it overturned or was not touched",
+        "null where it overturned, was not touched, or is undecided for another reason than error",
         lambda facts: facts.margin,
-        rows="standing",
+        rows="rated",
     ),
     OutcomeColumn(
         "max_rotation_deg",
         "float64",
         "deg",
-        "largest rotation of the boulder, in either direction",
+        "largest rotation of the boulder, in either direction, up to end_time_s",
         lambda facts: np.degrees(facts.outcomes.theta_max),
     ),
     OutcomeColumn(
         "max_displacement_m",
         "float64",
         "m",
-        "largest displacement of the centre of mass of boulder and soil wedge",
+        "largest displacement of the centre of mass of boulder and soil wedge, up to end_time_s",
         lambda facts: facts.outcomes.x_b_max,
     ),
     OutcomeColumn(
         "max_vehicle_displacement_m",
         "float64",
         "m",
-        "largest displacement of the vehicle",
+        "largest displacement of the vehicle, up to end_time_s",
         lambda facts: facts.outcomes.x_v_max,
     ),
     OutcomeColumn(
         "peak_force_kN",
         "float64",
         "kN",
-        "largest force between vehicle and boulder",
+        "largest force between vehicle and boulder, up to end_time_s",
         lambda facts: facts.outcomes.F_v_max / 1000.0,
     ),
     OutcomeColumn(
@@ -150,15 +153,16 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "float64",
         "m",
         "how far the leading edge of the cargo bed gets beyond the far face of the boulder "
-        "(negative: it stays short of it)",
+        "(negative: it stays short of it), up to end_time_s",
         lambda facts: facts.penetration,
     ),
     OutcomeColumn(
         "rating",
         "dictionary",
         "",
-        "penetration rating reached (P1, P2, P3); null beyond P3 or where not rated",
+        "penetration rating reached (P1, P2, P3), by simulation, not by test; null beyond P3 and where margin is null",
         lambda facts: facts.rating,
+        rows="rated",
         words=RATINGS,
     ),
     OutcomeColumn(
@@ -169,7 +173,13 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         lambda facts: facts.outcomes.t_limit,
         rows="overturned",
     ),
-    OutcomeColumn("end_time_s", "float64", "s", "time simulated", lambda facts: facts.outcomes.t_end),
+    OutcomeColumn(
+        "end_time_s",
+        "float64",
+        "s",
+        "time simulated: until the rotation reached the limit, nothing could grow any more, or the horizon",
+        lambda facts: facts.outcomes.t_end,
+    ),
     OutcomeColumn(
         "rotation_error_deg",
         "float64",
@@ -183,6 +193,39 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "m",
         "estimated numerical error of the displacements",
         lambda facts: facts.outcomes.x_error,
+    ),
+    OutcomeColumn(
+        "vehicle_crush_m",
+        "float64",
+        "m",
+        "largest crush of the vehicle's front while it drives forward: displacement of the vehicle less that of the "
+        "point of contact",
+        lambda facts: facts.outcomes.crush_max,
+    ),
+    OutcomeColumn(
+        "overlap_m",
+        "float64",
+        "m",
+        "height of the top of the boulder over the underside of the bumper",
+        lambda facts: facts.overlap,
+        rows="judged",
+    ),
+    OutcomeColumn(
+        "validity",
+        "dictionary",
+        "",
+        "what lies outside of what the model was tested on: flags joined by ; (docs/validity.md), empty where nothing "
+        "does; they do not change the verdict",
+        lambda facts: facts.validity,
+        rows="judged",
+        words=("",),
+    ),
+    OutcomeColumn(
+        "step_s",
+        "float64",
+        "s",
+        "time step that decided the row, shortened further where stability asks for it",
+        lambda facts: np.full(len(facts.verdict), facts.step_s),
     ),
 )
 

@@ -95,7 +95,7 @@ class Label:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DesignBlock:
-    """Rows ``[start, stop)`` of a sweep.
+    """Rows ``[start, stop)`` of a sweep, or some of them.
 
     Attributes
     ----------
@@ -107,6 +107,8 @@ class DesignBlock:
         Why single rows cannot be computed.
     labels : dict of str to Label
         Text columns that are carried along.
+    numbers : ndarray of int64, shape (n,), or None
+        Numbers of the designs where they are not all of ``[start, stop)``.
     """
 
     start: int
@@ -114,13 +116,14 @@ class DesignBlock:
     columns: dict[str, Column]
     reasons: Reasons
     labels: dict[str, Label] = field(default_factory=dict)
+    numbers: np.ndarray | None = None
 
     def __len__(self) -> int:
-        return self.stop - self.start
+        return self.stop - self.start if self.numbers is None else len(self.numbers)
 
     def design_id(self) -> np.ndarray:
         """Return the numbers of the designs, int64."""
-        return np.arange(self.start, self.stop, dtype=np.int64)
+        return np.arange(self.start, self.stop, dtype=np.int64) if self.numbers is None else self.numbers
 
 
 class Source:
@@ -267,11 +270,25 @@ class DesignPlan:
         IndexError
             The rows are not within the sweep.
         """
-        rows = self._rows(start, stop)
+        return self._block(self._rows(start, stop))
+
+    def selection(self, numbers: np.ndarray) -> DesignBlock:
+        """Return some designs by their numbers, int64, ascending, at least one.
+
+        Raises
+        ------
+        IndexError
+            The rows are not within the sweep.
+        """
+        first, stop = int(numbers[0]), int(numbers[-1]) + 1
+        return self._block(self._rows(first, stop, numbers))
+
+    def _block(self, rows: _Rows) -> DesignBlock:
+        """Return the designs of some rows."""
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
-        codes = rows.values(self.refusals)
         labels = {name: label.at(rows.place((label.axis,))) for name, label in self.labels.items()}
-        return DesignBlock(start, stop, columns, Reasons(codes, REASONS), labels)
+        reasons = Reasons(rows.values(self.refusals), REASONS)
+        return DesignBlock(rows.start, rows.stop, columns, reasons, labels, rows.numbers)
 
     def given_rows(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Return what is given of the designs ``[start, stop)``, one value a row; what follows from it is left out.
@@ -284,11 +301,11 @@ class DesignPlan:
         rows = self._rows(start, stop)
         return {name: rows.values(source) for name, source in self.given.items()}
 
-    def _rows(self, start: int, stop: int) -> _Rows:
-        """Return a range of rows that must be within the sweep."""
+    def _rows(self, start: int, stop: int, numbers: np.ndarray | None = None) -> _Rows:
+        """Return a range of rows that must be within the sweep, or some rows of it."""
         if not 0 <= start <= stop <= self.n_designs:
             raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
-        return _Rows(self, start, stop)
+        return _Rows(self, start, stop, numbers)
 
 
 def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
@@ -321,9 +338,10 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
 class _Rows:
     """Places of a range of rows on the axes; of 32 bits where they fit, which divide several times as fast."""
 
-    def __init__(self, plan: DesignPlan, start: int, stop: int) -> None:
+    def __init__(self, plan: DesignPlan, start: int, stop: int, numbers: np.ndarray | None = None) -> None:
         self.plan = plan
-        self.start, self.count = start, stop - start
+        self.start, self.stop, self.numbers = start, stop, numbers
+        self.count = stop - start if numbers is None else len(numbers)
         self.digits: dict[int, np.ndarray] = {}
         self.places: dict[tuple[int, ...], np.ndarray] = {}
 
@@ -342,6 +360,9 @@ class _Rows:
         """Return the place of every row on one axis, int32 or int64."""
         if axis not in self.digits:
             stride, length = self.plan.strides[axis], self.plan.lengths[axis]
+            if self.numbers is not None:
+                self.digits[axis] = self.numbers // stride % length
+                return self.digits[axis]
             first, beyond = divmod(self.start, stride)
             largest = max(beyond, length, stride) + self.count
             # The number of a design may need 64 bits; how far it is from the first of the block hardly ever does.

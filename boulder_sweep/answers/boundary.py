@@ -10,7 +10,7 @@ every change, or a second change along a line, is not seen.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from boulder_sweep.columns import INPUT_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.judge.judged import FAIL, NO_CONTACT, PASS
+from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
 from boulder_sweep.settings.fields import EMBEDMENT
 
 if TYPE_CHECKING:
@@ -137,11 +137,27 @@ def boundary(sweep: Sweep, *, jobs: int | None = None) -> Boundary:
         raise QuestionError("a map needs a grid with at least one axis")
     if sweep.n_designs > MOST_CELLS:
         raise QuestionError(f"a map of {sweep.n_designs:,} designs is too large; at most {MOST_CELLS:,}")
-    judges = judges_of(sweep)
+    # Too little overlap is known from the inputs alone, and puts an end to what passes along a line: it is added last.
+    judges = judges_of(replace(sweep, criterion=replace(sweep.criterion, min_overlap_m=0.0)))
     judges.own.warm_up()
     lines = _Lines(sweep, judges, threads(jobs))
     lines.fill()
-    return lines.map()
+    return _without_overlap(lines.map())
+
+
+def _without_overlap(found: Boundary) -> Boundary:
+    """Return a map with the designs left undecided whose top barely reaches the bumper."""
+    block = found.sweep.block(0, found.sweep.n_designs)
+    height, depth, bumper = (
+        block.columns[name].to_numpy() for name in ("boulder_height_m", "embedment_depth_m", "bumper_height_m")
+    )
+    milder = (found.verdict == PASS) | np.isin(found.reason, (HORIZON, NUMERICAL_ERROR))
+    slight = milder & (height - depth - bumper < found.sweep.criterion.min_overlap_m)
+    return replace(
+        found,
+        verdict=np.where(slight, UNDECIDED, found.verdict).astype(np.int8),
+        reason=np.where(slight, OVERRIDE, found.reason).astype(np.int8),
+    )
 
 
 class _Lines:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+import textwrap
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -144,6 +145,7 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
     lines += verdict_lines(summary.reasons, summary.rows)
     lines += [
         "",
+        *firmness_lines(summary.firmness),
         *accuracy_lines(summary.accuracy),
         f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
         f"open   boulder_sweep.read({str(summary.out)!r})",
@@ -151,6 +153,31 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
         f"       duckdb: FROM read_parquet('{summary.out}/*.parquet')",
         f"share  {shlex.join(['sweep', 'report', str(summary.out)])}",
     ]
+    return lines
+
+
+def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
+    """Return how firm the verdicts are, from a sample of the designs; nothing if it was not found out."""
+    if not firmness:
+        return []
+    from boulder_sweep.judge.validity import NOT_A_RATING  # only where there is a result: the kernels are heavy
+
+    changed, flags = firmness["changed"], firmness["flags"]
+    error = firmness["numerical_error_deg"]
+    sample = counted(firmness["designs"], "design")
+    exact = "no numerical error estimated" if error is None else f"numerical error at most {error:g} deg (99.9 %)"
+    lines = [
+        f"pass   is {NOT_A_RATING}",
+        f"firm?  sample of {sample}: {exact}",
+        f"       verdicts changed by the other reading of the paper {changed['reading']:.1%},",
+        f"       by 1 deg of friction angle {changed['friction_angle']:.1%}, 5 % of speed {changed['speed']:.1%}, "
+        f"3 K_p for K_p^2 {changed['resistance']:.1%}",
+    ]
+    if firmness["passes"]:
+        shares = {name: count / firmness["passes"] for name, count in flags.items()}
+        named = ", ".join(f"{name} {share:.0%}" for name, share in shares.items() if name)
+        lines.append(f"flags  {shares['']:.0%} of the passes are inside what the model was tested on")
+        lines += textwrap.wrap(named, 80, initial_indent=7 * " ", subsequent_indent=7 * " ")
     return lines
 
 

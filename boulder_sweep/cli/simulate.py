@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import click
 
@@ -65,7 +66,7 @@ def simulate(
     result = simulate_design(sweep, number)
     # First of all: a picture may be impossible where nothing moved, a film takes its time.
     values = shown_values(result.summary(), units)
-    show(*([json.dumps(values)] if as_json else console.value_lines(values)))
+    show(*([json.dumps(values)] if as_json else [*console.value_lines(values), *_cautions(values)]))
     if plot is not None:
         result.plot(plot)
     if trajectory is not None:
@@ -80,3 +81,11 @@ def simulate(
         if file is not None and not quiet:
             say(f"written  {file}")
     return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0
+
+
+def _cautions(values: dict[str, Any]) -> list[str]:
+    """Return what to say beside the result."""
+    from boulder_sweep.judge.validity import NOT_A_RATING, meanings
+
+    lines = [f"caution: {words} (docs/validity.md)" for words in meanings(values["validity"] or "")]
+    return [*lines, f"pass: {NOT_A_RATING}"] if values["verdict"] == "pass" else lines

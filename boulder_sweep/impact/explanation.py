@@ -16,7 +16,8 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.columns import INPUT_COLUMNS, OUTCOME_COLUMNS
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import Evaluation
-from boulder_sweep.judge.verdict import Limits
+from boulder_sweep.judge.refinement import reported_step_s
+from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import Criterion, Model, ReadingChoice, SolverSettings
 from boulder_sweep.store.errors import OtherVersionError
@@ -107,12 +108,12 @@ def explain(out: str | Path, design_id: int) -> Explanation:
     inputs = {name: values[name] for name in INPUT_COLUMNS}
     try:
         control, readings = Control(**there["control"]), Readings(**there["readings"])
-        sweep = _one_design(there["settings"], inputs, control)
+        sweep = _one_design(there["settings"], inputs, control, values["step_s"] or reported_step_s(control))
         stated = [there[part] for part in ("settings", "readings", "control", "accuracy")]
     except (LookupError, TypeError, ValueError) as unfamiliar:
         why = f"its settings are not those of this version: {unfamiliar}"
         raise OtherVersionError(folder, why, version_of({"identity": there})) from unfamiliar
-    limits = Limits(control.theta_limit, sweep.criterion.rating)
+    limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
     judged = Evaluation(readings, control, limits)(block)
     again = part_table(block, judged, {}).to_pylist()[0]
@@ -128,8 +129,8 @@ def explain(out: str | Path, design_id: int) -> Explanation:
     )
 
 
-def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control) -> Sweep:
-    """Return a sweep of the one design, with the model and the step its table was computed with."""
+def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
+    """Return a sweep of the one design, with the model and the step its row was computed with."""
     readings = ReadingChoice(**settings["model"]["readings"])
     return Sweep(
         name=settings["name"],
@@ -137,10 +138,10 @@ def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], contr
         axes=(),
         constants={name: float(value) for name, value in inputs.items() if value is not None},
         criterion=Criterion(**settings["criterion"]),
-        model=Model(readings, control.elements),
+        model=Model(readings, control.elements, settings["model"]["calibrated_crush_m"]),
         solver=SolverSettings(
             accuracy=None,
-            step_s=0.5 * control.h if control.error_estimate else control.h,
+            step_s=step_s,
             horizon_s=control.horizon,
         ),
     )

@@ -25,19 +25,23 @@ from boulder_kernels.design import design_at
 from boulder_kernels.table import SAFETY, SAFETY_PRINTED, empty_outcomes, estimate_errors, write_outcome
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
-from boulder_sweep.judge.evaluation import control_of, readings_of
+from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
+from boulder_sweep.judge.judged import ERROR, Judged
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.judge.verdict import Limits, judge
+from boulder_sweep.judge.refinement import finer_controls, reported_step_s
+from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
-from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
+from boulder_sweep.settings.model import ReadingChoice, SolverSettings
 
 __all__ = ["Trajectory", "simulate"]
 
 SAMPLE_S = 0.0005
 """Time between two samples of a trajectory [s]."""
 MOST_SAMPLES = 1_000_000
+_DECIDED = ("verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s")
+"""Columns that are those of a row of ``sweep run``, which stops at the limit."""
 BEFORE_THE_END = 1.0 - 1e-14
 """The last sample is taken this close to the end, so that rounding cannot place it after the end."""
 
@@ -109,16 +113,19 @@ def simulate(
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
     designs = designs_of(block)
     one, how = design_at(designs.table, 0), readings_of(sweep)
-    control = _control(sweep)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    decided = evaluation.judged(designs)
+    control = _control(evaluation.control, decided)
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
     outcome = simulate_design(one, how, control, record)
-    limits = Limits(control.theta_limit, sweep.criterion.rating)
     row = _outcome_row(outcome)
     if control.error_estimate:
         coarser = simulate_design(one, how, control._replace(halved=False), no_record())
         _estimate(row, _outcome_row(coarser), designs.table, how)
-    judged = judge(row, designs, limits)
+    judged = judge(row, designs, evaluation.limits, reported_step_s(control))
+    if judged.verdict[0] != ERROR:
+        judged = _as_decided(judged, decided)
     motion = Motion(one, how, constants_of(one, how, control.elements), control, _kept(record, times, outcome), outcome)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
 
@@ -154,11 +161,11 @@ def _changed(
         choice = ReadingChoice.of_preset(readings) if isinstance(readings, str) else readings
         if isinstance(readings, str) and choice.preset != readings:
             raise ValueError(f"readings are 'as_printed', 'corrected' or a ReadingChoice, not {readings!r}")
-        model = Model(choice, model.soil_elements)
+        model = dataclasses.replace(model, readings=choice)
     if soil_elements is not None:
         if soil_elements < 0:
             raise ValueError("soil_elements must be 0 (closed form) or the number of elements")
-        model = Model(model.readings, soil_elements)
+        model = dataclasses.replace(model, soil_elements=soil_elements)
     if step_s is not None or horizon_s is not None:
         for name, value in (("step_s", step_s), ("horizon_s", horizon_s)):
             if value is not None and not 0.0 < value < math.inf:
@@ -171,10 +178,21 @@ def _changed(
     return dataclasses.replace(sweep, model=model, solver=solver)
 
 
-def _control(sweep: Sweep) -> Control:
-    """How the reported solution is integrated: with half the step where a coarser one estimates its error."""
-    control = control_of(sweep, accuracy_of(sweep))
+def _control(control: Control, decided: Judged) -> Control:
+    """How the time history is integrated: by the steps that decided the row, and beyond the limit.
+
+    Where a coarser solution estimates its error, by half of the step.
+    """
+    for finer in finer_controls(control):
+        if reported_step_s(finer) == decided["step_s"][0]:
+            control = finer
     return control._replace(stop_at_limit=False, halved=control.error_estimate)
+
+
+def _as_decided(judged: Judged, decided: Judged) -> Judged:
+    """Return the maxima of the whole time history with the verdict of a row of ``sweep run``."""
+    columns = judged.columns | {name: decided[name] for name in _DECIDED}
+    return Judged(columns, judged.words | {name: decided.words[name] for name in _DECIDED if name in decided.words})
 
 
 def _sample_times(horizon: float, sample_s: float) -> np.ndarray:

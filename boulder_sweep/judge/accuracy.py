@@ -31,6 +31,10 @@ LADDER = (
 """Steps a pilot run chooses from, cheapest first. Longer steps save nothing because events dominate the cost."""
 
 
+ELEMENTS_AS_FAST = 16
+"""Number of soil elements that cost about as much as the closed form."""
+
+
 @dataclass(frozen=True)
 class Accuracy:
     """How accurately a sweep is computed.

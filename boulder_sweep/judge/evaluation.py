@@ -15,13 +15,17 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import Judged, joined, not_computed
-from boulder_sweep.judge.verdict import Limits, judge
+from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
+from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
+from boulder_sweep.judge.verdict import Limits, judge, limits_of
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.accuracy import Accuracy
     from boulder_sweep.settings import Sweep
+
+LONGEST_HORIZON = 10.0
+"""A design without proof of its verdict at the horizon is simulated up to so many times the horizon."""
 
 Simulate = Callable[[DesignTable, Readings, Control], OutcomeTable]
 """Function that simulates a table of designs; always `by_kernels` outside tests."""
@@ -85,9 +89,35 @@ class Evaluation:
         return both.rows(place)
 
     def judged(self, designs: Designs) -> Judged:
-        """Simulate and judge designs that can be computed, n of them; n rows in the same order."""
-        outcomes = self.simulate(designs.table, self.readings, self.control)
-        return joined([judge(outcomes, designs, self.limits)])
+        """Simulate and judge designs that can be computed.
+
+        Rows that are refused for their time steps, or undecided for their numerical error, are simulated again by
+        finer steps until they are decided or `finer_controls` ends. A row depends on nothing but its own design.
+
+        Parameters
+        ----------
+        designs
+            n designs.
+
+        Returns
+        -------
+        Judged
+            n rows, in the same order.
+        """
+        found = self._once(designs, self.control)
+        for control in finer_controls(self.control):
+            again = np.flatnonzero(is_open(found))
+            if not len(again):
+                break
+            finer = self._once(designs.rows(again), control)
+            computed = finer.verdict != ERROR
+            found = with_rows(found, again[computed], finer.rows(computed))
+        return joined([found])
+
+    def _once(self, designs: Designs, control: Control) -> Judged:
+        """Simulate and judge designs once."""
+        outcomes = self.simulate(designs.table, self.readings, control)
+        return judge(outcomes, designs, self.limits, reported_step_s(control))
 
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return readings and control as plain data, for the record."""
@@ -126,7 +156,7 @@ def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kern
     return Evaluation(
         readings=readings_of(sweep),
         control=control_of(sweep, accuracy),
-        limits=Limits(math.radians(sweep.criterion.max_rotation_deg), sweep.criterion.rating),
+        limits=limits_of(sweep),
         simulate=simulate,
     )
 
@@ -145,4 +175,5 @@ def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
         elements=int(sweep.model.soil_elements),
         error_estimate=accuracy.error_estimate,
         locate_yield=accuracy.steps.locate_yield,
+        longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
     )

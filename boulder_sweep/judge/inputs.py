@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -64,15 +63,6 @@ def designs_of(block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
     return Designs(DesignTable(**columns), _values(block, "bed_offset_m", rows))
-
-
-def put_together(pieces: Sequence[Designs]) -> Designs:
-    """Return the designs of several pieces as one; none where there are no pieces."""
-    if not pieces:
-        return Designs(DesignTable(*(np.empty(0) for _ in DesignTable._fields)), np.empty(0))
-    columns = zip(*(piece.table for piece in pieces), strict=True)
-    table = DesignTable(*(np.concatenate(column) for column in columns))
-    return Designs(table, np.concatenate([piece.bed_offset for piece in pieces]))
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from boulder_sweep.columns import OUTCOMES, REASONS, VERDICTS, OutcomeColumn
 
 PASS, FAIL, UNDECIDED, ERROR = range(len(VERDICTS))
-NO_REASON, NO_CONTACT, OVERTURNS, PENETRATION, HORIZON, NUMERICAL_ERROR = range(len(REASONS))
+NO_REASON, NO_CONTACT, OVERTURNS, PENETRATION, HORIZON, NUMERICAL_ERROR, CRUSH, OVERRIDE = range(len(REASONS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,6 +115,13 @@ def joined(pieces: list[Judged]) -> Judged:
             parts = [_translated(piece, spec.name, words[spec.name]) for piece in pieces]
         columns[spec.name] = parts[0] if len(parts) == 1 else np.concatenate(parts)
     return Judged(columns, words)
+
+
+def with_rows(judged: Judged, places: np.ndarray, rows: Judged) -> Judged:
+    """Return judged rows with those at some places replaced."""
+    order = np.arange(len(judged))
+    order[places] = len(judged) + np.arange(len(rows))
+    return joined([judged, rows]).rows(order)
 
 
 def _words_in_use(spec: OutcomeColumn, pieces: list[Judged]) -> tuple[str, ...]:

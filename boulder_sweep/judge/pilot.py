@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, simulate_table
-from boulder_sweep.judge.accuracy import LADDER, Accuracy, Steps, steps_of
-from boulder_sweep.judge.evaluation import readings_of
-from boulder_sweep.judge.inputs import Designs, designs_of, put_together
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, LADDER, Accuracy, Steps, steps_of
+from boulder_sweep.judge.evaluation import control_of, readings_of
+from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.sampling import sampled_rows
 
 if TYPE_CHECKING:
@@ -21,8 +21,6 @@ DESIGNS = 4096
 """Designs of a pilot run, soil in closed form."""
 FEWEST_DESIGNS = 256
 """Smallest number of designs, for any number of soil elements."""
-ELEMENTS_AS_FAST = 16
-"""Number of soil elements that cost about as much as the closed form."""
 QUANTILE = 0.999
 """Fraction of the designs whose estimated error must not exceed the requested accuracy."""
 AT_ONCE = 256
@@ -68,16 +66,8 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     table = sampled_designs(sweep, pilot_size(sweep.model.soil_elements)).table
     readings = readings_of(sweep)
     found: list[tuple[float, int]] = []
-    limit = math.radians(sweep.criterion.max_rotation_deg)
     for rung, steps in enumerate(LADDER):
-        control = Control(
-            steps.step_s,
-            sweep.solver.horizon_s,
-            limit,
-            sweep.model.soil_elements,
-            error_estimate=True,
-            locate_yield=steps.locate_yield,
-        )
+        control = control_of(sweep, Accuracy("", steps, error_estimate=True))
         # Rounded, so that a processor that differs in the last bits finds the same.
         achieved = float(f"{estimated_error_deg(table, readings, control):.3g}")
         found.append((achieved, rung))
@@ -101,8 +91,8 @@ def pilot_size(elements: int) -> int:
 
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
     """Return about so many designs of a sweep that can be computed."""
-    blocks = [sweep.block(row, row + 1) for row in sampled_rows(sweep, count).tolist()]
-    return put_together([designs_of(block) for block in blocks if not block.reasons.any])
+    block = sweep.plan.selection(sampled_rows(sweep, count))
+    return designs_of(block, np.asarray(block.reasons.codes) == 0)
 
 
 def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:

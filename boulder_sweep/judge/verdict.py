@@ -6,17 +6,22 @@ The rules, worst first; the first that applies decides the row:
 2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
 3. ``fail / overturns``: the rotation reached its limit. A small penetration does not change that.
 4. ``fail / penetration``: the truck's cargo bed ends further behind the boulder than its rating allows.
-5. ``undecided / horizon``: at the end of the simulated time something was still growing.
-6. ``undecided / error``: a peak below its limit lies nearer to it than the estimated numerical error.
-7. ``pass``.
+5. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
+6. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
+7. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
+   penetration stay below their limits.
+8. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
+9. ``pass``. Where a reading lets forces feed energy, as the printed ones do, nothing can be proved of later times; such
+   rows pass by the maxima up to the longest horizon and carry a flag.
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side.
-Where no error was estimated (NaN), rule 6 cannot hold and the verdict is unguarded.
+Where no error was estimated (NaN), rule 8 cannot apply and the verdict is unguarded.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,17 +29,24 @@ from boulder_kernels import SIMULATED, OutcomeTable, Status
 from boulder_sweep.columns import OUTCOMES, RATINGS, REASONS, Rows
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import (
+    CRUSH,
     ERROR,
     FAIL,
     HORIZON,
     NO_CONTACT,
     NUMERICAL_ERROR,
+    OVERRIDE,
     OVERTURNS,
     PASS,
     PENETRATION,
     UNDECIDED,
     Judged,
 )
+from boulder_sweep.judge.validity import TESTED_ROTATION_DEG, flagged
+from boulder_sweep.settings.model import Criterion, Model
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
 
 PENETRATION_LIMITS_M = {"P1": 1.0, "P2": 7.0, "P3": 30.0}
 """Largest penetration of each rating [m] (ASTM F2656)."""
@@ -51,6 +63,8 @@ STATUS_REASONS = {
     Status.INVALID: "a constant of the design (mass, inertia or stiffness) is zero, negative or not finite",
 }
 """Reason of a row that the kernels could not compute."""
+STEP_REASONS = frozenset(text for status, text in STATUS_REASONS.items() if status != Status.INVALID)
+"""Those that a finer time step may mend."""
 NOT_FINITE = "the computed result is not a finite number"
 
 
@@ -61,6 +75,12 @@ class Limits(NamedTuple):
     """Largest rotation [rad]."""
     rating: str
     """Required penetration rating, one of `RATINGS`."""
+    min_overlap: float = Criterion().min_overlap_m
+    """Least overlap of bumper and boulder [m]."""
+    calibrated_crush: float = Model().calibrated_crush_m
+    """Crush beyond which a row is flagged [m]."""
+    tested_rotation: float = math.radians(TESTED_ROTATION_DEG["corrected"])
+    """Rotation beyond which a row is flagged [rad]."""
 
     @property
     def penetration(self) -> float:
@@ -76,8 +96,12 @@ class Facts(NamedTuple):
     designs: Designs
     """Inputs of the same rows."""
     limits: Limits
+    step_s: float
+    """Step of the solution that is judged [s]."""
     rows: dict[Rows, np.ndarray]
-    """Masks: which rows were computed, stand, overturned."""
+    """Masks, see `OutcomeColumn`."""
+    overlap: np.ndarray
+    """Height of the top of the boulder over the underside of the bumper [m]."""
     penetration: np.ndarray
     """How far the leading edge of the cargo bed came past the far face of the boulder [m]."""
     margin: np.ndarray
@@ -86,13 +110,15 @@ class Facts(NamedTuple):
     """Codes of the verdicts."""
     reason: np.ndarray
     """Codes of the reasons."""
-    reasons: tuple[str, ...]
-    """What the codes of the reasons stand for."""
     rating: np.ndarray
     """Codes of the ratings; -1 where there is none."""
+    validity: np.ndarray
+    """Codes of the flags."""
+    words: dict[str, tuple[str, ...]]
+    """What the codes of a column stand for, where that depends on the rows."""
 
 
-def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Judged:
+def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float) -> Judged:
     """Apply the rules of this module to n rows.
 
     Parameters
@@ -102,32 +128,42 @@ def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Judged:
     designs
         Inputs of the same rows.
     limits
-        Largest rotation and required rating.
+        Limits of the criterion, and what the model was tested on.
+    step_s
+        Step of the solution [s].
 
     Returns
     -------
     Judged
         One verdict a row; no row is dropped.
     """
-    facts = facts_of(outcomes, designs, limits)
+    facts = facts_of(outcomes, designs, limits, step_s)
     columns, words = {}, {}
     for spec in OUTCOMES:
         values = spec.value(facts)
         if spec.type == "dictionary":
-            columns[spec.name] = values
-            words[spec.name] = facts.reasons if spec.name == "reason" else spec.words
-        else:
-            columns[spec.name] = _kept(values, facts.rows[spec.rows])
+            words[spec.name] = facts.words.get(spec.name, spec.words)
+        if spec.rows != "all":
+            none = -1 if spec.type == "dictionary" else np.nan
+            values = np.where(facts.rows[spec.rows], values, none).astype(values.dtype, copy=False)
+        columns[spec.name] = values
     return Judged(columns, words)
 
 
-def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
+def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float) -> Facts:
     """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
     no_contact = status == Status.NO_CONTACT
     simulated = np.isin(status, SIMULATED)
     finite = np.ones(status.shape, dtype=bool)
-    for maximum in (outcomes.theta_max, outcomes.x_b_max, outcomes.x_v_max, outcomes.F_v_max, outcomes.t_end):
+    for maximum in (
+        outcomes.theta_max,
+        outcomes.x_b_max,
+        outcomes.x_v_max,
+        outcomes.F_v_max,
+        outcomes.crush_max,
+        outcomes.t_end,
+    ):
         finite &= np.isfinite(maximum)
     computed = simulated & finite
 
@@ -135,9 +171,12 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     standing = computed & ~overturned
     penetration = outcomes.x_v_max - designs.bed_offset - designs.table.L
     too_deep = standing & (penetration > limits.penetration)
-    outward = standing & (status == Status.OUTWARD)
+    unproved = standing & np.isin(status, (Status.HORIZON, Status.OUTWARD))
+    crushed = standing & (outcomes.crush_max > designs.bed_offset)
+    overlap = designs.table.H - designs.table.d - designs.table.e_bumper
+    slight = standing & (overlap < limits.min_overlap)
     unsure = (limits.rotation - outcomes.theta_max < outcomes.theta_error) | (
-        limits.penetration - penetration < outcomes.x_error
+        np.minimum(limits.penetration - penetration, designs.bed_offset - outcomes.crush_max) < outcomes.x_error
     )
 
     reason, reasons = _error_reasons(status, simulated & ~finite)
@@ -145,18 +184,23 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     # Mildest rule first, so that the worst one stays.
     for rows, kind, why in (
         (standing & unsure, UNDECIDED, NUMERICAL_ERROR),
-        (outward, UNDECIDED, HORIZON),
+        (unproved, UNDECIDED, HORIZON),
+        (slight, UNDECIDED, OVERRIDE),
+        (crushed, UNDECIDED, CRUSH),
         (too_deep, FAIL, PENETRATION),
         (overturned, FAIL, OVERTURNS),
         (no_contact, FAIL, NO_CONTACT),
     ):
         verdict[rows] = kind
         reason[rows] = why
-    return Facts(
+    rated = standing & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
+    facts = Facts(
         outcomes=outcomes,
         designs=designs,
         limits=limits,
-        rows={"computed": computed, "standing": standing, "overturned": overturned},
+        step_s=step_s,
+        rows={"judged": verdict != ERROR, "computed": computed, "rated": rated, "overturned": overturned},
+        overlap=overlap,
         penetration=penetration,
         margin=np.minimum(
             (limits.rotation - outcomes.theta_max) / limits.rotation,
@@ -164,20 +208,32 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
         ),
         verdict=verdict,
         reason=reason,
-        reasons=reasons,
-        rating=_ratings(penetration, standing),
+        rating=_ratings(penetration),
+        validity=reason,
+        words={"reason": reasons},
+    )
+    flags, named = flagged(facts)
+    return facts._replace(validity=flags, words={"reason": reasons, "validity": named})
+
+
+def limits_of(sweep: Sweep) -> Limits:
+    """Return the limits of a sweep."""
+    preset = sweep.model.preset
+    tested = TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values()))
+    criterion = sweep.criterion
+    return Limits(
+        rotation=math.radians(criterion.max_rotation_deg),
+        rating=criterion.rating,
+        min_overlap=criterion.min_overlap_m,
+        calibrated_crush=sweep.model.calibrated_crush_m,
+        tested_rotation=math.radians(tested),
     )
 
 
-def _kept(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Values where `rows` holds, NaN elsewhere."""
-    return np.where(rows, values, np.nan)
-
-
-def _ratings(penetration: np.ndarray, standing: np.ndarray) -> np.ndarray:
-    """Code of the best rating each penetration [m] keeps to; -1 beyond the last and where nothing stands."""
+def _ratings(penetration: np.ndarray) -> np.ndarray:
+    """Code of the best rating each penetration [m] keeps to; -1 beyond the last."""
     bounds = np.array([PENETRATION_LIMITS_M[rating] for rating in RATINGS])
-    codes = np.searchsorted(bounds, np.where(standing, penetration, np.inf), side="left")
+    codes = np.searchsorted(bounds, penetration, side="left")
     return np.where(codes < len(RATINGS), codes, -1).astype(np.int32)
 
 

@@ -52,7 +52,7 @@ def page_data(
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
         "settings": [float(value) for value in (*readings, *control._replace(elements=0))],
-        "rules": _rules(control.theta_limit, settings["criterion"]["rating"]),
+        "rules": _rules(control.theta_limit, settings["criterion"]),
         "inputs": [_input(spec.name, start, settings) for spec in INPUTS],
         "outcomes": [
             {"name": spec.name, "unit": spec.unit, "label": OUTCOME_WORDS[spec.name]}
@@ -130,12 +130,14 @@ def _layout() -> dict[str, Any]:
     }
 
 
-def _rules(rotation: float, rating: str) -> dict[str, Any]:
+def _rules(rotation: float, criterion: Mapping[str, Any]) -> dict[str, Any]:
     """What a design must keep to, and the words of every verdict."""
+    rating = criterion["rating"]
     return {
         "rotation": rotation,
         "rating": rating,
         "penetration": PENETRATION_LIMITS_M[rating],
+        "min_overlap": criterion["min_overlap_m"],
         "ratings": list(PENETRATION_LIMITS_M.items()),
         "status": {status.name: status.value for status in Status},
         "simulated": [status.value for status in SIMULATED],

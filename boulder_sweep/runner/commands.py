@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 def repeat_command(sweep: Sweep) -> str:
     """Return the command that computes the same table, the same on every machine."""
-    return f"sweep run {shlex.quote(sweep.path.name)}" if sweep.path else "boulder_sweep.run(sweep, out)"
+    if sweep.path is None:
+        return "boulder_sweep.run(sweep, out)"
+    return shlex.join(["sweep", "run", sweep.path.name, *_overrides(sweep)])
 
 
 def resume_command(sweep: Sweep, out: Path, jobs: int | None, backend: str, scheduler: str | None) -> str:
@@ -26,4 +28,12 @@ def resume_command(sweep: Sweep, out: Path, jobs: int | None, backend: str, sche
         words += ["--backend", backend]
     if scheduler is not None:
         words += ["--scheduler", scheduler]
-    return shlex.join([*words, "--resume"])
+    return shlex.join([*words, *_overrides(sweep), "--resume"])
+
+
+def _overrides(sweep: Sweep) -> list[str]:
+    """Return the options that replace entries of the file, as they were given."""
+    words = []
+    for entry in sweep.overrides:
+        words += entry.split("=", 1) if entry.startswith("--") else ["--set", entry]
+    return words

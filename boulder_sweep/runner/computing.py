@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_sweep.columns import VERDICTS
-from boulder_sweep.judge.judged import Judged, joined, not_computed
+from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed
+from boulder_sweep.judge.validity import FLAGGED
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
@@ -84,11 +85,18 @@ def failed_rows(count: int, reason: str) -> Judged:
 
 
 def verdict_counts(judged: Judged) -> dict[str, int]:
-    """Count the rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` without one."""
+    """Count the rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` without one.
+
+    Passes with a flag of `boulder_sweep.judge.validity` are counted under ``pass/flagged``.
+    """
     width = len(judged.reasons)
     counts = np.bincount(judged.verdict.astype(np.int64) * width + judged.reason)
     found = {}
     for code in np.flatnonzero(counts):
         verdict, reason = VERDICTS[code // width], judged.reasons[code % width]
         found[f"{verdict}/{reason}" if reason else verdict] = int(counts[code])
-    return dict(sorted(found.items()))
+    flagged = int(np.count_nonzero((judged.verdict == PASS) & (judged["validity"] > 0)))
+    if flagged:
+        found[FLAGGED] = flagged
+        found["pass"] -= flagged
+    return dict(sorted((key, count) for key, count in found.items() if count))

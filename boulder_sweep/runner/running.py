@@ -6,9 +6,10 @@ import queue
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.judge.evaluation import Evaluation
+from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.assembly import Assembly
 from boulder_sweep.runner.backends import DASK
@@ -53,7 +54,8 @@ class Run:
         self._evaluation = evaluation
         self._folder = folder
         self._signals = signals
-        self._metadata = file_metadata(folder.manifest.identity, repeat_command(sweep))
+        self.firmness: dict[str, Any] = {}
+        self._metadata: dict[bytes, bytes] = {}
         self._rows_before = folder.manifest.rows_done
         self._jobs = 1
         self._cluster: Cluster | None = None
@@ -74,6 +76,9 @@ class Run:
             if backend == DASK:
                 self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler))
                 self._jobs = max(sum(self._cluster.threads().values()), 1)
+            self.firmness = self._signals.call(lambda: firmness_of(self._sweep).to_dict())
+            identity, command = self._folder.manifest.identity, repeat_command(self._sweep)
+            self._metadata = file_metadata(identity, command, self.firmness)
             if self._rows_before < self._sweep.n_designs:
                 self._estimate = self._signals.call(self._estimated)
                 objections = self._estimate.objections

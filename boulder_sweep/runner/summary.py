@@ -63,6 +63,8 @@ class Summary:
         Files of the table and their size.
     accuracy
         The accuracy requested, the step chosen for it, and the error estimated by a pilot.
+    firmness
+        How many verdicts of a sample small changes of the inputs would change, see `boulder_sweep.judge.firmness`.
     notes
         What the user should know: damaged parts that were computed again, lost workers.
     """
@@ -78,6 +80,7 @@ class Summary:
     parts: int
     bytes: int
     accuracy: dict[str, Any] = field(default_factory=dict)
+    firmness: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @property
@@ -142,6 +145,7 @@ def summary_of(
     seconds: float,
     jobs: int,
     backend: str,
+    firmness: dict[str, Any],
     notes: list[str],
 ) -> Summary:
     """Return the summary of a finished run from the manifest it left."""
@@ -162,5 +166,6 @@ def summary_of(
         parts=len(manifest.parts),
         bytes=sum(part.bytes for part in manifest.parts.values()),
         accuracy=manifest.identity.get("accuracy", {}),
+        firmness=firmness,
         notes=tuple(notes),
     )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from boulder_sweep.errors import ClusterLostError, Interrupted
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
+from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
 from boulder_sweep.runner.backends import available_cores, check_backend
@@ -151,6 +152,7 @@ def run(
         seconds=time.monotonic() - begun,
         jobs=jobs,
         backend=backend,
+        firmness=whole.firmness,
         notes=whole.notes,
     )
 
@@ -190,7 +192,9 @@ def estimate(
             pass
     evaluation.warm_up()
     metadata = file_metadata(
-        identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()), repeat_command(sweep)
+        identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()),
+        repeat_command(sweep),
+        firmness_of(sweep).to_dict(),
     )
     return estimated(
         take_sample(evaluation, sweep.block, sweep.n_designs, metadata),

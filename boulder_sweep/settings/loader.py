@@ -68,7 +68,7 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     check_complete(entries)
     check_pairs(entries)
     problems.raise_if_any()
-    return _build(name, entries)
+    return _build(name, entries, tuple(overrides))
 
 
 def _read_name(entries: Entries) -> str:
@@ -83,7 +83,7 @@ def _read_name(entries: Entries) -> str:
     return default
 
 
-def _build(name: str, entries: Entries) -> Sweep:
+def _build(name: str, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
     """Put the checked parts together."""
     from boulder_sweep.settings.notes import notes_on
     from boulder_sweep.settings.sweep import Sweep
@@ -109,6 +109,7 @@ def _build(name: str, entries: Entries) -> Sweep:
         distributions=spreads,
         correlation=entries.settings.get("correlation", 0.0),
         partial_factor=factor,
+        overrides=overrides,
     )
     places = {field.name: entries.place_of(field) for field in fields.INPUTS}
     object.__setattr__(sweep, "notes", tuple(notes_on(sweep, places)))

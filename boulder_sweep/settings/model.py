@@ -30,10 +30,13 @@ class Criterion:
         Rotation at which the boulder counts as overturned [deg].
     rating : str
         Penetration rating required: P1, P2 or P3.
+    min_overlap_m : float
+        Least height of the boulder's top over the underside of the bumper [m].
     """
 
     max_rotation_deg: float = 20.0
     rating: str = "P1"
+    min_overlap_m: float = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +88,13 @@ class Model:
         The five readings.
     soil_elements : int
         Number of soil elements; 0 means the closed form, the limit of infinitely many.
+    calibrated_crush_m : float
+        Crush up to which spring and damper describe the vehicle's front [m].
     """
 
     readings: ReadingChoice = ReadingChoice()
     soil_elements: int = 0
+    calibrated_crush_m: float = 1.0
 
     @property
     def preset(self) -> str:

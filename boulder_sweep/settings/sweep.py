@@ -104,6 +104,8 @@ class Sweep:
     partial_factor : float
         Partial factor on tan(friction angle). The friction angles in `constants`, `axes` and `table` are design
         values: the factor has been applied to them.
+    overrides : tuple of str
+        Entries that replaced those of the file, as of ``--set``.
     notes : tuple of Problem
         Notes that are not errors.
     """
@@ -120,6 +122,7 @@ class Sweep:
     correlation: float = 0.0
     partial_factor: float = 1.0
     notes: tuple[Problem, ...] = ()
+    overrides: tuple[str, ...] = ()
 
     @cached_property
     def plan(self) -> DesignPlan:
@@ -202,11 +205,13 @@ class Sweep:
             "criterion": {
                 "max_rotation_deg": self.criterion.max_rotation_deg,
                 "rating": self.criterion.rating,
+                "min_overlap_m": self.criterion.min_overlap_m,
             },
             "model": {
                 "preset": self.model.preset,
                 "readings": self.model.readings.as_dict(),
                 "soil": self.model.soil_elements or CLOSED_FORM,
+                "calibrated_crush_m": self.model.calibrated_crush_m,
             },
             "solver": {
                 "accuracy": accuracy if isinstance(accuracy, str) else None,

@@ -88,7 +88,9 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
     return [f"{key}: {_shown(before, key)} -> {_shown(after, key)}" for key in changed]
 
 
-def file_metadata(identity_: Mapping[str, Any], repeat: str) -> dict[bytes, bytes]:
+def file_metadata(
+    identity_: Mapping[str, Any], repeat: str, firmness: Mapping[str, Any] | None = None
+) -> dict[bytes, bytes]:
     """Metadata of a part: its identity, and also command, commit and processor.
 
     Parameters
@@ -97,8 +99,10 @@ def file_metadata(identity_: Mapping[str, Any], repeat: str) -> dict[bytes, byte
         See `identity`.
     repeat
         Command that computes the same table.
+    firmness
+        How many verdicts of a sample small changes would change, see `boulder_sweep.judge.firmness`.
     """
-    entries = {**identity_, "repeat": repeat, "commit": commit(), "cpu": cpu_name()}
+    entries = {**identity_, "repeat": repeat, "commit": commit(), "cpu": cpu_name(), "firmness": firmness}
     return {
         f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(
             errors="backslashreplace"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.columns import column_spec
+from boulder_sweep.columns import OUTCOMES, column_spec
 from boulder_sweep.store.finished import FinishedRows
 
 if TYPE_CHECKING:
@@ -42,6 +42,9 @@ def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool 
     table, rows = _read(Path(out), columns, verify)
     # Split into blocks: consolidating columns of one type would copy the whole table once more.
     frame = table.to_pandas(split_blocks=True, self_destruct=True)
+    for spec in OUTCOMES:
+        if spec.type == "dictionary" and spec.name in frame:
+            frame[spec.name] = _ordered(frame[spec.name], spec.words)
     frame.attrs = {
         "units": {name: column_spec(name).unit for name in frame.columns},
         "meanings": {name: column_spec(name).meaning for name in frame.columns},
@@ -49,6 +52,13 @@ def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool 
         "complete": len(frame) == rows,
     }
     return frame
+
+
+def _ordered(words: pd.Series, known: Sequence[str]) -> pd.Series:
+    """Return a column of words with the known ones first and the others sorted, whatever parts they come from."""
+    there = list(words.cat.categories)
+    wanted = [*(word for word in known if word in there), *sorted(set(there) - set(known))]
+    return words if wanted == there else words.cat.reorder_categories(wanted)
 
 
 def read_table(folder: Path, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_kernels import Control, OutcomeTable, Readings
-from boulder_sweep.judge.pilot import ELEMENTS_AS_FAST, simulated
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
+from boulder_sweep.judge.pilot import simulated
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.tradeoff.points import Method, Point, compared
 
@@ -25,19 +26,21 @@ _SHORTEST_TIMING_S = 0.05
 class Sample:
     """The designs that all methods simulate."""
 
-    def __init__(self, designs: Designs, readings: Readings, limits: Limits, horizon: float) -> None:
-        self.designs, self.readings, self.limits, self.horizon = designs, readings, limits, horizon
+    def __init__(self, designs: Designs, readings: Readings, limits: Limits, control: Control) -> None:
+        self.designs, self.readings, self.limits, self.control = designs, readings, limits, control
 
     def solve(
         self, step_s: float, elements: int = 0, *, error_estimate: bool = False, locate_yield: bool = False
     ) -> OutcomeTable:
         """Simulate the designs."""
-        control = Control(step_s, self.horizon, self.limits.rotation, elements, error_estimate, True, locate_yield)
+        control = self.control._replace(
+            h=step_s, elements=elements, error_estimate=error_estimate, locate_yield=locate_yield
+        )
         return simulated(self.designs.table, self.readings, control)
 
-    def judged(self, outcomes: OutcomeTable) -> Judged:
+    def judged(self, outcomes: OutcomeTable, step_s: float) -> Judged:
         """Return their verdicts."""
-        return judge(outcomes, self.designs, self.limits)
+        return judge(outcomes, self.designs, self.limits, step_s)
 
     def measured(self, method: Method, known: OutcomeTable, accuracy: str) -> Point:
         """Simulate the designs by one method, long enough to time it, and compare."""
@@ -56,11 +59,13 @@ class Sample:
             took = time.thread_time() - begun
             spent, best = spent + took, min(best, took)
         ref = OutcomeTable(*(column[rows] for column in known))
-        return compared(method, accuracy, 1e6 * best / len(rows), (out, fewer.judged(out)), (ref, fewer.judged(ref)))
+        step_s = 1e-3 * method.step_ms
+        both = (out, fewer.judged(out, step_s)), (ref, fewer.judged(ref, step_s))
+        return compared(method, accuracy, 1e6 * best / len(rows), *both)
 
     def rows(self, chosen: np.ndarray) -> Sample:
         """Return a sample of some of the designs, by their places."""
-        return Sample(self.designs.rows(chosen), self.readings, self.limits, self.horizon)
+        return Sample(self.designs.rows(chosen), self.readings, self.limits, self.control)
 
 
 def _part(count: int, elements: int) -> np.ndarray:

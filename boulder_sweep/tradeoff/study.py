@@ -19,10 +19,10 @@ import numpy as np
 from boulder_kernels import OutcomeTable, Readings, as_printed, corrected
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import NothingToMeasureError
-from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
-from boulder_sweep.judge.evaluation import readings_of
+from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps
+from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.pilot import sampled_designs
-from boulder_sweep.judge.verdict import Limits
+from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.tradeoff.points import Method, Point, mark_front
 from boulder_sweep.tradeoff.sample import Sample
 
@@ -197,7 +197,8 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
             f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
             "the table of a run says why"
         )
-    limits = Limits(math.radians(sweep.criterion.max_rotation_deg), sweep.criterion.rating)
+    limits = limits_of(sweep)
+    control = control_of(sweep, Accuracy("", Steps(REFERENCE_STEP_S), error_estimate=False))
     presets = {"corrected": corrected(), "as_printed": as_printed()}
     if sweep.model.preset not in presets:
         presets = {sweep.model.preset: readings_of(sweep), **presets}
@@ -210,7 +211,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
         if time.monotonic() - begun > seconds:
             left_out += _methods(name)
             continue
-        sample = Sample(sample_designs, readings, limits, sweep.solver.horizon_s)
+        sample = Sample(sample_designs, readings, limits, control)
         if tell is not None:
             tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {sample_designs.size:,}")
         known = sample.solve(REFERENCE_STEP_S, locate_yield=True)

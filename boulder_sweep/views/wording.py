@@ -14,7 +14,9 @@ REASON_WORDS = {
     "no_contact": "the truck passes over it",
     "overturns": "it overturns",
     "penetration": "the truck gets too far",
-    "horizon": "still moving at the end of the simulated time",
+    "horizon": "nothing proved at the end of the simulated time",
+    "crush": "the truck would be inside the boulder",
+    "override": "it hardly reaches the bumper",
     "error": "too near to a limit for the accuracy",
 }
 

@@ -12,10 +12,11 @@ from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
 from docs.studies import answers, energy
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
-from docs.studies.extremes import admitted_table, refusal_table
+from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
 from docs.studies.readings import ReadingsStudy, readings_study
 from docs.studies.settings_tables import choices_table, columns_table, entries_table
+from docs.studies.validity import flags_of_grids, flags_table
 from docs.studies.wording import balance_words, convergence_words, fit_text, readings_words
 
 GRID = Path("configs/m30_sizing.yaml")
@@ -122,6 +123,10 @@ def _refusals(_: Path) -> str:
     return refusal_table().markdown()
 
 
+def _box_shares(_: Path) -> str:
+    return box_shares_table().markdown()
+
+
 def _settings_entries(_: Path) -> str:
     return entries_table().markdown()
 
@@ -132,6 +137,14 @@ def _settings_choices(_: Path) -> str:
 
 def _result_columns(_: Path) -> str:
     return columns_table().markdown()
+
+
+def _validity_flags(_: Path) -> str:
+    return flags_table().markdown()
+
+
+def _validity_shares(root: Path) -> str:
+    return flags_of_grids(root / GRID).markdown()
 
 
 CONTENTS: dict[str, Callable[[Path], str]] = {
@@ -151,6 +164,9 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "knife-edge": _knife_edge,
     "admitted-box": _admitted_box,
     "refusals": _refusals,
+    "box-shares": _box_shares,
+    "validity-flags": _validity_flags,
+    "validity-shares": _validity_shares,
     "settings-entries": _settings_entries,
     "settings-choices": _settings_choices,
     "result-columns": _result_columns,

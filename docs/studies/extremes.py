@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from boulder_kernels import Status
+from collections import Counter
+
+import numpy as np
+
+from boulder_kernels import Control, Status, corrected
+from boulder_sweep.columns import INPUT_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.judge.verdict import STATUS_REASONS
-from boulder_sweep.settings.fields import FIELDS, MAX_ELEMENTS
+from boulder_sweep.designs import block_of
+from boulder_sweep.judge.accuracy import STEPS
+from boulder_sweep.judge.evaluation import LONGEST_HORIZON, Evaluation
+from boulder_sweep.judge.inputs import Designs, designs_of
+from boulder_sweep.judge.judged import Judged
+from boulder_sweep.judge.refinement import reported_step_s
+from boulder_sweep.judge.verdict import STATUS_REASONS, Limits, judge
+from boulder_sweep.settings.fields import FIELDS, INPUTS, MAX_ELEMENTS
+
+SPARE = 4
+"""Designs drawn for each one that is kept."""
 
 
 def admitted_table() -> Table:
@@ -25,3 +39,51 @@ def refusal_table() -> Table:
     for status, reason in STATUS_REASONS.items():
         table.add(f"`{Status(status).name}`", reason)
     return table
+
+
+def box_designs(count: int, seed: int) -> Designs:
+    """Draw designs from the whole admitted box, by their logarithm where its lower end is positive.
+
+    Parameters
+    ----------
+    count
+        Number of designs; those buried deeper than they are high are drawn again.
+    seed
+        Of the random numbers.
+    """
+    rng = np.random.default_rng(seed)
+    ends = {field.name: field.admitted for field in INPUTS if field.admitted is not None}
+
+    def drawn(name: str) -> np.ndarray:
+        low, high, _ = ends[name]
+        if low <= 0.0:
+            return rng.uniform(low, high, SPARE * count)
+        return np.exp(rng.uniform(np.log(low), np.log(high), SPARE * count))
+
+    given = {name: drawn(name) for name in INPUT_COLUMNS if name != "impact_height_m"}
+    given["hood_height_m"] = np.maximum(given["hood_height_m"], given["bumper_height_m"])
+    kept = np.flatnonzero(given["embedment_depth_m"] < given["boulder_height_m"])[:count]
+    return designs_of(block_of({name: values[kept] for name, values in given.items()}))
+
+
+def box_shares_table(count: int = 4000, seed: int = 1) -> Table:
+    """Return how designs from the whole admitted box end, by the steps of `balanced` and by finer ones."""
+    designs = box_designs(count, seed)
+    limits = Limits(float(np.radians(20.0)), "P1")
+    control = Control(STEPS["balanced"].step_s, 1.0, limits.rotation, 0, True, longest_horizon=LONGEST_HORIZON)
+    evaluation = Evaluation(corrected(), control, limits)
+    once = judge(evaluation.simulate(designs.table, corrected(), control), designs, limits, reported_step_s(control))
+    table = Table(("ends as", "by the usual steps", "with finer steps", "share"))
+    counts = [Counter(_endings(rows)) for rows in (once, evaluation.judged(designs))]
+    for ending in sorted({**counts[0], **counts[1]}, key=lambda word: -counts[1][word]):
+        table.add(ending, str(counts[0][ending]), str(counts[1][ending]), f"{counts[1][ending] / count:.1%}")
+    return table
+
+
+def _endings(judged: Judged) -> list[str]:
+    """Return verdict and reason of every row; of refused ones the cause alone."""
+    words = []
+    for verdict, reason in zip(judged.verdict, judged.reason, strict=True):
+        found = judged.reasons[reason].partition(" (")[0]
+        words.append(", ".join(word for word in (VERDICTS[verdict], found) if word))
+    return words

@@ -17,7 +17,7 @@ from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, PASS
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import Sweep, load
-from boulder_sweep.settings.model import PRESETS, PRINTED, SWITCHES, Model, ReadingChoice
+from boulder_sweep.settings.model import PRESETS, PRINTED, SWITCHES, ReadingChoice
 
 BLOCK = 32_768
 EQUATIONS = {
@@ -198,7 +198,7 @@ def passing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
     every
         Only every so many-th design, from the first on.
     """
-    read_so = dataclasses.replace(sweep, model=Model(choice, sweep.model.soil_elements))
+    read_so = dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=choice))
     evaluation = evaluation_of(read_so, accuracy_of(read_so))
     passes = []
     for start in range(0, sweep.n_designs, BLOCK):

@@ -37,7 +37,7 @@ def test_named_accuracies_keep_their_promises_on_the_grid() -> None:
 def outcomes(status: list[int], theta: list[float]) -> OutcomeTable:
     out = empty_outcomes(len(status))
     out.status[:] = status
-    for column in (out.theta_max, out.x_b_max, out.x_v_max, out.F_v_max, out.t_limit, out.t_end):
+    for column in (out.theta_max, out.x_b_max, out.x_v_max, out.F_v_max, out.crush_max, out.t_limit, out.t_end):
         column[:] = theta
     return out
 
@@ -56,7 +56,7 @@ def test_where_only_one_solution_reached_the_limit_the_error_is_infinite() -> No
 def test_nearer_to_the_limit_than_the_error_is_undecided(error: float, verdict: int) -> None:
     out = outcomes([Status.SETTLED.value], [LIMIT - 0.005])
     out.x_v_max[:], out.theta_error[:], out.x_error[:] = 0.5, error, 0.0
-    assert judge(out, plain_designs(L=1.65), Limits(LIMIT, "P1")).verdict[0] == verdict
+    assert judge(out, plain_designs(L=1.65), Limits(LIMIT, "P1"), 0.004).verdict[0] == verdict
 
 
 def test_no_estimate_unless_asked_for() -> None:

@@ -40,6 +40,14 @@ def test_designs_that_are_not_touched_are_counted(sweep, possible_grid):
     assert _counts(out)["error"] == 0
 
 
+def test_a_run_says_how_firm_its_verdicts_are(sweep, possible_grid):
+    _, out, _ = sweep("run", possible_grid)
+    assert "a simulation, not a rating by test" in out
+    assert "firm?  sample of 18 designs" in out
+    for change in ("other reading of the paper", "1 deg of friction angle", "5 % of speed", "3 K_p for K_p^2"):
+        assert change in out
+
+
 def test_json_is_one_object_on_stdout(sweep, possible_grid):
     code, out, _ = sweep("run", possible_grid, "-o", "out", "--json", "--quiet")
     assert code == 0
@@ -48,6 +56,7 @@ def test_json_is_one_object_on_stdout(sweep, possible_grid):
     assert found["name"] == "small grid"
     assert found["rows"] == 18
     assert sum(found["verdicts"].values()) == 18
+    assert found["firmness"]["designs"] == 18
     assert found["out"] == "out"
 
 

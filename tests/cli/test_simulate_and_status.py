@@ -27,6 +27,15 @@ def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
     assert found["max_displacement_m"] == pytest.approx(displacement, abs=5e-4)
 
 
+def test_what_stands_beside_a_pass(sweep):
+    case = CONFIGS / "rwg.yaml"
+    _, out, _ = sweep("simulate", case)
+    assert "a simulation, not a rating by test" in out
+    assert "caution" not in out
+    _, out, _ = sweep("simulate", case, "--set", "boulder.density=3200 kg/m^3", "-q")
+    assert "caution: a density that rock does not have" in out
+
+
 def test_a_design_of_a_list(sweep):
     code, out, err = sweep("simulate", CONFIGS / "crash_tests.yaml", "--design", "1")
     assert (code, err) == (0, "")

@@ -42,7 +42,12 @@ MUTATIONS = (
     Mutation((20,), _SOIL, "M -= F_n * (k.lever_d * ratio + k.q)", "M -= F_n * (k.lever_d * ratio - k.q)"),
     Mutation((19, 20), _SOIL, "pressed_r = c.K_soil * spring_r + R", "pressed_r = c.K_soil * spring_r - R"),
     Mutation((19,), _SOIL, "drag = BB * (2.0 * r_0 - 1.0)", "drag = BB * (2.0 * r_0 + 1.0)"),
-    Mutation((21, 26, 28), _SOIL, "min(max(displacement, -c.x_yield), c.x_yield)", "min(displacement, c.x_yield)"),
+    Mutation(
+        (21, 26, 28),
+        _SOIL,
+        "limited = min(max(displacement, -c.x_yield), c.x_yield)",
+        "limited = min(displacement, c.x_yield)",
+    ),
     Mutation((22,), _SOIL, "x_b - c.l_n * versin + c.z_0 * sin", "x_b + c.l_n * versin + c.z_0 * sin"),
     Mutation((24,), _DESIGN, "return 1e6 * design.beta * design.W", "return 1e6 * design.beta"),
     Mutation((24,), _DESIGN, "return (n - 0.5) * d / elements", "return n * d / elements"),

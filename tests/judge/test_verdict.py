@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import boulder_sweep
 from boulder_kernels import SIMULATED, OutcomeTable, Status
 from boulder_sweep.columns import OUTCOME_COLUMNS, RATINGS, REASONS, VERDICTS
 from boulder_sweep.judge.judged import Judged
-from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, Limits, judge
+from boulder_sweep.judge.validity import TESTED_ROTATION_DEG
+from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, Limits, judge, limits_of
 from tests.judge.plain import plain_designs
+from tests.runner.grids import grid
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 LIMIT = math.radians(20.0)
 NAN = math.nan
 LENGTH, BED = 1.5, 2.9
@@ -40,12 +45,12 @@ def outcome(status: Status, **values: float) -> OutcomeTable:
 
 def not_simulated(status: Status) -> OutcomeTable:
     """One row without values."""
-    return OutcomeTable(np.array([status], dtype=np.int8), *(np.array([NAN]) for _ in range(9)))
+    return OutcomeTable(np.array([status], dtype=np.int8), *(np.array([NAN]) for _ in OutcomeTable._fields[1:]))
 
 
 def judged(outcomes: OutcomeTable, rating: str = "P1") -> Judged:
     n = len(outcomes.status)
-    return judge(outcomes, plain_designs(n, L=LENGTH, bed_offset=BED), Limits(LIMIT, rating))
+    return judge(outcomes, plain_designs(n, L=LENGTH, bed_offset=BED), Limits(LIMIT, rating), 0.004)
 
 
 def only(row: Judged) -> tuple[str, str]:
@@ -58,7 +63,7 @@ def test_outcome_columns_are_those_of_the_register():
     assert tuple(PENETRATION_LIMITS_M) == RATINGS
 
 
-@pytest.mark.parametrize("status", [Status.SETTLED, Status.BELOW_LIMIT, Status.UNPROVABLE, Status.HORIZON])
+@pytest.mark.parametrize("status", [Status.SETTLED, Status.BELOW_LIMIT, Status.UNPROVABLE])
 def test_pass(status):
     row = judged(outcome(status))
     assert only(row) == ("pass", "")
@@ -75,7 +80,7 @@ def test_no_contact_fails_without_any_value():
     assert only(row) == ("fail", "no_contact")
     assert row["rating"][0] == -1
     for name in OUTCOME_COLUMNS[2:]:
-        if name != "rating":
+        if name not in ("rating", "overlap_m", "validity"):
             assert np.isnan(row[name][0]), name
 
 
@@ -116,9 +121,49 @@ def test_rating_is_the_best_that_is_kept(penetration, rating):
     assert (RATINGS[code] if code >= 0 else None) == rating
 
 
-def test_still_moving_outwards_is_undecided_unless_something_worse_is_known():
-    assert only(judged(outcome(Status.OUTWARD))) == ("undecided", "horizon")
-    assert only(judged(outcome(Status.OUTWARD, x_v_max=x_v(1.5)))) == ("fail", "penetration")
+@pytest.mark.parametrize("status", [Status.HORIZON, Status.OUTWARD])
+def test_without_proof_at_the_horizon_a_row_is_undecided_unless_something_worse_is_known(status):
+    row = judged(outcome(status))
+    assert only(row) == ("undecided", "horizon")
+    assert np.isnan(row["margin"][0])
+    assert row["rating"][0] == -1
+    assert row["max_rotation_deg"][0] == pytest.approx(math.degrees(0.1))  # up to end_time_s
+    assert only(judged(outcome(status, x_v_max=x_v(1.5)))) == ("fail", "penetration")
+
+
+def test_more_crush_than_the_front_is_long_is_never_a_pass():
+    assert only(judged(outcome(Status.SETTLED, crush_max=BED))) == ("pass", "")
+    row = judged(outcome(Status.SETTLED, crush_max=1.001 * BED))
+    assert only(row) == ("undecided", "crush")
+    assert np.isnan(row["margin"][0])
+    assert row["rating"][0] == -1
+    assert only(judged(outcome(Status.SETTLED, crush_max=4.0, x_v_max=x_v(1.5)))) == ("fail", "penetration")
+    assert only(judged(outcome(Status.LIMIT, crush_max=4.0))) == ("fail", "overturns")
+    near = outcome(Status.SETTLED, crush_max=BED - 1e-4, x_error=2e-4)
+    assert only(judged(near)) == ("undecided", "error")
+
+
+@pytest.mark.parametrize(("overlap", "found"), [(0.26, ("pass", "")), (0.24, ("undecided", "override"))])
+def test_a_boulder_that_barely_reaches_the_bumper_does_not_pass(overlap, found):
+    designs = plain_designs(H=2.0 + overlap, d=1.5, e_bumper=0.5)
+    row = judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1"), 0.004)
+    assert only(row) == found
+    assert row["overlap_m"][0] == pytest.approx(overlap)
+    assert only(judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1", min_overlap=0.0), 0.004)) == ("pass", "")
+    overturned = judge(outcome(Status.LIMIT), designs, Limits(LIMIT, "P1"), 0.004)
+    assert only(overturned) == ("fail", "overturns")
+
+
+def test_limits_are_those_of_the_settings():
+    sweep = grid(rotation="15 deg")
+    limits = limits_of(sweep)
+    assert limits.rotation == pytest.approx(math.radians(15.0))
+    assert (limits.min_overlap, limits.calibrated_crush) == (0.25, 1.0)
+    changes = ["criterion.min_overlap=10 in", "vehicle.calibrated_crush=0.8 m", "model.readings=as_printed"]
+    limits = limits_of(boulder_sweep.load(CONFIGS / "rwg.yaml", changes))
+    assert limits.min_overlap == pytest.approx(0.254)
+    assert limits.calibrated_crush == 0.8
+    assert math.degrees(limits.tested_rotation) == pytest.approx(TESTED_ROTATION_DEG["as_printed"])
 
 
 def test_a_peak_nearer_to_its_limit_than_its_error_is_undecided():
@@ -180,9 +225,12 @@ def plain_reading(row: dict[str, float], status: Status, limit: float) -> tuple[
         return "fail", "overturns"
     if penetration > limit:
         return "fail", "penetration"
-    if status == Status.OUTWARD:
+    if row["crush_max"] > BED:
+        return "undecided", "crush"
+    if status in (Status.OUTWARD, Status.HORIZON):
         return "undecided", "horizon"
-    if LIMIT - row["theta_max"] < row["theta_error"] or limit - penetration < row["x_error"]:
+    distances = limit - penetration, BED - row["crush_max"]
+    if LIMIT - row["theta_max"] < row["theta_error"] or min(distances) < row["x_error"]:
         return "undecided", "error"
     return "pass", ""
 
@@ -193,7 +241,7 @@ rows = st.fixed_dictionaries(
         "x_b_max": st.floats(-0.1, 2.0),
         "x_v_max": st.floats(0.0, 50.0),
         "F_v_max": st.floats(0.0, 1e8),
-        "crush_max": st.floats(0.0, 50.0),
+        "crush_max": st.floats(0.0, 5.0),
         "t_end": st.floats(0.0, 1.0),
         "theta_error": st.one_of(st.just(NAN), st.floats(0.0, 0.5)),
         "x_error": st.one_of(st.just(NAN), st.floats(0.0, 50.0)),
@@ -214,6 +262,7 @@ def test_vectorised_rules_are_the_plain_ones(table, rating):
     assert list(named) == sorted(set(named))
     errors = result.verdict == VERDICTS.index("error")
     assert np.isnan(result["max_rotation_deg"][errors]).all()
-    overturned = np.isin(result.reason, (REASONS.index("overturns"), REASONS.index("no_contact")))
+    unrated = ("overturns", "no_contact", "horizon", "crush", "override")
+    overturned = np.isin(result.reason, [REASONS.index(reason) for reason in unrated])
     assert np.isnan(result["margin"][overturned]).all()
     assert (result["rating"][overturned] == -1).all()

@@ -56,11 +56,11 @@ def plausible(table: DesignTable, readings: Readings, control: Control) -> Outco
         (Status.HORIZON, 0.6),
         (Status.LIMIT, 0.5),
         (Status.OUTWARD, 0.2),
-        (Status.UNSTABLE, 0.1),
+        (Status.INVALID, 0.1),
         (Status.NO_CONTACT, 0.05),
     ):
         status[share < below] = kind
-    computed = ~np.isin(status, (Status.UNSTABLE, Status.NO_CONTACT))
+    computed = ~np.isin(status, (Status.INVALID, Status.NO_CONTACT))
     theta = np.where(status == Status.LIMIT, control.theta_limit, share * control.theta_limit)
 
     def kept(values: np.ndarray) -> np.ndarray:

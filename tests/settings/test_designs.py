@@ -144,6 +144,19 @@ def test_rows_outside_of_the_grid(load_it, example, start, stop):
         load_it(example).block(start, stop)
 
 
+@pytest.mark.parametrize("numbers", [[0], [7], [0, 3, 17, 2735], list(range(5, 2736, 37))])
+def test_chosen_designs_are_those_of_the_grid(load_it, example, numbers):
+    sweep = load_it(example)
+    chosen, whole = sweep.plan.selection(np.array(numbers)), sweep.block(0, sweep.n_designs)
+    assert len(chosen) == len(numbers)
+    assert chosen.design_id().tolist() == numbers
+    for name, column in chosen.columns.items():
+        assert column.to_numpy().tolist() == whole.columns[name].to_numpy()[numbers].tolist(), name
+    assert chosen.reasons.codes.tolist() == np.asarray(whole.reasons.codes)[numbers].tolist()
+    with pytest.raises(IndexError):
+        sweep.plan.selection(np.array([2736]))
+
+
 def test_an_empty_block(load_it, example):
     block = load_it(example).block(7, 7)
     assert len(block) == 0

@@ -109,7 +109,8 @@ def test_resolved_is_plain_data_with_units_in_its_names(load_it, example):
     assert resolved["n_designs"] == 2736
     assert resolved["inputs"]["embedment_ratio"] == [round(0.40 + 0.02 * i, 2) for i in range(16)]
     assert resolved["inputs"]["impact_height_m"].startswith("Eq 9")
-    assert resolved["criterion"] == {"max_rotation_deg": 20.0, "rating": "P1"}
+    assert resolved["criterion"] == {"max_rotation_deg": 20.0, "rating": "P1", "min_overlap_m": 0.25}
+    assert resolved["model"]["calibrated_crush_m"] == 1.0
     assert resolved["model"]["readings"]["inertia"] == "box"
     assert resolved["model"]["soil"] == "closed_form"
     assert resolved["solver"] == {"accuracy": "balanced", "accuracy_deg": None, "step_s": None, "horizon_s": 1.0}
@@ -170,7 +171,7 @@ def test_a_given_impact_height_takes_the_place_of_equation_9(load_with):
 
 def test_register_of_columns():
     assert [spec.name for spec in COLUMNS] == ["design_id", *INPUT_COLUMNS, *OUTCOME_COLUMNS]
-    assert len(BY_NAME) == len(COLUMNS) == 1 + 17 + 13
+    assert len(BY_NAME) == len(COLUMNS) == 1 + 17 + 17
     assert all(spec.meaning for spec in COLUMNS)
     endings = {"m": "_m", "kg": "_kg", "deg": "_deg", "s": "_s", "kN": "_kN", "m/s": "_m_s"}
     for spec in COLUMNS:

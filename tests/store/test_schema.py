@@ -103,7 +103,7 @@ def test_encodings(block, judged):
         name = column.path_in_schema
         if name == DESIGN_ID.name:
             assert "DELTA_BINARY_PACKED" in column.encodings
-        elif name in (*INPUT_COLUMNS, "verdict", "reason", "rating") and name != "impact_height_m":
+        elif name in (*INPUT_COLUMNS, "verdict", "reason", "rating", "validity") and name != "impact_height_m":
             assert "RLE_DICTIONARY" in column.encodings
         else:
             assert "BYTE_STREAM_SPLIT" in column.encodings

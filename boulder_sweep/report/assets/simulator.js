@@ -87,7 +87,7 @@ class Simulator {
     const complete = designs.map((design) => this.completed(design));
     const outcomes = this.kernel.outcomes(complete.map((one) => this.kernelDesign(one.inputs)), this.settings(changed));
     return complete.map(({ inputs, refusal }, row) => {
-      const found = judge(outcomes, row, inputs.boulder_length_m, inputs.bed_offset_m, this.data.rules);
+      const found = judge(outcomes, row, inputs, this.data.rules);
       if (refusal === "") return found;
       const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
       return { ...nothing, verdict: "error", reason: refusal, rating: null };

@@ -1,0 +1,146 @@
+"""How firm a table is: how many verdicts small changes of the inputs, or another reading, would change.
+
+A sample of the designs is simulated again with each change. It depends on the settings alone, and so do its results:
+they stand in the metadata of every file of the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_kernels import DesignTable, Readings, as_printed, corrected
+from boulder_kernels.design import passive_pressure_coefficient
+from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, sampled_designs, simulated
+from boulder_sweep.judge.refinement import reported_step_s
+from boulder_sweep.judge.validity import flag_counts
+from boulder_sweep.judge.verdict import judge
+
+if TYPE_CHECKING:
+    from boulder_kernels import Control
+    from boulder_sweep.judge.inputs import Designs
+    from boulder_sweep.judge.judged import Judged
+    from boulder_sweep.settings import Sweep
+
+DESIGNS = 2048
+"""Designs of the sample, with the soil in closed form; the steps of `balanced` and their error take 0.1 s."""
+SHORTEST_STEP_S = 1e-3
+"""Where steps are shorter, the sample for the numerical error is smaller in proportion."""
+ANGLE_DEG = 1.0
+SPEED = 0.05
+LEAST_ANGLE_DEG = 1.0
+CHANGES = {
+    "reading": "the other reading of the paper",
+    "friction_angle": f"{ANGLE_DEG:g} deg of friction angle either way",
+    "speed": f"{SPEED:.0%} of speed either way",
+    "resistance": "3 K_p in place of K_p^2",
+}
+"""What is changed, by its name in the result."""
+
+
+@dataclass(frozen=True)
+class Firmness:
+    """How firm the verdicts of a sweep are.
+
+    Attributes
+    ----------
+    designs : int
+        Designs of the sample; those that cannot be computed are left out.
+    changed : dict of str to float
+        Fraction of them whose verdict each of `CHANGES` turns from pass to fail or back.
+    numerical_error_deg, numerical_error_m : float or None
+        Estimated error that 99.9 % of those that did not overturn keep to; None where none is estimated.
+    passes : int
+        Passes of the sample.
+    flags : dict of str to int
+        Passes of the sample with each flag of `boulder_sweep.judge.validity`; under ``""`` those without any.
+    """
+
+    designs: int
+    changed: dict[str, float]
+    numerical_error_deg: float | None
+    numerical_error_m: float | None
+    passes: int
+    flags: dict[str, int] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return asdict(self)
+
+
+def firmness_of(sweep: Sweep, count: int = DESIGNS) -> Firmness:
+    """Find out how firm the verdicts of a sweep are.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    count
+        Designs of the sample, about.
+    """
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    designs, limits = sampled_designs(sweep, count), evaluation.limits
+    control, readings = evaluation.control._replace(elements=0), evaluation.readings
+    other = as_printed() if readings == corrected() else corrected()
+
+    def verdicts(table: DesignTable, read: Readings) -> Judged:
+        steps = (STEPS if read.restoring_gravity else STEPS_PRINTED)["fast"]
+        # Not beyond the horizon: without a proof that would cost ten times as much for a few verdicts.
+        fast = control._replace(h=steps.step_s, locate_yield=False, error_estimate=False, longest_horizon=0.0)
+        return judge(simulated(table, read, fast), designs._replace(table=table), limits, steps.step_s)
+
+    table = designs.table
+    found = verdicts(table, readings)
+    passes = found.verdict == PASS
+    angle = table.phi - math.radians(ANGLE_DEG)
+    variants = {
+        "reading": [(table, other)],
+        "friction_angle": [
+            (table._replace(phi=np.maximum(angle, math.radians(LEAST_ANGLE_DEG))), readings),
+            (table._replace(phi=table.phi + math.radians(ANGLE_DEG)), readings),
+        ],
+        "speed": [(table._replace(v_0=table.v_0 * factor), readings) for factor in (1.0 - SPEED, 1.0 + SPEED)],
+        "resistance": [(table._replace(K_epsilon=table.K_epsilon * 3.0 / _passive(table.phi)), readings)],
+    }
+    changed = {}
+    for name, tables in variants.items():
+        turned = np.zeros(designs.size, dtype=bool)
+        for variant, read in tables:
+            turned |= (verdicts(variant, read).verdict == PASS) != passes
+        changed[name] = float(turned.mean()) if designs.size else 0.0
+    words = Counter(found.words["validity"][code] for code in found["validity"][passes].tolist())
+    return Firmness(
+        designs=designs.size,
+        changed=changed,
+        **_numerical_errors(designs, readings, control),
+        passes=int(passes.sum()),
+        flags=flag_counts(words.items()),
+    )
+
+
+def _numerical_errors(designs: Designs, readings: Readings, control: Control) -> dict[str, float | None]:
+    """Estimated errors that most of the designs keep to that did not overturn."""
+    error_deg = error_m = None
+    if control.error_estimate:
+        share = min(1.0, reported_step_s(control) / SHORTEST_STEP_S)
+        some = designs.rows(slice(None, None, max(1, round(1.0 / share))))
+        control = control._replace(longest_horizon=0.0)
+        outcomes = simulated(some.table, readings, control)
+        counts = np.isfinite(outcomes.theta_error) & (outcomes.theta_error > 0.0)
+        if counts.any():
+            of_all = (np.degrees(outcomes.theta_error[counts]), outcomes.x_error[counts])
+            # Rounded so that a processor that differs in the last bits finds the same.
+            error_deg, error_m = (float(f"{np.quantile(values, QUANTILE, method='higher'):.2g}") for values in of_all)
+    return {"numerical_error_deg": error_deg, "numerical_error_m": error_m}
+
+
+def _passive(phi: np.ndarray) -> np.ndarray:
+    """Coefficient of passive earth pressure K_p of every angle [rad]."""
+    return np.array([passive_pressure_coefficient(angle) for angle in phi.tolist()])

@@ -1,0 +1,84 @@
+"""How firm a table is: small changes against plain simulations of the changed designs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import boulder_sweep
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.firmness import CHANGES, firmness_of
+from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.runner.sweeper import run
+from boulder_sweep.settings.model import ReadingChoice
+from boulder_sweep.store.manifest import load as load_manifest
+from tests.runner.grids import grid
+
+
+def passes(sweep: boulder_sweep.Sweep) -> np.ndarray:
+    """Which designs of a small sweep pass, by the fast steps."""
+    fast = replace(sweep, solver=replace(sweep.solver, accuracy="fast", step_s=None))
+    evaluation = evaluation_of(fast, accuracy_of(fast))
+    control = evaluation.control._replace(longest_horizon=0.0)
+    return replace(evaluation, control=control)(fast.block(0, fast.n_designs)).verdict == PASS
+
+
+def test_shares_are_those_of_the_changed_sweeps() -> None:
+    sweep = grid()
+    found = firmness_of(sweep)
+    assert found.designs == sweep.n_designs  # all of them: the sample is the grid
+    own = passes(sweep)
+    printed = replace(sweep, model=replace(sweep.model, readings=ReadingChoice.of_preset("as_printed")))
+    assert found.changed["reading"] == pytest.approx(np.mean(passes(printed) != own))
+    turned = np.zeros(len(own), dtype=bool)
+    for factor in (0.95, 1.05):
+        speed = sweep.constants["impact_speed_m_s"] * factor
+        turned |= passes(replace(sweep, constants=sweep.constants | {"impact_speed_m_s": speed})) != own
+    assert found.changed["speed"] == pytest.approx(turned.mean())
+    assert found.passes == own.sum()
+    assert set(found.changed) == set(CHANGES)
+    assert all(0.0 < share < 1.0 for share in found.changed.values())
+
+
+def test_less_resistance_is_what_it_says() -> None:
+    """3 K_p in place of K_p^2: where K_p is 3 both are the same, and nothing changes."""
+    found = firmness_of(grid(friction="30 deg"))
+    assert found.changed["resistance"] == 0.0
+
+
+def test_it_stands_in_summary_and_metadata_and_repeats_itself(tmp_path: Path) -> None:
+    sweep = grid()
+    summary = run(sweep, tmp_path / "one", jobs=1)
+    expected = firmness_of(sweep).to_dict()
+    assert summary.firmness == expected == json.loads(json.dumps(expected))
+    part = next((tmp_path / "one").glob("rows-*.parquet"))
+    metadata = pq.read_schema(part).metadata
+    assert json.loads(metadata[b"boulder_sweep.firmness"]) == expected
+    again = run(grid(), tmp_path / "one", jobs=2, resume=True)
+    assert again.firmness == expected
+    assert load_manifest(tmp_path / "one").rows_done == sweep.n_designs
+
+
+def test_the_numerical_error_is_that_of_the_accuracy_asked_for() -> None:
+    assert firmness_of(grid()).numerical_error_deg is None  # a plain step
+    errors = []
+    for accuracy in ("balanced", "fine"):
+        sweep = grid()
+        asked = replace(sweep, solver=replace(sweep.solver, accuracy=accuracy, step_s=None))
+        errors.append(firmness_of(asked).numerical_error_deg)
+    assert errors[0] is not None
+    assert errors[1] is not None
+    assert 0.0 < errors[1] < errors[0] < 1.0
+
+
+def test_nothing_to_simulate() -> None:
+    sweep = grid(height="[2 m, 3 m]", site="embedment_depth: 3.5 m")
+    found = firmness_of(sweep)
+    assert (found.designs, found.passes) == (0, 0)
+    assert set(found.changed.values()) == {0.0}

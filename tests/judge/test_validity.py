@@ -1,0 +1,106 @@
+"""Flags on rows outside of what the model was tested on."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boulder_kernels import Status
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge import validity
+from boulder_sweep.judge.judged import Judged, joined
+from boulder_sweep.judge.validity import FLAGS, TESTED_ROTATION_DEG, flag_counts, meanings
+from boulder_sweep.judge.verdict import Limits, judge
+from boulder_sweep.settings.model import PRESETS
+from tests.judge.plain import plain_designs
+from tests.judge.test_verdict import outcome
+
+LIMITS = Limits(math.radians(20.0), "P1")
+INSIDE = {"W": 1.2, "H": 2.7, "d": 1.5, "rho_b": 2600.0, "phi": math.radians(40.0), "beta": 60.0}
+
+
+def flags_of(row: Judged) -> str:
+    """Return the flags of the only row."""
+    return str(row.row(0)["validity"])
+
+
+def judged(status: Status = Status.SETTLED, changes: dict[str, float] | None = None, **outcomes: float) -> Judged:
+    """One row inside what the model was tested on unless told otherwise."""
+    return judge(outcome(status, **outcomes), plain_designs(**INSIDE | (changes or {})), LIMITS, 0.004)
+
+
+def test_inside_there_are_none() -> None:
+    assert flags_of(judged()) == ""
+
+
+@pytest.mark.parametrize(
+    ("flag", "changes", "outcomes"),
+    [
+        ("crush", {}, {"crush_max": 1.01}),
+        ("rotation", {}, {"theta_max": math.radians(13.9)}),
+        ("width", {"W": 1.3}, {}),
+        ("size", {"L": 0.05}, {}),
+        ("size", {"W": 0.5}, {}),
+        ("embedment", {"d": 1.1, "W": 0.9, "H": 3.3}, {}),
+        ("embedment", {"H": 4.0, "d": 3.005}, {}),
+        ("rock_density", {"rho_b": 1.0}, {}),
+        ("rock_density", {"rho_b": 3100.0}, {}),
+        ("soil_pair", {"phi": math.radians(28.0), "beta": 110.0}, {}),
+        ("soil_pair", {"beta": 5.0}, {}),
+        ("overlap", {"H": 2.4}, {}),
+    ],
+)
+def test_each_flag_is_raised_alone(flag: str, changes: dict[str, float], outcomes: dict[str, float]) -> None:
+    row = judged(changes=changes, **outcomes)
+    assert flags_of(row) == flag
+    assert row.row(0)["verdict"] == "pass"  # a flag does not change it
+
+
+def test_nothing_is_proved_as_printed() -> None:
+    assert flags_of(judged(Status.UNPROVABLE)) == "unproved"
+
+
+def test_several_flags_stand_in_the_order_of_the_register() -> None:
+    both = judged(changes={"W": 2.4, "rho_b": 1.0}, crush_max=2.0)
+    assert flags_of(both) == "crush;width;rock_density"
+    assert meanings(flags_of(both))[1] == "a wider boulder for its depth than tested"
+    assert meanings("") == []
+
+
+def test_words_are_the_same_however_the_rows_are_cut() -> None:
+    rows = [judged(), judged(changes={"W": 2.4}), judged(crush_max=2.0), judged()]
+    whole = joined(rows)
+    assert whole.words["validity"] == ("", "crush", "width")
+    halves = joined([joined(rows[:1]), joined(rows[1:])])
+    assert halves.words == whole.words
+    assert np.array_equal(halves["validity"], whole["validity"])
+
+
+def test_counts_by_flag() -> None:
+    assert flag_counts([("", 3), ("crush;width", 2), ("width", 1)]) == {"": 3, "crush": 2, "width": 3}
+    assert flag_counts([]) == {"": 0}
+
+
+def test_the_crash_tests_are_inside() -> None:
+    """What the thresholds are taken from: the test that passed raises no flag, and the tests lie just inside."""
+    rwg, abg = (crash_test(name).constants for name in ("rwg", "abg"))
+    for preset in PRESETS:
+        found = simulate(crash_test("rwg"), readings=preset)
+        assert found.summary()["validity"] == ("" if preset == "corrected" else "unproved")
+        rotation = found.summary()["max_rotation_deg"]
+        assert TESTED_ROTATION_DEG[preset] == pytest.approx(rotation, abs=0.05)
+        assert TESTED_ROTATION_DEG[preset] > rotation
+    wide = max(case["boulder_width_m"] / case["embedment_depth_m"] for case in (rwg, abg))
+    assert validity.TESTED_WIDTH_OVER_DEPTH - 0.01 < wide <= validity.TESTED_WIDTH_OVER_DEPTH
+    overlap = min(c["boulder_height_m"] - c["embedment_depth_m"] - c["bumper_height_m"] for c in (rwg, abg))
+    assert validity.TESTED_OVERLAP_M <= overlap < validity.TESTED_OVERLAP_M + 0.01
+
+
+def test_the_page_names_every_flag() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "validity.md").read_text()
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == [flag.name for flag in FLAGS]
