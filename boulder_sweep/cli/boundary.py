@@ -8,6 +8,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
 Examples:
@@ -53,11 +54,11 @@ def boundary(
     counts = found.counts()
     if as_json:
         record = {"name": sweep.name, "designs": sweep.n_designs, "simulations": found.simulations, "verdicts": counts}
-        click.echo(json.dumps(record))
+        show(json.dumps(record))
     else:
         for verdict, count in counts.items():
-            click.echo(f"  {verdict:<10}{count:>13,}{count / sweep.n_designs:>8.1%}")
-        click.echo(
+            show(f"  {verdict:<10}{count:>13,}{count / sweep.n_designs:>8.1%}")
+        show(
             f"{found.simulations:,} simulations for {sweep.n_designs:,} designs: {found.share:.1%}, "
             f"{1.0 - found.share:.1%} saved"
         )

@@ -8,6 +8,7 @@ import click
 
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
 Examples:
@@ -37,7 +38,7 @@ def which(grid: str, jobs: int | None, out: str | None, quiet: bool, overrides: 
     if out is not None:
         checked_parquet(out)
     found = reserves(sweep, jobs=jobs)
-    click.echo(json.dumps(found.to_dict()) if as_json else "\n".join(reserve_lines(found)))
+    show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found)))
     if out is not None:
         found.write(out)
     return 0

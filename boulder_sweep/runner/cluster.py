@@ -131,6 +131,17 @@ class _Task:
     """Whether the bytes come back through the scheduler, because the worker cannot write into the folder."""
 
 
+@dataclass(frozen=True)
+class _Work:
+    """What every task of a run has in common; sent to the cluster once."""
+
+    computation: Computation
+    rows_per_block: int
+    folder: str
+    table_rows: int
+    fingerprint: Fingerprint
+
+
 class _Done(NamedTuple):
     """What a worker returns."""
 
@@ -200,7 +211,9 @@ class ClusterWorkers(threading.Thread):
 
     def _work(self) -> None:
         """Keep some tasks in flight until all are done."""
-        shared = self._cluster.client.submit(_received, self._computation, pure=False)
+        folder, rows = str(self._folder.path.resolve()), self._folder.manifest.rows
+        work = _Work(self._computation, self._rows_per_block, folder, rows, fingerprint())
+        shared = self._cluster.client.submit(_received, work, pure=False)
         looked = result = time.monotonic()
         self._look_at_workers()
         more = True
@@ -236,17 +249,7 @@ class ClusterWorkers(threading.Thread):
 
     def _submit(self, shared: Any, task: _Task) -> None:
         """Hand a task to the scheduler."""
-        folder = None if task.relayed else str(self._folder.path.resolve())
-        future = self._cluster.client.submit(
-            _compute,
-            shared,
-            (task.start, task.stop),
-            self._rows_per_block,
-            folder,
-            self._folder.manifest.rows,
-            fingerprint(),
-            pure=False,
-        )
+        future = self._cluster.client.submit(_compute, shared, task.start, task.stop, task.relayed, pure=False)
         self._in_flight[future] = task
         future.add_done_callback(self._arrived.put)
 
@@ -322,32 +325,24 @@ def fingerprint() -> Fingerprint:
     return versions(), kernels_sha256(), rules_sha256()
 
 
-def _received(computation: Computation) -> Computation:
-    """Hold the computation on a worker, from which the others fetch it; repeated if that worker is lost."""
-    return computation
+def _received(work: _Work) -> _Work:
+    """Hold the work on a worker, from which the others fetch it; repeated if that worker is lost."""
+    return work
 
 
-def _compute(
-    computation: Computation,
-    rows: tuple[int, int],
-    rows_per_block: int,
-    folder: str | None,
-    table_rows: int,
-    expected: Fingerprint,
-) -> _Done:
+def _compute(work: _Work, start: int, stop: int, relayed: bool) -> _Done:
     """Compute, encode and stage some rows of one part on a worker."""
-    if fingerprint() != expected:
+    if fingerprint() != work.fingerprint:
         raise BackendError(_other_versions_text("a worker"))
-    start, stop = rows
-    pieces = [
-        computation.judged(first, min(first + rows_per_block, stop)) for first in range(start, stop, rows_per_block)
-    ]
-    part = computation.encoded(start, pieces)
-    if folder is None:
+    firsts = range(start, stop, work.rows_per_block)
+    pieces = [work.computation.judged(first, min(first + work.rows_per_block, stop)) for first in firsts]
+    part = work.computation.encoded(start, pieces)
+    if relayed:
         return _Done(None, part._replace(content=bytes(part.content)))
-    if not (Path(folder) / LOCK_NAME).exists():
+    folder = Path(work.folder)
+    if not (folder / LOCK_NAME).exists():
         return _Done(None, None)
-    return _Done(stage(Path(folder), table_rows, part.first, part.content, part.rows, part.verdicts), None)
+    return _Done(stage(folder, work.table_rows, part.first, part.content, part.rows, part.verdicts), None)
 
 
 def _wait_for_a_worker(client: Any, address: str) -> None:
