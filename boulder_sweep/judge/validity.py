@@ -55,7 +55,7 @@ class Flag:
     raised: Callable[[Any], np.ndarray]
 
 
-def _usual(name: str) -> tuple[float, float]:
+def usual_range(name: str) -> tuple[float, float]:
     """Range met in practice, from the register of settings, rounding allowed for."""
     usual = BY_NAME[name].usual
     if usual is None:
@@ -67,8 +67,8 @@ def _outside(values: np.ndarray, low: float, high: float) -> np.ndarray:
     return (values < low) | (values > high)
 
 
-_SIZES = {side: _usual(f"boulder_{name}_m") for side, name in (("L", "length"), ("W", "width"), ("H", "height"))}
-_EMBEDMENT, _ROCK = _usual("embedment_ratio"), _usual("boulder_density_kg_m3")
+_SIZES = {side: usual_range(f"boulder_{name}_m") for side, name in (("L", "length"), ("W", "width"), ("H", "height"))}
+_EMBEDMENT, _ROCK = usual_range("embedment_ratio"), usual_range("boulder_density_kg_m3")
 
 FLAGS = (
     Flag(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,12 +14,21 @@ from boulder_kernels import SIMULATED, Control, Readings, Status
 from boulder_sweep.columns import INPUTS, OUTCOMES
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
-from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M, STATUS_REASONS
+from boulder_sweep.judge.refinement import finer_controls
+from boulder_sweep.judge.validity import (
+    FLAGS,
+    TESTED_OVERLAP_M,
+    TESTED_ROTATION_DEG,
+    TESTED_WIDTH_OVER_DEPTH,
+    usual_range,
+)
+from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, PARTS
-from boulder_sweep.report.rows import Rows, Thinned
+from boulder_sweep.report.rows import SIZES, Rows, Thinned
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.notes import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.views.wording import REASON_WORDS
 
@@ -28,11 +38,17 @@ OUTCOME_WORDS = {
     "max_vehicle_displacement_m": "vehicle moves",
     "peak_force_kN": "peak force",
     "penetration_m": "penetration",
+    "vehicle_crush_m": "vehicle's front crushed",
+    "overlap_m": "overlap with the bumper",
     "rating": "penetration rating",
     "time_to_limit_s": "limit reached after",
     "rotation_error_deg": "numerical error of the rotation",
 }
 """Outcomes that the page shows of a design."""
+
+
+ANGLES = np.arange(20.0, 61.0)
+"""Friction angles [deg] over which the page is told which soils belong together; whole degrees, as the curves bend."""
 
 
 def page_data(
@@ -52,7 +68,7 @@ def page_data(
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
         "settings": [float(value) for value in (*readings, *control._replace(elements=0))],
-        "rules": _rules(control.theta_limit, settings["criterion"]),
+        "rules": _rules(control.theta_limit, settings),
         "inputs": [_input(spec.name, start, settings) for spec in INPUTS],
         "outcomes": [
             {"name": spec.name, "unit": spec.unit, "label": OUTCOME_WORDS[spec.name]}
@@ -63,9 +79,14 @@ def page_data(
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": REASONS,
         "words": REASON_WORDS,
+        "finer": [
+            {"h": finer.h, "locate_yield": float(finer.locate_yield)}
+            for finer in finer_controls(control._replace(elements=0))
+        ],
         "parts": list(PARTS),
         "colours": COLOURS,
         "yaml": _yaml(settings),
+        "vehicle": [f"calibrated_crush: {settings['model']['calibrated_crush_m']} m"],
         "chosen": [dict(one) for one in chosen],
         "kernel": base64.b64encode(KERNEL.read_bytes()).decode(),
     }
@@ -130,9 +151,9 @@ def _layout() -> dict[str, Any]:
     }
 
 
-def _rules(rotation: float, criterion: Mapping[str, Any]) -> dict[str, Any]:
+def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     """What a design must keep to, and the words of every verdict."""
-    rating = criterion["rating"]
+    criterion, rating = settings["criterion"], settings["criterion"]["rating"]
     return {
         "rotation": rotation,
         "rating": rating,
@@ -142,6 +163,26 @@ def _rules(rotation: float, criterion: Mapping[str, Any]) -> dict[str, Any]:
         "status": {status.name: status.value for status in Status},
         "simulated": [status.value for status in SIMULATED],
         "why": {str(status.value): words for status, words in STATUS_REASONS.items()},
+        "open": sorted(STEP_REASONS),
+        "tested": _tested(settings["model"]),
+    }
+
+
+def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
+    """What the model was tested on, and what the flags say."""
+    rotation = TESTED_ROTATION_DEG.get(model["preset"], min(TESTED_ROTATION_DEG.values()))
+    return {
+        "rotation": math.radians(rotation),
+        "crush": model["calibrated_crush_m"],
+        "width": TESTED_WIDTH_OVER_DEPTH,
+        "overlap": TESTED_OVERLAP_M,
+        "usual": {name: usual_range(name) for name in (*SIZES, "embedment_ratio")},
+        "soil": {
+            "angle": ANGLES.tolist(),
+            "least": (terzaghi_curve(ANGLES) / FAMILY_FACTOR).tolist(),
+            "most": (FAMILY_FACTOR * api_curve(ANGLES)).tolist(),
+        },
+        "meanings": {flag.name: flag.meaning for flag in FLAGS},
     }
 
 
@@ -189,7 +230,8 @@ def _yaml(settings: Mapping[str, Any]) -> list[str]:
     asked = solver["accuracy"] or (f"{solver['accuracy_deg']} deg" if solver["accuracy_deg"] is not None else None)
     accuracy = f"step: {solver['step_s']} s" if asked is None else f"accuracy: {asked}"
     return [
-        f"criterion: {{max_rotation: {criterion['max_rotation_deg']} deg, rating: {criterion['rating']}}}",
+        f"criterion: {{max_rotation: {criterion['max_rotation_deg']} deg, rating: {criterion['rating']}, "
+        f"min_overlap: {criterion['min_overlap_m']} m}}",
         f"model: {{readings: {readings}, soil: {soil}}}",
         f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",
     ]

@@ -42,6 +42,8 @@ class Page {
     this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found);
     const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
     table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
+    const flags = String(found.validity ?? "").split(";").filter((name) => name !== "");
+    byId(`${panel}-flags`).replaceChildren(...flags.map((name) => element("li", this.data.rules.tested.meanings[name])));
     this.plots.draw(panel, motion, this.units, this.data.parts, this.data.rules.rotation);
     this.motions[panel] = { scene: this.scene(inputs), motion };
     const slider = byId(`${panel}-time`);

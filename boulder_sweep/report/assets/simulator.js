@@ -5,7 +5,7 @@ const SAMPLES = 400;
 /** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
 const BEFORE_THE_END = 1 - 1e-14;
 /** Columns that `sweep simulate`, which goes on beyond the limit, takes from a row of `sweep run`, which stops there. */
-const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s"];
+const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"];
 
 /** Designs by the columns of the table in, judged rows and motions out. */
 class Simulator {
@@ -60,7 +60,21 @@ class Simulator {
    * @returns {Judged[]}
    */
   rows(designs) {
-    return this.judged(designs, { stop_at_limit: 1 });
+    const found = this.judged(designs, { stop_at_limit: 1 });
+    for (const finer of this.data.finer) {
+      const open = found.flatMap((one, row) => (this.isOpen(one) ? [row] : []));
+      if (open.length === 0) break;
+      const again = this.judged(open.map((row) => designs[row]), { ...finer, stop_at_limit: 1 });
+      again.forEach((one, k) => {
+        if (one.verdict !== "error") found[open[k]] = one;
+      });
+    }
+    return found;
+  }
+
+  /** @param {Judged} one @returns {boolean} whether finer steps may decide it */
+  isOpen(one) {
+    return (one.verdict === "undecided" && one.reason === "error") || this.data.rules.open.includes(one.reason);
   }
 
   /**
@@ -71,11 +85,22 @@ class Simulator {
   whole(design) {
     const { inputs, refusal } = this.completed(design);
     const [decided] = this.rows([design]);
-    const beyond = { stop_at_limit: 0 };
+    /** @type {Record<string, number>[]} */
+    const finer = this.data.finer;
+    const steps = finer.find((one) => this.step(one) === decided.step_s) ?? {};
+    const beyond = { ...steps, stop_at_limit: 0 };
     const [judged] = this.judged([design], beyond);
-    for (const name of DECIDED) judged[name] = decided[name];
+    if (judged.verdict !== "error") for (const name of DECIDED) judged[name] = decided[name];
     const times = refusal === "" ? this.times : new Float64Array(0);
     return { judged, motion: this.kernel.history(this.kernelDesign(inputs), this.settings(beyond), times), inputs };
+  }
+
+  /** @param {Record<string, number>} changed settings @returns {number} step of the solution that is reported [s] */
+  step(changed) {
+    const settings = this.settings(changed);
+    /** @param {string} name */
+    const of = (name) => settings[this.data.layout.settings.indexOf(name)];
+    return of("error_estimate") > 0 ? 0.5 * of("h") : of("h");
   }
 
   /**
@@ -88,6 +113,7 @@ class Simulator {
     const outcomes = this.kernel.outcomes(complete.map((one) => this.kernelDesign(one.inputs)), this.settings(changed));
     return complete.map(({ inputs, refusal }, row) => {
       const found = judge(outcomes, row, inputs, this.data.rules);
+      found.step_s = found.end_time_s === null ? null : this.step(changed);
       if (refusal === "") return found;
       const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
       return { ...nothing, verdict: "error", reason: refusal, rating: null };

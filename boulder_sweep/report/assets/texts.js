@@ -15,6 +15,7 @@ function yamlOf(data, design) {
     const words = unit === "1" ? "" : ` ${unit}`;
     (sections[section] ??= []).push(`${key}: ${design[name]}${words}`);
   }
+  sections.vehicle.push(...data.vehicle);
   return [
     `name: ${JSON.stringify(data.title)}`,
     ...Object.entries(sections).map(([section, entries]) => `${section}: {${entries.join(", ")}}`),

@@ -9,8 +9,21 @@
  * @property {number} min_overlap least height of the boulder's top over the underside of the bumper [m]
  * @property {[string, number][]} ratings every rating and its largest penetration [m], the best first
  * @property {Record<string, number>} status how a simulation can end, by name
- * @property {number[]} simulated those that have maxima to report
  * @property {Record<string, string>} why the reason of each status that leaves a design without a result
+ * @property {string[]} open those of them that finer steps may mend
+ * @property {Tested} tested
+ */
+
+/**
+ * What the model was tested on: values beyond which a row is flagged; written by Python.
+ * @typedef {object} Tested
+ * @property {number} rotation [rad]
+ * @property {number} crush [m]
+ * @property {number} width over embedment depth
+ * @property {number} overlap [m]
+ * @property {Record<string, [number, number]>} usual range of sizes, embedment ratio and density of rock
+ * @property {{angle: number[], least: number[], most: number[]}} soil subgrade reaction [MN/m^3] over friction angle [deg]
+ * @property {Record<string, string>} meanings of every flag, in their order
  */
 
 /**
@@ -72,5 +85,52 @@ function judge(outcomes, row, inputs, rules) {
     displacement_error_m: kept(of("x_error")),
     vehicle_crush_m: kept(crush),
     overlap_m: verdict === "error" ? null : overlap,
+    validity: verdict === "error" ? null : flagsOf(outcomes, row, inputs, overlap, rules).join(";"),
   };
+}
+
+/**
+ * The flags of one design: those of `boulder_sweep.judge.validity`, held against them by a test.
+ * @param {Record<string, Float64Array>} outcomes
+ * @param {number} row
+ * @param {Record<string, number>} inputs
+ * @param {number} overlap [m]
+ * @param {Rules} rules
+ * @returns {string[]} their names
+ */
+function flagsOf(outcomes, row, inputs, overlap, rules) {
+  const { tested } = rules;
+  const depth = inputs.embedment_depth_m;
+  /** @param {string} name @param {number} value */
+  const outside = (name, value) => value < tested.usual[name][0] || value > tested.usual[name][1];
+  /** @param {number[]} values */
+  const along = (values) => Math.exp(interpolated(tested.soil.angle, values.map(Math.log), inputs.friction_angle_deg));
+  const reaction = inputs.subgrade_reaction_MN_m3;
+  /** @type {Record<string, boolean>} */
+  const raised = {
+    crush: outcomes.crush_max[row] > tested.crush,
+    rotation: outcomes.theta_max[row] > tested.rotation,
+    width: tested.width * depth < inputs.boulder_width_m,
+    size: ["boulder_length_m", "boulder_width_m", "boulder_height_m"].some((name) => outside(name, inputs[name])),
+    embedment: outside("embedment_ratio", depth / inputs.boulder_height_m),
+    rock_density: outside("boulder_density_kg_m3", inputs.boulder_density_kg_m3),
+    soil_pair: reaction > along(tested.soil.most) || reaction < along(tested.soil.least),
+    overlap: overlap < tested.overlap,
+    unproved: outcomes.status[row] === rules.status.UNPROVABLE,
+  };
+  return Object.keys(tested.meanings).filter((name) => raised[name]);
+}
+
+/**
+ * The value at a place between ascending ones, or at the nearer end.
+ * @param {number[]} places
+ * @param {number[]} values
+ * @param {number} place
+ */
+function interpolated(places, values, place) {
+  const next = places.findIndex((one) => one >= place);
+  if (next < 0) return values[values.length - 1];
+  if (next === 0) return values[0];
+  const share = (place - places[next - 1]) / (places[next] - places[next - 1]);
+  return values[next - 1] + share * (values[next] - values[next - 1]);
 }
