@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from boulder_sweep.judge.validity import BY_FLAG
 from boulder_sweep.report.rows import NOT_YET, SOIL, Rows
 from boulder_sweep.views.wording import REASON_WORDS
 
@@ -57,6 +58,11 @@ def answer_of(rows: Rows) -> Answer:
     others = [f"{count:,} {_in_words(name)}" for name, count in counts.items() if name not in ("pass", NOT_YET)]
     if others:
         sentences.append((f"The others: {'; '.join(others)}.",))
+    flagged = n - rows.flags.get("", 0)
+    if flagged:
+        commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
+        most = "; ".join(f"{count:,} with {BY_FLAG[name].meaning}" for count, name in commonest[:3])
+        sentences.append((f"{flagged:,} of those that pass lie outside of what the model was tested on: {most}.",))
     if n == 0:
         return Answer((*sentences, ("No design passes.",)), ())
     soils = tuple(place for place, name in enumerate(rows.axes) if name in SOIL and rows.shape[place] > 1)

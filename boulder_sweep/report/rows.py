@@ -6,6 +6,7 @@ axes, their inputs follow from the settings and are not read at all.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.reader import read_row
@@ -49,6 +51,8 @@ class Rows:
         What a code stands for: verdict and reason, ``fail: overturns``; the last is for rows not computed yet.
     codes : ndarray of uint8, shape (rows,)
         Place of every row among the names.
+    flags : dict of str to int
+        Designs that pass, by what lies outside of what the model was tested on; under ``""`` those inside.
     axes : dict of str to ndarray
         Values along each axis of the grid, the last fastest; for named sets of soils or vehicles their numbers. Empty
         for a list of designs.
@@ -63,6 +67,7 @@ class Rows:
     finished: FinishedRows
     names: tuple[str, ...]
     codes: np.ndarray
+    flags: dict[str, int]
     axes: dict[str, np.ndarray]
     sets: dict[str, NamedSets]
     inputs: dict[str, np.ndarray]
@@ -139,7 +144,9 @@ def read_rows(folder: Path) -> Rows:
     codes = np.full(finished.rows, 255, np.uint8)
     columns = {name: np.full(finished.rows, np.nan) for name in stored}
     names: list[str] = []
-    for table in finished.tables(["design_id", "verdict", "reason", *stored]):
+    flags: Counter[str] = Counter()
+    for table in finished.tables(["design_id", "verdict", "reason", "validity", *stored]):
+        flags.update(_flags_of_passes(table))
         rows = table.column("design_id").to_numpy()
         codes[rows] = _codes(table, names)
         for name in stored:
@@ -154,7 +161,7 @@ def read_rows(folder: Path) -> Rows:
     for place, (axis, values) in enumerate(axes.items()):
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
-    return Rows(folder, finished, (*names, NOT_YET), codes, axes, sets, inputs)
+    return Rows(folder, finished, (*names, NOT_YET), codes, flag_counts(flags.items()), axes, sets, inputs)
 
 
 def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:
@@ -192,6 +199,14 @@ def _axes(
 
 def _length(values: Any) -> int:
     return int(values["count"]) if isinstance(values, dict) else len(values)
+
+
+def _flags_of_passes(table: Any) -> dict[str, int]:
+    """Return how many designs of a part pass with each word of the column ``validity``."""
+    import pyarrow.compute as pc
+
+    words = table.column("validity").filter(pc.equal(table.column("verdict").cast("string"), "pass"))
+    return {one["values"] or "": one["counts"] for one in pc.value_counts(words.cast("string")).to_pylist()}
 
 
 def _codes(table: Any, names: list[str]) -> np.ndarray:
