@@ -7,6 +7,7 @@
  * @property {number} rotation largest rotation [rad]
  * @property {number} penetration largest penetration of the required rating [m]
  * @property {number} min_overlap least height of the boulder's top over the underside of the bumper [m]
+ * @property {number[]} simulated ends of a simulation that has maxima to report
  * @property {[string, number][]} ratings every rating and its largest penetration [m], the best first
  * @property {Record<string, number>} status how a simulation can end, by name
  * @property {Record<string, string>} why the reason of each status that leaves a design without a result
