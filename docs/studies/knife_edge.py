@@ -127,7 +127,7 @@ def knife_edge_words() -> str:
     change = float(np.abs(np.diff(steady.rotations_deg)).max())
     return "\n".join(
         (
-            f"- The truck of the picture at {found.edge_m_s:.2f} m/s turns the boulder by {found.below_deg:.2f}°. "
+            f"- At {found.edge_m_s:.2f} m/s the truck of the picture turns the boulder by {found.below_deg:.2f}°. "
             f"Faster by less than {_power(found.width_m_s)} m/s, it turns it by {found.above_deg:.2f}°, less.",
             f"- With `restoring: gravity`, everything else as printed, no two neighbours of the 401 speeds of the "
             f"picture differ by more than {change:.3f}°.",
