@@ -57,8 +57,8 @@ def room_of(module: str) -> str:
     return module.split(".")[1]
 
 
-FACES = {"boulder_sweep", "boulder_sweep.__main__"}
-"""They hand on what the rooms have to offer, at first use; nothing below may import them, see below."""
+TOP = {"boulder_sweep", "boulder_sweep.__main__"}
+"""They fetch public names from the rooms at first use; nothing below may import them, see below."""
 
 
 def test_the_guide_lists_every_room() -> None:
@@ -72,14 +72,14 @@ def test_imports_point_down() -> None:
     upward = [
         f"{module} -> {name}"
         for module, names in GRAPH.items()
-        if module.startswith("boulder_sweep.") and module not in FACES
+        if module.startswith("boulder_sweep.") and module not in TOP
         for name in names
         if name.startswith("boulder_sweep.") and rank[room_of(name)] < rank[room_of(module)]
     ]
     assert upward == []
 
 
-def test_nothing_imports_the_face_of_the_package() -> None:
+def test_nothing_below_imports_the_top_of_the_package() -> None:
     """Its names are fetched from the rooms at first use, which would hide an arrow up."""
     assert [module for module, names in GRAPH.items() if "boulder_sweep" in names] == []
 
@@ -98,13 +98,13 @@ def test_kernels_know_nothing_of_the_package_above() -> None:
     assert {name.partition(".")[0] for name in below} == {"boulder_kernels"}
 
 
-def test_modules_are_chosen_by_name_at_run_time_only_where_it_says_why() -> None:
+def test_modules_are_imported_by_name_in_few_places_only() -> None:
     """`import_module` escapes the tests above: the package's face, the one way to the pictures, and an extra."""
     found = {module for module, file in MODULES.items() if "import_module(" in file.read_text(encoding="utf-8")}
     assert found == {"boulder_sweep", "boulder_sweep.drawing", "boulder_sweep.runner.cluster"}
 
 
-def test_only_pictures_are_drawn_through_the_back_door() -> None:
+def test_drawing_imports_views_only() -> None:
     source = MODULES["boulder_sweep.drawing"].read_text(encoding="utf-8")
     assert re.findall(r"import_module\((.*?)\)", source) == ['f"boulder_sweep.views.{view}"']
 

@@ -1,4 +1,4 @@
-"""Films of the side view: GIF by Pillow, MP4 by ffmpeg, and a page with a slider for any browser."""
+"""Animations of the side view: GIF by Pillow, MP4 by ffmpeg, and an HTML page with a slider."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ if TYPE_CHECKING:
 
 KINDS = (".gif", ".mp4", ".html")
 EVERY_S = 0.005
-"""Time between two frames of a film [s]."""
+"""Time between two frames [s]."""
 MOST_FRAMES = 120
 FRAMES_PER_S = 20
-"""Frames shown in a second: at 5 ms between frames, ten times slower than it happens."""
+"""Frames per second of playing: with 5 ms between frames, ten times slower than real time."""
 LAST_FRAME_S = 1.5
-"""How long a GIF rests on its last frame before it begins again [s]."""
+"""How long a GIF shows its last frame before it starts again [s]."""
 COLOURS = 48
-"""Of a GIF; the drawing has few."""
+"""Colours of a GIF; the drawing needs few."""
 FILM_DPI = 84
 SWATCH = 40
 """Height of a strip of each colour in the picture that the palette of a GIF is taken from."""
 
 
 def animate(trajectory: Trajectory, path: str | Path) -> None:
-    """Make a film of the side view: truck, boulder, soil wedge and forces to scale over time.
+    """Animate the side view: truck, boulder, soil wedge and forces to scale over time.
 
     Parameters
     ----------
     trajectory
         The impact.
     path
-        Film to write: .gif, .mp4 (needs the program ffmpeg), or .html, one file with a player and a slider.
+        File to write: .gif, .mp4 (needs the program ffmpeg), or .html, one file with a player and a slider.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def animate(trajectory: Trajectory, path: str | Path) -> None:
     kind = target.suffix.lower()
     if kind == ".mp4" and shutil.which("ffmpeg") is None:
         raise PictureError(
-            f"{path}: an MP4 film needs the program ffmpeg, which is not installed; "
+            f"{path}: an MP4 animation needs the program ffmpeg, which is not installed; "
             f"{target.with_suffix('.gif').name} or {target.with_suffix('.html').name} need nothing more"
         )
     try:
@@ -72,12 +72,12 @@ def animate(trajectory: Trajectory, path: str | Path) -> None:
 
 
 def frames(trajectory: Trajectory) -> Iterator[np.ndarray]:
-    """Draw the frames of a film one after the other.
+    """Draw the frames of an animation one by one.
 
     Yields
     ------
     ndarray of uint8, shape (height, width, 3)
-        One picture; height and width are even, as films want them.
+        One picture; height and width are even, as video formats require.
     """
     figures.require_matplotlib()
     import matplotlib
@@ -125,7 +125,7 @@ def _write_gif(trajectory: Trajectory, target: Path) -> None:
 
 
 def _write_mp4(trajectory: Trajectory, target: Path) -> None:
-    """Hand raw frames to ffmpeg."""
+    """Pipe raw frames to ffmpeg."""
     film = frames(trajectory)
     first = next(film)
     height, width = first.shape[:2]
@@ -144,11 +144,13 @@ def _write_mp4(trajectory: Trajectory, target: Path) -> None:
         _, said = encoder.communicate()
     if encoder.returncode != 0:
         words = said.decode(errors="replace").strip()
-        raise PictureError(f"{target}: ffmpeg could not make the film: {words or f'exit code {encoder.returncode}'}")
+        raise PictureError(
+            f"{target}: ffmpeg could not make the animation: {words or f'exit code {encoder.returncode}'}"
+        )
 
 
 def page(trajectory: Trajectory) -> str:
-    """Return a page with a player of the side view: one file, nothing to be fetched.
+    """Return an HTML page that plays the side view: one file, no other resources.
 
     The shapes of every frame travel as numbers and are drawn by the browser, so the page is small and sharp.
     """
@@ -172,7 +174,7 @@ def page(trajectory: Trajectory) -> str:
 
 
 def _plain(shape: Shape) -> dict[str, Any]:
-    """Return a shape for JSON, millimetres being fine enough."""
+    """Return a shape as plain data, rounded to millimetres."""
     plain: dict[str, Any] = {"k": shape.kind, "s": shape.style, "p": [[round(v, 3) for v in at] for at in shape.points]}
     if shape.text:
         plain["t"] = shape.text

@@ -1,4 +1,4 @@
-"""What all pictures share: how a figure is made and saved, colours, fonts, and what to say when it cannot be."""
+"""Common to all pictures: making and saving figures, colours, fonts, error messages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito: told apart with every kind of colour vision, and in grey.
+# Colours of Okabe and Ito: distinct for every kind of colour vision, and in grey.
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, YELLOW, AMBER, BLACK = "#56B4E9", "#F0E442", "#E69F00", "#222222"
 PALE_ORANGE = "#EDB08A"
@@ -43,7 +43,7 @@ KINDS = (".png", ".svg", ".pdf")
 
 
 def require_matplotlib() -> None:
-    """Make sure that pictures can be drawn.
+    """Check that matplotlib is installed.
 
     Raises
     ------
@@ -57,12 +57,12 @@ def require_matplotlib() -> None:
 
 
 def checked_kind(path: str | Path, kinds: tuple[str, ...] = KINDS) -> Path:
-    """Return the path of a picture if its ending names a kind that can be written.
+    """Return the path of a picture if it can be written there.
 
     Raises
     ------
     PictureError
-        It does not, or its folder does not exist.
+        Its extension is not one of `kinds`, or its folder does not exist.
     """
     target = Path(path)
     if target.suffix.lower() not in kinds:
@@ -88,7 +88,7 @@ def make_folder(folder: Path) -> None:
 
 @contextmanager
 def figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
-    """Give an empty figure, and save it at the end.
+    """Yield an empty figure, and save it at the end.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
     import matplotlib
     from matplotlib.figure import Figure
 
-    # A figure of its own, not pyplot's: no window, no global state, safe beside a user's own plots.
+    # Not a figure of pyplot: no window and no global state that could disturb a user's own plots.
     with matplotlib.rc_context(STYLE):
         fig = Figure(figsize=(width, height), layout="constrained")
         yield fig
@@ -124,12 +124,12 @@ def save(fig: Figure, target: Path) -> None:
 
 
 def limit_y(axes: Axes, low: float, high: float) -> None:
-    """Set the range of the vertical axis; some range also where nothing moves."""
+    """Set the range of the vertical axis, never an empty one."""
     axes.set_ylim(low, high if high > low else low + 1.0)
 
 
 def mark_peak(axes: Axes, time: float, value: float, text: str, colour: str, *, below: bool = False) -> None:
-    """Mark a peak with a dot and its value: above or below it, on the side where there is room."""
+    """Mark a peak with a dot and its value, above or below it, on the side with more room."""
     axes.plot([time], [value], "o", color=colour, markersize=4.5, zorder=5, clip_on=False)
     left, right = axes.get_xlim()
     beyond_middle = time > left + 0.62 * (right - left)

@@ -1,4 +1,4 @@
-"""A table of designs piece by piece, and the few rows of it that a picture is made of."""
+"""A table of designs in pieces, and the few rows of it that a picture needs."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ RATIO = "embedment_ratio"
 DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
 VERDICT, REASON = "verdict", "reason"
 MOST_KEPT = 2_000_000
-"""Rows; a dozen maps with as many cells as a map may have. Of more, those are kept that a picture can tell apart."""
+"""Most rows kept: a dozen maps with as many cells as a map may have. Of more, only rows that differ in the picture."""
 _RASTER = 500
-"""Places along an axis of a map that a picture can tell apart; it has fewer pixels there."""
+"""Distinct positions along an axis of a map; more than it has pixels."""
 
 Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
 """Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along."""
 
 
 def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
-    """Return a table that is in memory as one piece; what yields pieces as it is."""
+    """Return a table in memory as a single piece, and a source of pieces unchanged."""
     if callable(table):
         return table
     whole = table.assign(**{RATIO: table[DEPTH] / table[HEIGHT]})
@@ -33,7 +33,7 @@ def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
 
 
 def finished_pieces(finished: FinishedRows) -> Pieces:
-    """Return what yields the finished rows of a result.
+    """Return a source of pieces of the finished rows of a result.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Kept:
         return self._parts[0]
 
     def _thin(self) -> None:
-        """Keep of the rows at the same place of a picture the one that would be drawn last."""
+        """Of several rows at the same position, keep the one that would be drawn last."""
         rows = self.rows()
         places = rows[self._over].copy()
         for name, (least, most) in self._ends.items():

@@ -1,4 +1,4 @@
-"""The side view of an impact as plain shapes in metres, for whoever draws it: matplotlib, or a page in a browser.
+"""The side view of an impact as plain shapes in metres, to be drawn by matplotlib or by a browser.
 
 X points in the direction of travel from where the boulder's near face was, Y up from the soil line.
 """
@@ -45,7 +45,7 @@ class SideView:
 
     @property
     def window(self) -> Window:
-        """The whole impact with some air around it."""
+        """The whole impact with some space around it."""
         design, inputs = self.trajectory.motion.design, self.trajectory.inputs
         wedge = design.L + design.d * math.tan(shear_wedge_angle(design.phi))
         reach = max(wedge, self.rating_line + 0.3) + 0.6
@@ -69,7 +69,7 @@ class SideView:
         return LONGEST_ARROW_M / peak if peak > 0.0 else 1e-6
 
     def ground(self) -> list[Shape]:
-        """Return what does not move: soil, the boulder's first place, the line of the rating, the scale of force."""
+        """Return what does not move: soil, initial position of the boulder, line of the rating, scale of force."""
         w, design = self.window, self.trajectory.motion.design
         rating = self.trajectory.settings["criterion"]["rating"]
         box = ((0.0, -design.d), (design.L, -design.d), (design.L, design.H - design.d), (0.0, design.H - design.d))
@@ -108,7 +108,7 @@ class SideView:
         )
 
     def _place(self, sample: int, x: float, y: float) -> tuple[float, float]:
-        """Place of a point of the boulder, given from the common centre of mass, x ahead and y up [m]."""
+        """Position of a point of the boulder, given relative to the common centre of mass, x forward and y up [m]."""
         c, theta = self.trajectory.motion.constants, float(self.trajectory.rotation_rad[sample])
         sin, cos = math.sin(theta), math.cos(theta)
         centre = c.c_x + float(self.trajectory.boulder_displacement_m[sample])
@@ -128,7 +128,7 @@ class SideView:
         ]
 
     def _wedge(self, sample: int) -> list[Shape]:
-        """The soil that is lumped on the boulder: a wedge cut into slices, each moving along with its element."""
+        """The soil that moves with the boulder: a wedge cut into slices, each moving with its element."""
         motion = self.trajectory.motion
         c, design = motion.constants, motion.design
         slope = math.tan(shear_wedge_angle(design.phi))
@@ -161,7 +161,7 @@ class SideView:
 
 
 def samples_shown(trajectory: Trajectory, most: int, every_s: float) -> np.ndarray:
-    """Return which samples make a film: one each `every_s` seconds, but not more than `most`."""
+    """Return the samples of an animation: one every `every_s` seconds, at most `most`."""
     last = len(trajectory) - 1
     duration = float(trajectory.time_s[-1])
     count = min(most, max(2, round(duration / every_s) + 1))

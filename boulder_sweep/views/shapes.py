@@ -1,4 +1,4 @@
-"""What a side view is made of."""
+"""The shapes and styles of a side view."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Shape(NamedTuple):
 
 
 class Style(NamedTuple):
-    """How it looks, in any drawer."""
+    """Style of a shape."""
 
     fill: str = "none"
     line: str = "none"

@@ -1,4 +1,4 @@
-"""The side view drawn by matplotlib: a still, and the frames of a film."""
+"""The side view drawn by matplotlib: one instant, and the frames of an animation."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def height_of(view: SideView) -> float:
 
 
 def stage(fig: Figure, view: SideView) -> Axes:
-    """Put everything that does not move into a figure."""
+    """Draw everything that does not move."""
     axes = fig.subplots()
     w = view.window
     axes.set_xlim(w.left, w.right)

@@ -176,7 +176,7 @@ def _check(levels: Mapping[str, np.ndarray], chosen: Sequence[str], held: Mappin
 
 
 def _independent(levels: Mapping[str, np.ndarray], asked: set[str]) -> list[str]:
-    """Inputs that vary of their own accord, and those asked for.
+    """Return the inputs that vary independently, and those asked for.
 
     A grid has embedment as depth or as ratio. Unless both are asked for, the other one follows: the one that is not
     asked for, or else the one with more values.
@@ -246,7 +246,7 @@ def unit_of(name: str) -> str:
 
 
 def _levels_of(pieces: Pieces) -> tuple[dict[str, np.ndarray], int]:
-    """Different values of every input, and how many rows there are."""
+    """Return the different values of every input, and the number of rows."""
     found: dict[str, np.ndarray] = {}
     total = 0
     for piece in pieces([*INPUT_COLUMNS, RATIO]):

@@ -1,4 +1,4 @@
-"""Work against precision: the error of a sample over the CPU time per design, with what no other method beats."""
+"""Work and precision: the error of a sample over the CPU time per design, with the Pareto front."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 FIRST_STEP_MS = 16.0
 """Step whose name stands on the other side of its point, off that of the next."""
 LEAST_DEG = 1e-11
-"""Errors below it are drawn there: no axis of logarithms has a zero [deg]."""
+"""Smaller errors are drawn here, because a logarithmic axis has no zero [deg]."""
 COLOURS = (ORANGE, AMBER, PURPLE, GREY, SKY)
 MARKERS = "^vDPX"
 NAMED_STEPS_MS = {False: (16.0, 8.0), True: (2.0, 1.0, 0.5)}
@@ -62,7 +62,7 @@ def _panel(axes: Axes, points: list[Point]) -> None:
         linewidth=7.0,
         solid_capstyle="round",
         zorder=1,
-        label="no other method is cheaper and better",
+        label="Pareto front",
     )
     groups = dict.fromkeys((p.method.soil_elements, p.method.error_estimate, p.method.locate_yield) for p in points)
     sums = iter(zip(COLOURS, MARKERS, strict=True))

@@ -1,4 +1,4 @@
-"""A medium-duty truck from the side, its front crushed as the model has it. Only its three heights are data."""
+"""A medium-duty truck from the side, with its front crushed as in the model. Only its three heights are data."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
 CRUSH_ZONE_M = 1.7
-"""Part of the front that is drawn shorter as it is crushed."""
+"""Length of the front that is drawn shorter when it is crushed."""
 LEAST_LEFT = 0.25
-"""Share of the zone that is always left, however large the crush."""
+"""Fraction of the zone that always remains visible."""
 WHEEL_RADIUS_M = 0.42
 BED_LENGTH_M = 6.0
 

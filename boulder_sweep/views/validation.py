@@ -1,4 +1,4 @@
-"""What the paper's figures show of the simulated side, redrawn; and everything that `validate` found, as files."""
+"""The simulated curves of the paper's figures, redrawn; and all results of `validate` as files."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measu
 
 
 def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
-    """Draw the paper's truck against a rigid wall, what Figure 10 shows of the Maxwell element."""
+    """Draw the paper's truck against a rigid wall, the response of the Maxwell element in Figure 10."""
     time = np.linspace(0.0, 0.2, 401)
     x, v, acceleration = wall.response(time)
     with figures.figure(path, 9.6, 3.3) as fig:

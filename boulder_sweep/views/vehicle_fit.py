@@ -1,4 +1,4 @@
-"""A crash pulse, the Maxwell element fitted to it, and what is left between them."""
+"""A crash pulse, the Maxwell element fitted to it, and the residuals."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
 
 
 def fit_line(fit: VehicleFit) -> str:
-    """Spring and damper with their standard errors in a line."""
+    """Spring and damper with their standard errors on one line."""
     spring = f"spring {fit.wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"
     damper = f"damper {fit.wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN·s/m"
     return f"{spring}, {damper}"

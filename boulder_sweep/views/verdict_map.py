@@ -168,7 +168,7 @@ def _panel_title(shown: Slice, row_value: float, column_value: float) -> str:
 
 
 def _legend(fig: Any, present: set[int], *, beside: bool) -> None:
-    """Say what the colours mean: above the maps, or beside them where the title leaves no room."""
+    """Draw the legend above the maps, or beside them if the title leaves no room."""
     from matplotlib.patches import Patch
 
     handles = [Patch(color=colour, label=words) for k, (_, colour, words) in enumerate(CLASSES) if k in present]
@@ -177,7 +177,7 @@ def _legend(fig: Any, present: set[int], *, beside: bool) -> None:
 
 
 def _caption(shown: Slice, terms: str, width: int) -> str:
-    """Say what is shown, what is the same for all designs, and what a pass means; each from a line of its own."""
+    """Say what is shown, what all designs have in common, and what a pass means, each on a new line."""
     fixed = ", ".join(_unbroken(name, value) for name, value in shown.fixed.items())
     words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")

@@ -135,7 +135,7 @@ def test_hardly_any_motion_is_drawn_too(tmp_path: Path, name: str, speed: float)
 
 
 @pytest.mark.parametrize("name", DRAWERS)
-def test_nothing_to_draw_is_said(tmp_path: Path, name: str) -> None:
+def test_nothing_to_draw_is_reported(tmp_path: Path, name: str) -> None:
     low = simulate(crash_test("rwg").constants | {"boulder_height_m": 2.5})
     with pytest.raises(PictureError, match="the truck passes over the boulder"):
         DRAWERS[name](low, tmp_path / "picture.png")
@@ -155,13 +155,13 @@ def test_wrong_names_are_refused(held: Trajectory, tmp_path: Path, file: str, me
         held.plot(tmp_path / file)
 
 
-def test_a_folder_in_the_way_is_said(held: Trajectory, tmp_path: Path) -> None:
+def test_a_folder_in_the_way_is_reported(held: Trajectory, tmp_path: Path) -> None:
     (tmp_path / "picture.png").mkdir()
     with pytest.raises(PictureError, match="cannot be written"):
         held.plot(tmp_path / "picture.png")
 
 
-def test_missing_matplotlib_is_said(held: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_matplotlib_is_reported(held: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "matplotlib" else found(name))
     with pytest.raises(PictureError, match=r"pip install 'boulder-sweep\[plot\]'"):
