@@ -128,10 +128,10 @@ def knife_edge_words() -> str:
     return "\n".join(
         (
             f"- At {found.edge_m_s:.2f} m/s the truck of the picture turns the boulder by {found.below_deg:.2f}°. "
-            f"Faster by less than {_power(found.width_m_s)} m/s, it turns it by {found.above_deg:.2f}°, less.",
+            f"At a speed higher by less than {_power(found.width_m_s)} m/s, it turns it by {found.above_deg:.2f}°.",
             f"- With `restoring: gravity`, everything else as printed, no two neighbours of the 401 speeds of the "
             f"picture differ by more than {change:.3f}°.",
-            f"- Of {COUNT:,} random designs as printed, {standing:,} stay below 20°. A truck faster by a tenth of a "
+            f"- Of {COUNT:,} random designs as printed, {standing:,} stay below 20°. A speed higher by a tenth of a "
             f"per cent changes the rotation of {near} of these by more than {NOTABLE_DEG:g}°.",
             f"- Those whose estimated error is larger than {NOTABLE_DEG:g}°: {marked}.",
         )
