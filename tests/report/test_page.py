@@ -11,6 +11,8 @@ import boulder_sweep
 from boulder_sweep.report import example, write_explorer, write_report
 from tests.report.conftest import GRID, SETS
 
+pytestmark = pytest.mark.slow  # these need Chromium, which not every machine has
+
 DESIGNS = 200
 SLIDERS = {
     "boulder_length_m": (0.6, 2.0),
