@@ -12,6 +12,7 @@ from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.views.validation import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
 from boulder_sweep.views.verdict_map import draw_verdict_map
+from boulder_sweep.views.wording import terms_line
 from docs.studies.answers import SITE, UNCERTAIN
 from docs.studies.contents import EVERY, GRID
 from docs.studies.example_pulse import example_pulse
@@ -64,5 +65,6 @@ def draw_all(root: Path) -> list[Path]:
         fit_pulse(read_pulse(pulse), 6800.0).plot(named("vehicle_fit.png"))
         sweep = load(root / GRID)
         run(sweep, Path(scratch) / "grid.sweep")
-        draw_verdict_map(read(Path(scratch) / "grid.sweep"), named("m30_sizing.png"), title=sweep.name)
+        table, terms = read(Path(scratch) / "grid.sweep"), terms_line(sweep.resolved())
+        draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)
     return sorted(drawn)
