@@ -5,37 +5,64 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from boulder_kernels import Constants, Control, DesignTable, Readings
+from boulder_kernels import Constants, Control, Readings
 from boulder_kernels.lanes import (
     EMPTY,
-    RUNNING,
     attempt_steps,
-    attend,
+    carry_on,
+    find_waiting,
+    handle,
     next_design,
-    start_lane,
+    step_groups,
     take_over_steps,
-    write_lane,
 )
-from boulder_kernels.outcomes import OutcomeTable
+from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.soil import Kinematics, closed_form, element_sums
-from boulder_kernels.workspace import ATTENTION, LANES, SIZE, field
+from boulder_kernels.workspace import EVENTS, GROUPS, LANES, SIZE, WHOLE
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 
 
 @_compiled
-def filled_workspace(table: DesignTable, readings: Readings, control: Control, steps: int) -> np.ndarray:
-    """Return a workspace whose lanes hold the first designs of a table during their motion."""
-    ws = np.zeros(SIZE)
-    for lane in range(LANES):
-        start_lane(ws, lane, table, lane, readings, control)
-    for _ in range(steps):
-        attempt_steps(ws)
-        take_over_steps(ws)
-        for lane in range(LANES):
-            if field(ws, ATTENTION, lane) != 0.0:
-                attend(ws, lane, readings, control)
-    return ws
+def simulate_and_count(
+    designs: np.ndarray, readings: Readings, control: Control, sweeps: int
+) -> tuple[np.ndarray, tuple[int, int, int]]:
+    """Simulate in lanes as `boulder_kernels.lanes.simulate_lanes` does, and count; stop after so many sweeps.
+
+    Returns
+    -------
+    ws
+        The workspace as it was left.
+    counts
+        Steps attempted by all lanes; those by lanes that held a design; those that needed more than to be accepted.
+    """
+    out = empty_outcomes(designs.shape[1])
+    ws = np.zeros(WHOLE)
+    first, second, third, fourth = ws[:SIZE], ws[SIZE:], ws[2 * SIZE :], ws[3 * SIZE :]
+    events = ws[EVENTS:]
+    rows, waiting = np.zeros(GROUPS * LANES + 1, np.int64), np.zeros(GROUPS * LANES, np.int64)
+    running = 0
+    attempts, in_use, attended = 0, 0, 0
+    for i in range(GROUPS * LANES):
+        next_design(ws, i, rows, designs, readings, control, out)
+        running += rows[i] != EMPTY
+    while running > 0 and attempts < sweeps * GROUPS * LANES:
+        attempts += GROUPS * LANES
+        in_use += running
+        step_groups(first, second, third, fourth)
+        count = find_waiting(ws, rows, waiting)
+        together = min(LANES, max(running // GROUPS, 1))
+        done = 0
+        while count - done >= together:
+            size = min(LANES, count - done)
+            attended += size
+            handle(ws, events, waiting, done, size, readings, control)
+            for k in range(size):
+                i = waiting[done + k]
+                carry_on(ws, i, EVENTS + k, rows, designs, readings, control, out)
+                running -= rows[i] == EMPTY
+            done += size
+    return ws, (attempts, in_use, attended)
 
 
 @_compiled
@@ -76,35 +103,3 @@ def integrate_often(k: Kinematics, c: Constants, times: int) -> float:
     for _ in range(times):
         total += closed_form(Kinematics(k.A + 1e-12 * total, k.slope_x, k.B, k.slope_v, k.q, k.lever_d), c).M
     return total
-
-
-@_compiled
-def count_attempts(table: DesignTable, readings: Readings, control: Control, out: OutcomeTable) -> tuple[int, int, int]:
-    """Simulate in lanes as `boulder_kernels.lanes.simulate_lanes` does, and count.
-
-    Returns
-    -------
-    attempts, in_use, attended
-        Steps attempted by all lanes; those by lanes that held a design; those handled one by one.
-    """
-    ws = np.zeros(SIZE)
-    rows = np.full(LANES, EMPTY)
-    row, running = 0, 0
-    attempts, in_use, attended = 0, 0, 0
-    for lane in range(LANES):
-        rows[lane], row = next_design(ws, lane, row, table, readings, control, out)
-        running += rows[lane] != EMPTY
-    while running > 0:
-        attempts += LANES
-        in_use += running
-        attempt_steps(ws)
-        take_over_steps(ws)
-        for lane in range(LANES):
-            if field(ws, ATTENTION, lane) != 0.0 and rows[lane] != EMPTY:
-                attended += 1
-                status = attend(ws, lane, readings, control)
-                if status != RUNNING:
-                    write_lane(ws, lane, status, out, rows[lane])
-                    rows[lane], row = next_design(ws, lane, row, table, readings, control, out)
-                    running -= rows[lane] == EMPTY
-    return attempts, in_use, attended

@@ -22,8 +22,8 @@ import numba
 import numpy as np
 
 import boulder_kernels as bk
+from boulder_kernels import _jit
 from boulder_kernels import lanes as double_lanes
-from boulder_kernels.table import empty_outcomes
 
 from .accuracy import control, reference_of
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, sample
@@ -38,14 +38,14 @@ KEPT = ("design", "readings", "stability")
 ORDER = (
     *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "soil", "tableau"),
     *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
-    *("energy", "settling", "after_step", "workspace", "impact"),
+    *("energy", "settling", "after_step", "workspace", "impact", "lane_events"),
     "lanes",
 )
 CHANGES = {
     # Its square must not be zero.
     "soil": (("TINY = 1e-30", "TINY = 1e-15"), ("    if c.elements > 0:\n        return element_sums(k, c)\n", "")),
     "workspace": (("LANES = 8", "LANES = 16"),),
-    "lanes": (("np.zeros(SIZE)", "np.zeros(SIZE, np.float32)"),),
+    "lanes": (("np.zeros(WHOLE)", "np.zeros(WHOLE, np.float32)"),),
 }
 STEPS_MS = (16.0, 12.0, 8.0, 4.0, 2.0, 1.0)
 
@@ -94,6 +94,7 @@ def _decorators() -> types.ModuleType:
     module.inlined = decorator({"contract", "nsz"}, inline=True)
     module.exact_kernel = decorator({"nsz"})
     module.exact_inlined = decorator({"nsz"}, inline=True)
+    module.function_of = _jit.function_of
     module.summing_kernel = decorator({"contract", "nsz", "reassoc"})
     return module
 
@@ -128,9 +129,8 @@ def single_control(step_ms: float) -> bk.Control:
 
 def simulated(lanes: Any, designs: bk.DesignTable, how: bk.Control) -> bk.OutcomeTable:
     """Simulate designs in lanes of either precision."""
-    out = empty_outcomes(designs.L.size)
-    lanes.simulate_lanes(designs, bk.corrected(), how, out)
-    return out
+    out = lanes.simulate_lanes(np.stack(designs), bk.corrected(), how)
+    return bk.OutcomeTable(out[0].astype(np.int8), *out[1:])
 
 
 def measure(count: int = DESIGNS, repeats: int = 4) -> Table:

@@ -9,6 +9,8 @@
     Fused multiply-add, and the sign of zero does not matter. Nothing may assume that NaN or infinity never
     occur: a state that has become non-finite must be seen and reported. Sums are reordered in one place
     only (`summing_kernel`), so a design gives the same bits wherever in a block it is computed.
+``no_cfunc_wrapper``
+    Nothing calls a kernel from C; a wrapper for it would take a tenth of the time to compile.
 ``cache``
     Compiled code is kept in a folder named by a hash of all kernel sources, because a cached function does
     not notice that a function it calls has changed in another file. Only a folder that nobody else can write is used.
@@ -137,13 +139,9 @@ def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool 
     before = SETTINGS.CACHE_DIR
     SETTINGS.CACHE_DIR = CACHE_FOLDER or ""
     try:
-        return numba.njit(
-            nogil=True,
-            cache=CACHE_FOLDER is not None,
-            error_model="numpy",
-            fastmath=fastmath,
-            forceinline=inline,
-        )(function)
+        options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
+        options |= {"cache": CACHE_FOLDER is not None, "fastmath": fastmath, "forceinline": inline}
+        return numba.njit(**options)(function)
     finally:
         SETTINGS.CACHE_DIR = before
 
@@ -193,3 +191,9 @@ def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     For sums over thousands of soil elements only; a function compiled so must not test for NaN.
     """
     return _compiled(function, {"contract", "nsz", "reassoc"})
+
+
+def function_of(source: str, **names: Any) -> Callable[..., Any]:
+    """Return the function that a source text defines, with the names it refers to: for what `overload` writes out."""
+    exec(source, names)
+    return names[source[len("def ") : source.index("(")]]

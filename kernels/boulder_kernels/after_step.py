@@ -13,45 +13,42 @@ from ._jit import inlined, kernel
 from .dense_output import DenseOutput, state_at
 from .design import Constants
 from .dynamics import Acceleration, State, acceleration
-from .events import first_event, locate_limit
-from .gaps import COUPLE, LIMIT, ROTATION, GapFactors, gap_factors, gaps_at
+from .events import begin_search, first_event, gaps_within, go_on_searching, least_gap, tolerance_of, weights_of
+from .gaps import LIMIT, GapFactors, gap_factors, gaps_at
 from .modes import Modes, Switches, switches_of
-from .outcomes import Maxima, Status, updated_maxima
+from .outcomes import Compression, Maxima, Status, updated_maxima
 from .readings import Readings
+from .roots import ITERATIONS
 from .settling import barrier_energy, boulder_energy, inside_maxima, stays_below
-from .transitions import change_mode, initial_modes
 
 RUNNING = -1
 """Status of a simulation that has not ended."""
-AT_ONCE = 1e-5
-"""Fraction of a step before which a kink counts as passed."""
-LANDED = 0.99
-"""Fraction of a step behind which a kink does no harm."""
-BEYOND = 1.002
-"""A retried step ends this much behind the kink, so that the kink lies in it and not in the next one."""
-SHORTEN = -2
-"""In place of an event: retry the step with a shorter length."""
 
 
 class Kept(NamedTuple):
     """What is kept of a step."""
 
-    status: int
-    """How the simulation ended with it, or RUNNING."""
-    event: int
-    """The event it was cut at, -1 where there was none; SHORTEN where nothing is kept."""
+    event: float
+    """The event it was cut at or NONE; SHORTEN where nothing is kept."""
     tau: float
     """Fraction of the step that is kept; with SHORTEN, the fraction of its length to try next."""
-    t: float
-    """Time at its end [s]."""
     y: State
     """State there, before the event."""
     m: Maxima
     """Maxima up to there."""
+
+
+class Decided(NamedTuple):
+    """How a simulation stands after a step."""
+
+    status: int
+    """How it ended, or RUNNING."""
+    t: float
+    """Time [s]."""
     barrier: float
-    """Energy below which the motion has settled from there on [J]."""
+    """Energy below which the motion has settled [J]."""
     horizon: float
-    """Time at which the simulation ends from there on [s]."""
+    """Time at which the simulation ends [s], unless there is a reason to go on."""
 
 
 class Ending(NamedTuple):
@@ -75,7 +72,7 @@ def is_finite(y: State) -> bool:
     return bool(np.isfinite(y.x_b + y.v_b + y.theta_b + y.omega_b + y.x_v + y.v_v))
 
 
-@kernel
+@inlined
 def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
     """Acceleration at a state."""
     return acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c)
@@ -105,185 +102,147 @@ def turned_back(y: State, y_end: State) -> bool:
     return y.omega_b * y_end.omega_b < 0.0 or y.v_b > 0.0 >= y_end.v_b or y.v_v > 0.0 >= y_end.v_v
 
 
-@kernel
-def keep_up_to_limit(
+@inlined
+def kept_up_to(
+    event: float,
+    tau: float,
     t: float,
-    h: float,
-    y: State,
-    dense: DenseOutput,
-    factors: GapFactors,
-    switches: Switches,
-    m: Maxima,
-    m_end: Maxima,
-    c: Constants,
-) -> tuple[float, State, Maxima]:
-    """Keep a step that turns beyond the limit and back again up to the limit.
-
-    Parameters
-    ----------
-    m, m_end
-        Maxima before the step and after it.
-    t, h, y, dense, factors, switches, c
-        As of `keep_up_to_event`.
-
-    Returns
-    -------
-    tau, y, m
-        The fraction of the step that is kept, the state there, and the maxima up to there.
-    """
-    tau_top = (m_end.t_theta - t) / h
-    gap, gap_top = factors.limit - abs(y.theta_b), factors.limit - m_end.theta
-    tau = locate_limit(gap, gap_top, dense.rotation, factors.limit, tau_top)
-    y_limit = state_at(dense, tau)
-    return tau, y_limit, updated_maxima(m, t, h, tau, y, y_limit, dense, switches, c)
-
-
-@kernel
-def keep_up_to_event(
-    t: float,
-    h: float,
-    y: State,
-    M: float,
     y_end: State,
-    M_end: float,
-    dense: DenseOutput,
-    factors: GapFactors,
-    switches: Switches,
+    start: Compression,
     m: Maxima,
+    dense: DenseOutput,
+    switches: Switches,
     c: Constants,
-) -> tuple[int, float, State, Maxima]:
-    """Keep a step up to its first event.
+) -> Kept:
+    """Keep a step up to an event.
 
     Parameters
     ----------
-    t, h
-        Start [s] and length [s] of the step.
-    y, M
-        State and net moment [N m] at its start.
-    y_end, M_end
-        The same at its end.
-    dense, factors, switches, c
-        The step.
+    event, tau
+        As of `boulder_kernels.events.first_event`.
+    t
+        Start of the step [s].
+    y_end
+        State at the end of the step.
+    start
+        Compression at its start.
     m
         Maxima before it.
-
-    Returns
-    -------
-    event, tau, y, m
-        The event or -1, the fraction of the step that is kept, the state there, and the maxima up to there. Where the
-        event is SHORTEN, nothing is kept, and the step is to be retried with the fraction tau of its length.
-
-    Notes
-    -----
-    The modes are frozen in the right-hand side, but the ultimate resistance of the soil is not: a step that ran across
-    its kink gains nothing from locating it. So the step is retried, to end just behind the kink.
+    dense, switches, c
+        The step.
     """
-    start, end = gaps_at(y, M, factors, c), gaps_at(y_end, M_end, factors, c)
-    event, tau = first_event(start, end, dense, factors, switches, c, False)
-    if min(end.top, end.base) < 0.0:
-        kink, tau_kink = first_event(start, end, dense, factors, switches, c, True)
-        # Where another event comes at once, next to nothing of the step is kept, and it need not be shorter.
-        if min(tau, tau_kink) > AT_ONCE and min(tau, tau_kink) < LANDED:
-            return SHORTEN, min(BEYOND * min(tau, tau_kink), 1.0), y, m
-        if event < 0:
-            event = kink
-    if tau < 1.0:
-        y_end = state_at(dense, tau)
-    m_end = updated_maxima(m, t, h, tau, y, y_end, dense, switches, c)
-    if m_end.theta >= factors.limit and event != LIMIT:
-        event = LIMIT
-        tau, y_end, m_end = keep_up_to_limit(t, h, y, dense, factors, switches, m, m_end, c)
-    return event, tau, y_end, m_end
+    cut, whole = state_at(dense, tau), tau >= 1.0
+    y = State(
+        y_end.x_b if whole else cut.x_b,
+        y_end.v_b if whole else cut.v_b,
+        y_end.theta_b if whole else cut.theta_b,
+        y_end.omega_b if whole else cut.omega_b,
+        y_end.x_v if whole else cut.x_v,
+        y_end.v_v if whole else cut.v_v,
+    )
+    m = updated_maxima(m, t, tau, start, y, dense, switches, c)
+    return Kept(event, tau, y, m)
 
 
 @kernel
 def keep_step(
     t: float,
-    h: float,
     y: State,
-    k: Acceleration,
+    M: float,
     y_end: State,
-    k_end: Acceleration,
+    M_end: float,
+    start: Compression,
+    m: Maxima,
     dense: DenseOutput,
     factors: GapFactors,
     switches: Switches,
-    m: Maxima,
-    barrier: float,
-    horizon: float,
-    ending: Ending,
+    locate_yield: bool,
     c: Constants,
 ) -> Kept:
-    """Keep a step up to its first event, and decide whether the simulation ends there.
+    """Keep a step up to its first event.
+
+    Parameters
+    ----------
+    t
+        Start of the step [s].
+    y, M, y_end, M_end
+        States and net moments [N m] at its ends.
+    start
+        Compression at its start.
+    m
+        Maxima before it.
+    dense, factors, switches, c
+        The step.
+    locate_yield
+        Whether a step is cut where the soil reaches its ultimate resistance.
+    """
+    end = gaps_at(y_end, M_end, factors, c)
+    weights = weights_of(end, dense, factors, locate_yield, c)
+    tolerance = tolerance_of(factors)
+    b, tau, searching = begin_search(gaps_at(y, M, factors, c), weights, tolerance)
+    for _ in range(ITERATIONS):
+        if not searching:
+            break
+        least, _ = least_gap(gaps_within(tau, dense, factors, switches, c), weights)
+        b, tau, searching = go_on_searching(b, tau, least, tolerance)
+    event, tau = first_event(b, tau, weights, end, dense, factors, switches, c)
+    return kept_up_to(event, tau, t, y_end, start, m, dense, switches, c)
+
+
+@kernel
+def decide(
+    t: float, h: float, y_start: State, kept: Kept, barrier: float, horizon: float, ending: Ending, c: Constants
+) -> Decided:
+    """Decide whether a simulation ends with a step.
 
     Parameters
     ----------
     t, h
         Start [s] and length [s] of the step.
-    y, k, y_end, k_end
-        States and accelerations at its ends.
-    dense, factors, switches, c
-        The step.
-    m, barrier
-        Maxima before it, and the energy below which the motion has settled [J].
+    y_start
+        State at its start.
+    kept
+        What is kept of it.
+    barrier
+        Energy below which the motion has settled [J].
     horizon
         Time at which the simulation ends [s], unless there is a reason to go on.
     ending
         What ends it.
     """
-    if not is_finite(y_end):
-        return Kept(Status.UNSTABLE.value, -1, 1.0, t, y, m, barrier, horizon)
-    event, tau, y_kept, m = keep_up_to_event(t, h, y, k.M, y_end, k_end.M, dense, factors, switches, m, c)
-    if event == SHORTEN:
-        return Kept(RUNNING, event, tau, t, y, m, barrier, horizon)
+    y, m = kept.y, kept.m
     last = h >= horizon - t
-    t = horizon if last and event < 0 else t + tau * h
+    t = horizon if last and kept.tau >= 1.0 else t + kept.tau * h
     status = RUNNING
-    if event == LIMIT:
+    if kept.event == LIMIT:
         status = Status.LIMIT.value
-        m = Maxima(factors.limit, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v, m.crush, m.t_crush)
-    elif ending.stopping and ending.provable and y_kept.v_v <= 0.0:
-        if turned_back(y, y_kept):
+    elif ending.stopping and ending.provable and y.v_v <= 0.0:
+        if turned_back(y_start, y):
             barrier = barrier_energy(m, c)
-        if inside_maxima(y_kept, m) and boulder_energy(y_kept, c) < barrier:
+        if inside_maxima(y, m) and boulder_energy(y, c) < barrier:
             status = Status.SETTLED.value
     if status == RUNNING and t >= horizon:
-        status = horizon_status(y_kept, m, ending, c)
-        if t < ending.longest and (status != Status.BELOW_LIMIT.value or is_growing(y_kept, m)):
+        status = horizon_status(y, m, ending, c)
+        if t < ending.longest and (status != Status.BELOW_LIMIT.value or is_growing(y, m)):
             status, horizon = RUNNING, min(horizon + ending.extension, ending.longest)
-    return Kept(status, event, tau, t, y_kept, m, barrier, horizon)
+    return Decided(status, t, barrier, horizon)
 
 
 @inlined
-def go_on(
-    y: State, modes: Modes, readings: Readings, theta_stop: float, locate_yield: bool, c: Constants
-) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
-    """State and modes, the factors of these modes, and the acceleration to start the next step with."""
-    switches = switches_of(modes, readings, c)
-    return y, modes, switches, gap_factors(modes, c, theta_stop, locate_yield), rate_of(y, switches, c)
+def at_limit(m: Maxima, t: float, limit: float) -> Maxima:
+    """Maxima of a motion that has reached its limit of rotation [rad] at a time [s]."""
+    return Maxima(limit, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v, m.crush, m.t_crush)
 
 
-@inlined
-def start_motion(
-    readings: Readings, theta_stop: float, locate_yield: bool, c: Constants
-) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
-    """What the first step starts with, as of `go_on`."""
-    return go_on(
-        State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0), initial_modes(readings, c), readings, theta_stop, locate_yield, c
-    )
+@kernel
+def enter_modes(
+    modes: Modes, readings: Readings, theta_stop: float, locate_yield: bool, c: Constants
+) -> tuple[Switches, GapFactors]:
+    """Factors of the right-hand side and of the gaps in new modes."""
+    return switches_of(modes, readings, c), gap_factors(modes, c, theta_stop, locate_yield)
 
 
-@inlined
-def cross_event(
-    event: int,
-    y: State,
-    modes: Modes,
-    switches: Switches,
-    readings: Readings,
-    theta_stop: float,
-    locate_yield: bool,
-    c: Constants,
-) -> tuple[State, Modes, Switches, GapFactors, Acceleration]:
-    """Go over into the modes that follow an event, as of `go_on`."""
-    M = rate_of(y, switches, c).M if event in (ROTATION, COUPLE) else np.nan
-    y, modes = change_mode(event, y, M, modes, c)
-    return go_on(y, modes, readings, theta_stop, locate_yield, c)
+@kernel
+def initial_state(c: Constants) -> State:
+    """State at the first touch."""
+    return State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)

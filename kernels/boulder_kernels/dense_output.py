@@ -77,6 +77,30 @@ def slope_at(q: Track, tau: float) -> float:
 
 
 @exact_inlined
+def curvature_at(q: Track, tau: float) -> float:
+    """Second derivative of a track by tau: the acceleration times the square of the length of the step."""
+    return 2.0 * q.x2 + tau * (6.0 * q.x3 + tau * (12.0 * q.x4 + tau * (20.0 * q.x5)))
+
+
+@exact_inlined
+def closer(q: Track, tau: float, tau_end: float) -> float:
+    """One step of Newton's method to the zero of a velocity, within 0 ... tau_end."""
+    return min(max(tau - slope_at(q, tau) / curvature_at(q, tau), 0.0), tau_end)
+
+
+@exact_inlined
+def turning_point(q: Track, tau_end: float) -> float:
+    """Fraction of a step at which a velocity that changes its sign before tau_end is zero; tau_end for any other.
+
+    Three steps from the chord: the velocity bends little within a step, and what is left counts by its square.
+    """
+    end = slope_at(q, tau_end)
+    tau = tau_end * q.x1 / (q.x1 - end)
+    tau = closer(q, closer(q, closer(q, tau, tau_end), tau_end), tau_end)
+    return tau if q.x1 * end < 0.0 else tau_end
+
+
+@exact_inlined
 def dense_output(y: State, k: Acceleration, y_end: State, k_end: Acceleration, h: float) -> DenseOutput:
     """Polynomials of a step of length h [s] from states and accelerations at its ends."""
     return DenseOutput(

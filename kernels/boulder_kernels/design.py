@@ -7,11 +7,13 @@ away from the truck; alpha is the depth below the soil line, 0 ... d.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import overload
 
-from ._jit import exact_kernel
+from ._jit import exact_kernel, function_of
 from .readings import Readings
 
 G = 9.80665
@@ -73,26 +75,21 @@ class DesignTable(NamedTuple):
     e_bumper: np.ndarray
 
 
-@exact_kernel
 def design_at(table: DesignTable, row: int) -> Design:
     """Return one row of a table as a `Design`."""
-    return Design(
-        table.L[row],
-        table.W[row],
-        table.H[row],
-        table.rho_b[row],
-        table.d[row],
-        table.e[row],
-        table.rho_s[row],
-        table.phi[row],
-        table.beta[row],
-        table.K_epsilon[row],
-        table.m_v[row],
-        table.v_0[row],
-        table.k_v[row],
-        table.c_v[row],
-        table.e_bumper[row],
-    )
+    return Design(*(column[row] for column in table))
+
+
+def design_in(designs: np.ndarray, row: int) -> Design:
+    """Return one design of an array whose rows are the columns of a `DesignTable`."""
+    return Design(*designs[:, row])
+
+
+@overload(design_in, inline="always", strict=False)
+def _design_in(designs: Any, row: Any) -> Callable[..., Any]:
+    """Write out every field: one array is counted once where a tuple of them is counted at every call."""
+    values = ", ".join(f"designs[{i}, row]" for i in range(len(Design._fields)))
+    return function_of(f"def design_in(designs, row):\n return Design({values})", Design=Design)
 
 
 class Constants(NamedTuple):

@@ -8,17 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .after_step import RUNNING, SHORTEN, Ending, cross_event, keep_step, start_motion
+from .after_step import RUNNING, Ending, at_limit, decide, enter_modes, initial_state, is_finite, keep_step, rate_of
 from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import locate_limit
+from .events import NONE, SHORTEN, locate_limit
 from .modes import Modes, Switches
-from .outcomes import Outcome, Status, no_maxima, undefined_maxima
+from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
 from .readings import Readings
 from .settling import NO_PROOF, proof_is_possible
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
+from .transitions import change_mode, initial_modes
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
@@ -201,7 +202,9 @@ def simulate_by_steps(
     """Simulate one impact with a given time step [s]; see `simulate_design`."""
     ending = ending_of(control, readings, h_full)
     budget = attempt_budget(h_full, ending.longest)
-    y, modes, switches, factors, k1 = start_motion(readings, theta_stop, control.locate_yield, c)
+    y, modes = initial_state(c), initial_modes(readings, c)
+    switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
+    k1 = rate_of(y, switches, c)
     m = no_maxima()
     exchanged = nothing_exchanged()
     recording = record.times.size > 0
@@ -214,29 +217,31 @@ def simulate_by_steps(
         attempts += 1
         h = min(h_next, horizon - t)
         y_end, k_end = step(y, k1, h, switches, c)
+        if not is_finite(y_end):
+            return failed(Status.UNSTABLE.value)
         dense = dense_output(y, k1, y_end, k_end, h)
-        kept = keep_step(t, h, y, k1, y_end, k_end, dense, factors, switches, m, barrier, horizon, ending, c)
-        if kept.status == Status.UNSTABLE.value:
-            return failed(kept.status)
+        start = compression_at(y, switches, c)
+        kept = keep_step(t, y, k1.M, y_end, k_end.M, start, m, dense, factors, switches, control.locate_yield, c)
         if kept.event == SHORTEN:
             h_next = kept.tau * h
             continue
-        h_next, m, barrier, horizon = h_full, kept.m, kept.barrier, kept.horizon
+        decided = decide(t, h, y, kept, barrier, horizon, ending, c)
+        h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
         if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
             gap_start, gap = control.theta_limit - abs(y.theta_b), control.theta_limit - m.theta
             t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, (m.t_theta - t) / h)
         if recording:
             written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
             exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
-        t = kept.t
-        if kept.status != RUNNING:
-            if kept.status == Status.LIMIT.value and control.stop_at_limit:
-                t_limit = t
-            return Outcome(kept.status, m, t_limit, t, attempts)
-        if kept.event >= 0:
-            y, modes, switches, factors, k1 = cross_event(
-                kept.event, kept.y, modes, switches, readings, theta_stop, control.locate_yield, c
-            )
-        else:
-            y, k1 = kept.y, k_end
+        t = decided.t
+        if decided.status != RUNNING:
+            if decided.status == Status.LIMIT.value:
+                m = at_limit(m, t, theta_stop)
+                t_limit = t if control.stop_at_limit else t_limit
+            return Outcome(decided.status, m, t_limit, t, attempts)
+        y, k1 = kept.y, k_end
+        if kept.event > NONE:
+            y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
+            switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
+            k1 = rate_of(y, switches, c)
     return failed(Status.STEP_BUDGET.value)

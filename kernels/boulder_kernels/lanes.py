@@ -1,9 +1,9 @@
 """Many designs side by side, one in each lane of the vector registers.
 
-Every lane has its own clock. One attempt advances all of them by a step (`attempt_steps`), and a second loop looks at
-what came out (`take_over_steps`): most steps meet no event and set no peak, and are accepted at once. The few that need
-more are handled one by one with the functions of the single impact, and a lane whose simulation has ended gets the
-next design. No lane waits for another.
+Every lane has its own clock. One attempt advances all lanes of a group by a step (`attempt_steps`), and a second loop
+looks at what came out (`take_over_steps`): most steps meet no event and set no peak, and are accepted at once. The few
+that need more wait until they fill a group of their own (`boulder_kernels.lane_events`), and a lane whose simulation
+has ended gets the next design. What a lane computes does not depend on the others, only when it does so.
 """
 
 from __future__ import annotations
@@ -11,20 +11,30 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import inlined, kernel
-from .after_step import RUNNING, SHORTEN, cross_event, keep_step, start_motion
-from .dense_output import dense_output
-from .design import Constants, DesignTable, constants_of, design_at, is_computable
+from .after_step import RUNNING, enter_modes, initial_state, rate_of
+from .design import constants_of, design_in, is_computable
 from .dormand_prince import step
-from .dynamics import Acceleration, State
-from .gaps import GapFactors, gaps_of
+from .events import SHORTEN
+from .gaps import gaps_of
 from .impact import Control, attempt_budget, ending_of, first_step
-from .modes import Modes, Switches
-from .outcomes import Maxima, OutcomeTable, Status, compression_at, compression_of, highest, no_maxima
+from .lane_events import conclude, start_steps, work_out
+from .outcomes import (
+    STATUS,
+    Maxima,
+    Status,
+    compression_at,
+    compression_of,
+    empty_outcomes,
+    highest,
+    no_maxima,
+    write_outcome,
+)
 from .readings import Readings
 from .restoring import signed_arm
 from .settling import NO_PROOF, boulder_energy
 from .soil import soil_kinematics
 from .stability import ACCEPTED, MOST_STEPS, RETRY
+from .transitions import initial_modes
 from .trigonometry import sine_versine
 from .workspace import (
     ATTEMPTS_LEFT,
@@ -34,7 +44,10 @@ from .workspace import (
     CONSTANTS,
     END,
     END_STATE,
+    EVENT,
+    EVENTS,
     FACTORS,
+    GROUPS,
     HORIZON,
     LANES,
     MAXIMA,
@@ -42,10 +55,14 @@ from .workspace import (
     SIZE,
     START,
     STATE,
+    STATUS_OF_LANE,
     STEP,
     STEP_FULL,
     SWITCHES,
+    TAU,
     TIME,
+    WHOLE,
+    copy_lane,
     field,
     load,
     put,
@@ -114,8 +131,8 @@ def take_over_steps(ws: np.ndarray) -> None:
         deepest, _ = highest(start.crush, start.crush_rate, end.crush, end.crush_rate, h)
         t_next = t + h
         put(ws, ATTENTION, lane, 0.0 if plain else 1.0)
-        put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
         if plain:
+            put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
             store(ws, STATE, lane, y_end)
             store(ws, START, lane, k_end)
             store(ws, COMPRESSION, lane, end)
@@ -132,11 +149,11 @@ def take_over_steps(ws: np.ndarray) -> None:
 def start_lane(
     ws: np.ndarray,
     lane: int,
-    table: DesignTable,
+    designs: np.ndarray,
     row: int,
     readings: Readings,
     control: Control,
-    longest: float = np.inf,
+    longest: float,
 ) -> int:
     """Put a design into a lane.
 
@@ -144,19 +161,19 @@ def start_lane(
     ----------
     ws, lane
         The workspace and the lane.
-    table, row
-        The design.
+    designs, row
+        The design, as of `simulate_lanes`.
     readings, control
         As of `simulate_lanes`.
     longest
-        Longest step that has not failed yet [s]; infinite at first.
+        Longest step that has not failed yet [s]; the one asked for at first.
 
     Returns
     -------
     int
         RUNNING, or the status of a design that needs no integration or allows none.
     """
-    design = design_at(table, row)
+    design = design_in(designs, row)
     if design.H - design.d <= design.e_bumper:
         return Status.NO_CONTACT.value
     c = constants_of(design, readings, 0)
@@ -166,180 +183,201 @@ def start_lane(
     if status != ACCEPTED:
         return status
     h_full = min(h_full, longest)
-    y, modes, switches, factors, k1 = start_motion(readings, control.theta_limit, control.locate_yield, c)
+    y, modes = initial_state(c), initial_modes(readings, c)
+    switches, factors = enter_modes(modes, readings, control.theta_limit, control.locate_yield, c)
     store(ws, CONSTANTS, lane, c)
+    store(ws, MODES, lane, modes)
+    store(ws, SWITCHES, lane, switches)
+    store(ws, FACTORS, lane, factors)
+    store(ws, STATE, lane, y)
+    store(ws, START, lane, rate_of(y, switches, c))
+    store(ws, COMPRESSION, lane, compression_at(y, switches, c))
     store(ws, MAXIMA, lane, no_maxima())
+    put(ws, TIME, lane, 0.0)
+    put(ws, STEP, lane, min(h_full, control.horizon))
     put(ws, STEP_FULL, lane, h_full)
     put(ws, ATTEMPTS_LEFT, lane, attempt_budget(h_full, ending_of(control, readings, h_full).longest))
     put(ws, BARRIER, lane, NO_PROOF)
     put(ws, HORIZON, lane, control.horizon)
-    set_modes(ws, lane, modes, switches, factors)
-    set_motion(ws, lane, 0.0, y, k1, switches, c, control.horizon)
-    return RUNNING
-
-
-@inlined
-def set_motion(
-    ws: np.ndarray,
-    lane: int,
-    t: float,
-    y: State,
-    k1: Acceleration,
-    switches: Switches,
-    c: Constants,
-    horizon: float,
-) -> None:
-    """Put the start of the next step into a lane."""
-    store(ws, STATE, lane, y)
-    store(ws, START, lane, k1)
-    put(ws, TIME, lane, t)
-    put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t))
-    store(ws, COMPRESSION, lane, compression_at(y, switches, c))
-
-
-@inlined
-def set_modes(ws: np.ndarray, lane: int, modes: Modes, switches: Switches, factors: GapFactors) -> None:
-    """Put the modes of the next step into a lane, and what follows from them."""
-    store(ws, MODES, lane, modes)
-    store(ws, SWITCHES, lane, switches)
-    store(ws, FACTORS, lane, factors)
-
-
-@kernel
-def attend(ws: np.ndarray, lane: int, readings: Readings, control: Control) -> int:
-    """Handle a step that meets an event, sets a peak or reaches the end.
-
-    Returns
-    -------
-    int
-        RUNNING, or the status with which the simulation ended; time and maxima are left in the lane.
-    """
-    t, h = field(ws, TIME, lane), field(ws, STEP, lane)
-    c = load(ws, CONSTANTS, lane)
-    switches = load(ws, SWITCHES, lane)
-    factors = load(ws, FACTORS, lane)
-    if field(ws, ATTEMPTS_LEFT, lane) < 0.0:
-        return Status.STEP_BUDGET.value
-    y, k1 = load(ws, STATE, lane), load(ws, START, lane)
-    y_end, k_end = load(ws, END_STATE, lane), load(ws, END, lane)
-    kept = keep_step(
-        t,
-        h,
-        y,
-        k1,
-        y_end,
-        k_end,
-        dense_output(y, k1, y_end, k_end, h),
-        factors,
-        switches,
-        load(ws, MAXIMA, lane),
-        field(ws, BARRIER, lane),
-        field(ws, HORIZON, lane),
-        ending_of(control, readings, field(ws, STEP_FULL, lane)),
-        c,
-    )
-    if kept.event == SHORTEN:
-        put(ws, STEP, lane, kept.tau * h)
-        return RUNNING
-    put(ws, TIME, lane, kept.t)
-    put(ws, BARRIER, lane, kept.barrier)
-    put(ws, HORIZON, lane, kept.horizon)
-    store(ws, MAXIMA, lane, kept.m)
-    if kept.status != RUNNING:
-        return kept.status
-    y, k1 = kept.y, k_end
-    if kept.event >= 0:
-        y, modes, switches, factors, k1 = cross_event(
-            kept.event,
-            y,
-            load(ws, MODES, lane),
-            switches,
-            readings,
-            control.theta_limit,
-            control.locate_yield,
-            c,
-        )
-        set_modes(ws, lane, modes, switches, factors)
-    set_motion(ws, lane, kept.t, y, k1, switches, c, kept.horizon)
     return RUNNING
 
 
 @kernel
-def write_lane(ws: np.ndarray, lane: int, status: int, out: OutcomeTable, row: int) -> None:
+def write_lane(ws: np.ndarray, lane: int, status: int, out: np.ndarray, row: int) -> None:
     """Write the outcome of a lane into its row; a design that failed leaves its row NaN."""
-    out.status[row] = status
-    if status == Status.UNSTABLE.value or status == Status.STEP_BUDGET.value:
-        return
-    m = load(ws, MAXIMA, lane)
     t = field(ws, TIME, lane)
-    out.theta_max[row], out.x_b_max[row] = m.theta, m.x_b
-    out.x_v_max[row], out.F_v_max[row], out.crush_max[row] = m.x_v, m.F_v, m.crush
-    out.t_end[row] = t
-    if status == Status.LIMIT.value:
-        out.t_limit[row] = t
+    if status == Status.UNSTABLE.value or status == Status.STEP_BUDGET.value:
+        out[STATUS, row] = status
+    else:
+        t_limit = t if status == Status.LIMIT.value else np.nan
+        write_outcome(out, row, status, load(ws, MAXIMA, lane), t_limit, t)
 
 
 @kernel
 def next_design(
     ws: np.ndarray,
-    lane: int,
-    row: int,
-    table: DesignTable,
+    i: int,
+    rows: np.ndarray,
+    designs: np.ndarray,
     readings: Readings,
     control: Control,
-    out: OutcomeTable,
-) -> tuple[int, int]:
+    out: np.ndarray,
+) -> None:
     """Put the next design that needs integration into a lane, writing those that need none on the way.
 
-    Returns
-    -------
-    row_in_lane, row
-        The row now in the lane, or EMPTY, and the first row not yet started.
+    Parameters
+    ----------
+    ws, i
+        The workspace and the number of the lane.
+    rows
+        The row in each lane or EMPTY, and in the last place the first row not yet started.
+    designs, readings, control, out
+        As of `simulate_lanes`.
     """
-    n = table.L.size
-    while row < n:
-        status = start_lane(ws, lane, table, row, readings, control)
-        row += 1
-        if status == RUNNING:
-            return row - 1, row
-        out.status[row - 1] = status
+    lane = lane_of(i)
+    rows[i] = EMPTY
     # An empty lane stands still: its steps have no length, and their results are ignored.
     put(ws, STEP, lane, 0.0)
     put(ws, STEP_FULL, lane, 0.0)
-    return EMPTY, row
+    while rows[i] == EMPTY and rows[-1] < designs.shape[1]:
+        row = rows[-1]
+        rows[-1] += 1
+        status = start_lane(ws, lane, designs, row, readings, control, control.h)
+        if status == RUNNING:
+            rows[i] = row
+        else:
+            out[STATUS, row] = status
+
+
+@inlined
+def lane_of(i: int) -> int:
+    """Place of lane i = 0 ... GROUPS * LANES - 1."""
+    return (i // LANES) * SIZE + i % LANES
+
+
+@inlined
+def step_groups(first: np.ndarray, second: np.ndarray, third: np.ndarray, fourth: np.ndarray) -> None:
+    """Attempt a step in all lanes of all groups, and accept those that need no more."""
+    attempt_steps(first)
+    take_over_steps(first)
+    attempt_steps(second)
+    take_over_steps(second)
+    attempt_steps(third)
+    take_over_steps(third)
+    attempt_steps(fourth)
+    take_over_steps(fourth)
+
+
+@inlined
+def find_waiting(ws: np.ndarray, rows: np.ndarray, waiting: np.ndarray) -> int:
+    """List the lanes whose step needs more, and return how many there are."""
+    count = 0
+    for i in range(GROUPS * LANES):
+        if field(ws, ATTENTION, lane_of(i)) != 0.0 and rows[i] != EMPTY:
+            waiting[count] = i
+            count += 1
+    return count
 
 
 @kernel
-def simulate_lanes(table: DesignTable, readings: Readings, control: Control, out: OutcomeTable) -> None:
+def handle(
+    ws: np.ndarray, events: np.ndarray, waiting: np.ndarray, done: int, size: int, readings: Readings, control: Control
+) -> None:
+    """Work out in the group of events what follows from the steps of some of the lanes that wait.
+
+    Parameters
+    ----------
+    ws, events
+        The workspace, and the part of it that is the group of events.
+    waiting, done, size
+        The lanes that wait, where in their list to begin, and how many to handle.
+    readings, control
+        As of `simulate_lanes`.
+    """
+    for k in range(size):
+        copy_lane(ws, lane_of(waiting[done + k]), EVENTS + k, 0, SIZE)
+    work_out(events, size, control.locate_yield)
+    for k in range(size):
+        ending = ending_of(control, readings, field(events, STEP_FULL, k))
+        put(events, STATUS_OF_LANE, k, float(conclude(events, k, readings, ending, control.locate_yield)))
+    start_steps(events)
+
+
+@kernel
+def carry_on(
+    ws: np.ndarray,
+    i: int,
+    other: int,
+    rows: np.ndarray,
+    designs: np.ndarray,
+    readings: Readings,
+    control: Control,
+    out: np.ndarray,
+) -> None:
+    """Let a lane go on with what the group of events has worked out for it, or with the next design.
+
+    Parameters
+    ----------
+    ws, i, other
+        The workspace, the number of the lane, and the place of its lane in the group of events.
+    rows, designs, readings, control, out
+        As of `next_design`.
+    """
+    lane, row = lane_of(i), rows[i]
+    status = int(field(ws, STATUS_OF_LANE, other))
+    if status == RUNNING and field(ws, EVENT, other) == SHORTEN:
+        put(ws, STEP, lane, field(ws, TAU, other) * field(ws, STEP, lane))
+        put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, other))
+    elif status == RUNNING:
+        copy_lane(ws, other, lane, SWITCHES, ATTENTION)
+    else:
+        h = field(ws, STEP_FULL, other)
+        if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
+            status = start_lane(ws, lane, designs, row, readings, control, RETRY * h)
+        if status != RUNNING:
+            write_lane(ws, other, status, out, row)
+            next_design(ws, i, rows, designs, readings, control, out)
+
+
+@kernel
+def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
     """Simulate every design of a table in lanes, by the closed form of the soil and stopping at the limit.
 
     Parameters
     ----------
-    table
-        Designs, SI, arrays of shape (n,).
+    designs
+        Designs, SI, shape (15, n), in the order of `DesignTable`.
     readings
         Which formulas are read as printed.
     control
         Step, horizon, limit; its choice of soil and of stopping is ignored.
-    out
-        Where the outcomes go, in the order of the designs; its error columns are left alone.
+
+    Returns
+    -------
+    ndarray, shape (10, n)
+        Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
     """
-    ws = np.zeros(SIZE)
-    rows = np.full(LANES, EMPTY)
-    row, running = 0, 0
-    for lane in range(LANES):
-        rows[lane], row = next_design(ws, lane, row, table, readings, control, out)
-        running += rows[lane] != EMPTY
+    out = empty_outcomes(designs.shape[1])
+    ws = np.zeros(WHOLE)
+    first, second, third, fourth = ws[:SIZE], ws[SIZE:], ws[2 * SIZE :], ws[3 * SIZE :]
+    events = ws[EVENTS:]
+    rows, waiting = np.zeros(GROUPS * LANES + 1, np.int64), np.zeros(GROUPS * LANES, np.int64)
+    running = 0
+    for i in range(GROUPS * LANES):
+        next_design(ws, i, rows, designs, readings, control, out)
+        running += rows[i] != EMPTY
     while running > 0:
-        attempt_steps(ws)
-        take_over_steps(ws)
-        for lane in range(LANES):
-            if field(ws, ATTENTION, lane) != 0.0 and rows[lane] != EMPTY:
-                status = attend(ws, lane, readings, control)
-                h = field(ws, STEP_FULL, lane)
-                if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
-                    status = start_lane(ws, lane, table, rows[lane], readings, control, RETRY * h)
-                if status != RUNNING:
-                    write_lane(ws, lane, status, out, rows[lane])
-                    rows[lane], row = next_design(ws, lane, row, table, readings, control, out)
-                    running -= rows[lane] == EMPTY
+        step_groups(first, second, third, fourth)
+        count = find_waiting(ws, rows, waiting)
+        # A lane that waits attempts the same step again meanwhile.
+        together = min(LANES, max(running // GROUPS, 1))
+        done = 0
+        while count - done >= together:
+            size = min(LANES, count - done)
+            handle(ws, events, waiting, done, size, readings, control)
+            for k in range(size):
+                i = waiting[done + k]
+                carry_on(ws, i, EVENTS + k, rows, designs, readings, control, out)
+                running -= rows[i] == EMPTY
+            done += size
+    return out

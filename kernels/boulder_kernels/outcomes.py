@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .dense_output import DenseOutput, Track, displacement_at, slope_at, state_at
+from .dense_output import DenseOutput, displacement_at, state_at, turning_point
 from .design import Constants
 from .dynamics import State
 from .modes import Switches
-from .roots import ITERATIONS, Bracket, narrowed, next_guess
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, contact_lever, spring_compression
 
@@ -126,6 +125,34 @@ class OutcomeTable(NamedTuple):
     """Estimated numerical error of x_b_max, x_v_max and crush_max, the largest [m]."""
 
 
+OUTCOME_FIELDS = OutcomeTable._fields
+STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END = (
+    OUTCOME_FIELDS.index(name)
+    for name in ("status", "theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max", "t_limit", "t_end")
+)
+
+
+@kernel
+def empty_outcomes(n: int) -> np.ndarray:
+    """Return an array for n outcomes, the columns of an `OutcomeTable` as its rows: INVALID and NaN until written."""
+    out = np.full((len(OUTCOME_FIELDS), n), np.nan)
+    out[0] = Status.INVALID.value
+    return out
+
+
+@kernel
+def write_outcome(out: np.ndarray, row: int, status: int, m: Maxima, t_limit: float, t_end: float) -> None:
+    """Write one outcome into the array of `empty_outcomes`; the rows of errors are left alone."""
+    out[STATUS, row] = status
+    out[THETA_MAX, row] = m.theta
+    out[X_B_MAX, row] = m.x_b
+    out[X_V_MAX, row] = m.x_v
+    out[F_V_MAX, row] = m.F_v
+    out[CRUSH_MAX, row] = m.crush
+    out[T_LIMIT, row] = t_limit
+    out[T_END, row] = t_end
+
+
 @kernel
 def no_maxima() -> Maxima:
     """Maxima before the first step."""
@@ -136,24 +163,6 @@ def no_maxima() -> Maxima:
 def undefined_maxima() -> Maxima:
     """Maxima of a design that was not simulated."""
     return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
-
-
-PEAK_TOLERANCE = 1e-4
-"""Precision of a located peak as a fraction of the step; its value is off by the square of that only."""
-
-
-@kernel
-def turning_point(q: Track, tau_end: float) -> float:
-    """Fraction of a step at which a velocity that changes its sign before tau_end is zero."""
-    bracket = Bracket(0.0, q.x1, tau_end, slope_at(q, tau_end), 0)
-    tau = tau_end
-    for _ in range(ITERATIONS):
-        before = tau
-        tau = next_guess(bracket)
-        if abs(tau - before) < PEAK_TOLERANCE:
-            break
-        bracket = narrowed(bracket, tau, slope_at(q, tau))
-    return tau
 
 
 class Compression(NamedTuple):
@@ -213,18 +222,16 @@ def highest(x: float, rate: float, x_end: float, rate_end: float, h: float) -> t
 @inlined
 def grown(best: float, t_best: float, value: float, t: float) -> tuple[float, float]:
     """Return the larger of the best so far and a value, with its time."""
-    if value > best:
-        return value, t
-    return best, t_best
+    better = value > best
+    return value if better else best, t if better else t_best
 
 
 @inlined
 def updated_maxima(
     m: Maxima,
     t: float,
-    h: float,
     tau_end: float,
-    y: State,
+    start: Compression,
     y_end: State,
     dense: DenseOutput,
     s: Switches,
@@ -236,37 +243,32 @@ def updated_maxima(
     ----------
     m
         Maxima before the step.
-    t, h
-        Start [s] and length [s] of the step.
+    t
+        Start of the step [s].
     tau_end
         Fraction of the step that was kept.
-    y, y_end
-        State at the start, and where the step was cut.
+    start
+        Compression at the start.
+    y_end
+        State where the step was cut.
     dense, s, c
         The step.
     """
+    h = dense.h
     t_end = t + tau_end * h
-    theta, t_theta = grown(m.theta, m.t_theta, abs(y_end.theta_b), t_end)
-    if dense.rotation.x1 * y_end.omega_b < 0.0:
-        tau = turning_point(dense.rotation, tau_end)
-        theta, t_theta = grown(theta, t_theta, abs(displacement_at(dense.rotation, tau)), t + tau * h)
-    x_b, t_x_b = grown(m.x_b, m.t_x_b, y_end.x_b, t_end)
-    if dense.boulder.x1 > 0.0 > y_end.v_b:
-        tau = turning_point(dense.boulder, tau_end)
-        x_b, t_x_b = grown(x_b, t_x_b, displacement_at(dense.boulder, tau), t + tau * h)
-    x_v, t_x_v = grown(m.x_v, m.t_x_v, y_end.x_v, t_end)
-    if dense.truck.x1 > 0.0 > y_end.v_v:
-        tau = turning_point(dense.truck, tau_end)
-        x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
-    part = tau_end * h
-    start, end = compression_at(y, s, c), compression_at(y_end, s, c)
-    u, tau = highest(start.u, start.rate, end.u, end.rate, part)
-    F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + tau * part)
-    crush, t_crush = m.crush, m.t_crush
-    if dense.truck.x1 > 0.0:
-        if y_end.v_v < 0.0:  # up to where the truck stops
-            tau_end = turning_point(dense.truck, tau_end)
-            part, end = tau_end * h, compression_at(state_at(dense, tau_end), s, c)
-        deepest, tau = highest(start.crush, start.crush_rate, end.crush, end.crush_rate, part)
-        crush, t_crush = grown(crush, t_crush, deepest, t + tau * part)
+    tau = turning_point(dense.rotation, tau_end)
+    theta, t_theta = grown(m.theta, m.t_theta, abs(displacement_at(dense.rotation, tau)), t + tau * h)
+    theta, t_theta = grown(theta, t_theta, abs(y_end.theta_b), t_end)
+    tau = turning_point(dense.boulder, tau_end)
+    x_b, t_x_b = grown(m.x_b, m.t_x_b, displacement_at(dense.boulder, tau), t + tau * h)
+    x_b, t_x_b = grown(x_b, t_x_b, y_end.x_b, t_end)
+    tau = turning_point(dense.truck, tau_end)
+    x_v, t_x_v = grown(m.x_v, m.t_x_v, displacement_at(dense.truck, tau), t + tau * h)
+    x_v, t_x_v = grown(x_v, t_x_v, y_end.x_v, t_end)
+    stop = compression_at(state_at(dense, tau), s, c)  # where the truck stops, or at the end
+    deepest, share = highest(start.crush, start.crush_rate, stop.crush, stop.crush_rate, tau * h)
+    crush, t_crush = grown(m.crush, m.t_crush, deepest if dense.truck.x1 > 0.0 else 0.0, t + share * tau * h)
+    end = compression_at(y_end, s, c)
+    u, share = highest(start.u, start.rate, end.u, end.rate, tau_end * h)
+    F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + share * tau_end * h)
     return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v, crush, t_crush)

@@ -22,7 +22,7 @@ class Bracket(NamedTuple):
     f_low: float
     high: float
     f_high: float
-    side: int
+    side: float
     """Which end was moved last: -1 the low one, 1 the high one, 0 none."""
 
 
@@ -30,7 +30,8 @@ class Bracket(NamedTuple):
 def next_guess(b: Bracket) -> float:
     """Where the chord meets zero, or the middle where rounding puts that outside the bracket."""
     tau = b.high - b.f_high * (b.high - b.low) / (b.f_high - b.f_low)
-    return tau if b.low < tau < b.high else 0.5 * (b.low + b.high)
+    inside = (b.low < tau) & (tau < b.high)
+    return tau if inside else 0.5 * (b.low + b.high)
 
 
 @inlined
@@ -39,6 +40,13 @@ def narrowed(b: Bracket, tau: float, f: float) -> Bracket:
 
     An end that stays twice running has its value halved, which pulls the next chord over to it.
     """
-    if (f > 0.0) == (b.f_low > 0.0):
-        return Bracket(tau, f, b.high, 0.5 * b.f_high if b.side < 0 else b.f_high, -1)
-    return Bracket(b.low, 0.5 * b.f_low if b.side > 0 else b.f_low, tau, f, 1)
+    from_below = (f > 0.0) == (b.f_low > 0.0)
+    f_low = 0.5 * b.f_low if b.side > 0.0 else b.f_low
+    f_high = 0.5 * b.f_high if b.side < 0.0 else b.f_high
+    return Bracket(
+        tau if from_below else b.low,
+        f if from_below else f_low,
+        b.high if from_below else tau,
+        f_high if from_below else f,
+        -1.0 if from_below else 1.0,
+    )

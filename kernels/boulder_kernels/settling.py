@@ -72,7 +72,7 @@ def least_soil_energy(slope_x: float, c: Constants) -> float:
     """
     if slope_x == 0.0:
         return 0.0
-    bracket = Bracket(0.0, soil_potential(0.0, slope_x, c).V_A, slope_x, soil_potential(slope_x, slope_x, c).V_A, 0)
+    bracket = Bracket(0.0, soil_potential(0.0, slope_x, c).V_A, slope_x, soil_potential(slope_x, slope_x, c).V_A, 0.0)
     A = 0.0
     for _ in range(PLACING_STEPS):
         A = next_guess(bracket)
@@ -124,7 +124,7 @@ def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     slope_end = end.V_A * direction_A + end.V_X * direction_X + lift
     s = 0.0 if slope >= 0.0 else sin_max
     if slope < 0.0 < slope_end:
-        bracket = Bracket(0.0, slope, sin_max, slope_end, 0)
+        bracket = Bracket(0.0, slope, sin_max, slope_end, 0.0)
         for _ in range(PLACING_STEPS):
             s = next_guess(bracket)
             p = soil_potential(x_max + direction_A * s, direction_X * s, c)

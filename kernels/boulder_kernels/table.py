@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .design import DesignTable, design_at
+from .design import DesignTable, design_in
 from .impact import Control, no_record, simulate_design
 from .lanes import simulate_lanes
-from .outcomes import Outcome, OutcomeTable, Status
+from .outcomes import OutcomeTable, Status, empty_outcomes, write_outcome
 from .readings import Readings
 
 SAFETY = 3.0
@@ -22,51 +22,20 @@ LEAST_ROTATION = 1e-4
 
 
 @kernel
-def empty_outcomes(n: int) -> OutcomeTable:
-    """Return a table for n outcomes, all of them NaN and INVALID until they are written."""
-    return OutcomeTable(
-        np.full(n, Status.INVALID.value, np.int8),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-    )
+def simulate_rows(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
+    """Simulate designs one by one, with any representation of the soil; arguments as of `simulate_lanes`."""
+    out = empty_outcomes(designs.shape[1])
+    for row in range(designs.shape[1]):
+        o = simulate_design(design_in(designs, row), readings, control, no_record())
+        write_outcome(out, row, o.status, o.maxima, o.t_limit, o.t_end)
+    return out
 
 
-@kernel
-def write_outcome(out: OutcomeTable, row: int, o: Outcome) -> None:
-    """Write one outcome into its row; the error columns are left alone."""
-    out.status[row] = o.status
-    out.theta_max[row] = o.maxima.theta
-    out.x_b_max[row] = o.maxima.x_b
-    out.x_v_max[row] = o.maxima.x_v
-    out.F_v_max[row] = o.maxima.F_v
-    out.crush_max[row] = o.maxima.crush
-    out.t_limit[row] = o.t_limit
-    out.t_end[row] = o.t_end
-
-
-@kernel
-def simulate_rows(table: DesignTable, readings: Readings, control: Control, out: OutcomeTable) -> None:
-    """Simulate the designs of a table one by one, with any representation of the soil."""
-    for row in range(table.L.size):
-        write_outcome(out, row, simulate_design(design_at(table, row), readings, control, no_record()))
-
-
-@kernel
 def simulate_once(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate every design of a table once: in lanes where they can be, else one by one."""
-    out = empty_outcomes(table.L.size)
-    if control.elements == 0 and control.stop_at_limit:
-        simulate_lanes(table, readings, control, out)
-    else:
-        simulate_rows(table, readings, control, out)
-    return out
+    simulate = simulate_lanes if control.elements == 0 and control.stop_at_limit else simulate_rows
+    out = simulate(np.stack(table), readings, control)
+    return OutcomeTable(out[0].astype(np.int8), *out[1:])
 
 
 @kernel
@@ -113,7 +82,6 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
         fine.x_error[row] = safety * x
 
 
-@kernel
 def simulate_table(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate every design of a table.
 
@@ -135,17 +103,6 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
     out = simulate_once(table, readings, control)
     if not control.error_estimate:
         return out
-    half = Control(
-        control.h,
-        control.horizon,
-        control.theta_limit,
-        control.elements,
-        control.error_estimate,
-        control.stop_at_limit,
-        control.locate_yield,
-        True,
-        control.longest_horizon,
-    )
-    fine = simulate_once(table, readings, half)
+    fine = simulate_once(table, readings, control._replace(halved=True))
     estimate_errors(out, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)
     return fine

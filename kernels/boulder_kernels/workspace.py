@@ -2,7 +2,8 @@
 
 A loop over lanes is vectorised only where the compiler can see that no store touches a later load. One array with
 constant offsets shows it; separate arrays do not. A field occupies LANES consecutive places, so that neighbouring
-lanes are neighbours in memory. The functions below are the only ones that know where a field lies.
+lanes are neighbours in memory. Several groups of lanes follow each other; a lane is known by the start of its group
+plus its number in it. The functions below are the only ones that know where a field lies.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 from numba.extending import overload
 
-from ._jit import inlined
+from ._jit import function_of, inlined
+from .dense_output import Track
 from .design import Constants
 from .dynamics import Acceleration, State
-from .gaps import GapFactors
+from .gaps import GapFactors, Gaps
 from .modes import Modes, Switches
 from .outcomes import Compression, Maxima
+from .roots import Bracket
 
 LANES = 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
@@ -26,6 +29,10 @@ more of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
 
 KNOWN: dict[str, object] = {"elements": 0} | {name: 0.0 for name in Maxima._fields if name.startswith("t_")}
 """Fields that are not kept: lanes know the closed form of the soil only, and no times of maxima."""
+
+
+GROUPS = 4
+"""Groups of lanes that are stepped in turn, so that those in need of more than a step fill a group of their own."""
 
 
 class Number(NamedTuple):
@@ -36,12 +43,11 @@ class Number(NamedTuple):
 
 _LAYOUT: dict[str, Any] = {
     "constants": Constants,
+    # What a step changes.
     "switches": Switches,
     "factors": GapFactors,
     "state": State,
     "start": Acceleration,
-    "end_state": State,
-    "end": Acceleration,
     "compression": Compression,
     "maxima": Maxima,
     "modes": Modes,
@@ -50,17 +56,42 @@ _LAYOUT: dict[str, Any] = {
     "time": Number,
     "barrier": Number,
     "horizon": Number,
-    "attention": Number,
     "attempts_left": Number,
+    # What the attempt at a step gives.
+    "attention": Number,
+    "end_state": State,
+    "end": Acceleration,
 }
+_EVENT_LAYOUT: dict[str, Any] = {
+    "boulder": Track,
+    "rotation": Track,
+    "truck": Track,
+    "weights": Gaps,
+    "end_gaps": Gaps,
+    "bracket": Bracket,
+    "tau": Number,
+    "open": Number,
+    "event": Number,
+    "moment": Number,
+    "status": Number,
+}
+"""What is known of a step in the group of those that need more: in a second part of the same array."""
+
+
+_ALL = _LAYOUT | _EVENT_LAYOUT
 
 
 def _place(name: str) -> int:
-    names = list(_LAYOUT)
-    return LANES * sum(len(_LAYOUT[before]._fields) for before in names[: names.index(name)])
+    names = list(_ALL)
+    return LANES * sum(len(_ALL[before]._fields) for before in names[: names.index(name)])
 
 
-SIZE = LANES * sum(len(record._fields) for record in _LAYOUT.values())
+SIZE = _place("boulder")
+"""Numbers of one group."""
+EVENTS = GROUPS * SIZE
+"""Where the group of those that need more begins: its lanes are EVENTS ... EVENTS + LANES - 1."""
+WHOLE = EVENTS + LANES * sum(len(record._fields) for record in _ALL.values())
+"""Numbers of all groups."""
 CONSTANTS = _place("constants")
 SWITCHES = _place("switches")
 FACTORS = _place("factors")
@@ -90,7 +121,20 @@ HORIZON = _place("horizon")
 ATTENTION = _place("attention")
 """1.0 where a step cannot simply be accepted."""
 ATTEMPTS_LEFT = _place("attempts_left")
-_RECORDS = {_place(name): record for name, record in _LAYOUT.items()}
+BOULDER, ROTATION, TRUCK = _place("boulder"), _place("rotation"), _place("truck")
+"""The motion within the step."""
+WEIGHTS = _place("weights")
+"""Factors of the gaps in the search for the first event."""
+END_GAPS = _place("end_gaps")
+BRACKET = _place("bracket")
+TAU = _place("tau")
+OPEN = _place("open")
+"""1.0 while the search goes on."""
+EVENT = _place("event")
+MOMENT = _place("moment")
+"""Net moment where the step is cut [N m]."""
+STATUS_OF_LANE = _place("status")
+_RECORDS = {_place(name): record for name, record in _ALL.items()}
 
 
 @inlined
@@ -131,7 +175,7 @@ def _load(ws: Any, place: Any, lane: Any) -> Callable[..., Any]:
         str(KNOWN[name]) if name in KNOWN else f"{kind.__name__}(ws[place + {i * LANES} + lane])"
         for i, (name, kind) in enumerate(get_type_hints(record).items())
     )
-    return _function(f"def written_out(ws, place, lane):\n return Record({', '.join(values)})", record)
+    return function_of(f"def load(ws, place, lane):\n return Record({', '.join(values)})", Record=record)
 
 
 @overload(store, inline="always", strict=False)
@@ -141,10 +185,11 @@ def _store(ws: Any, place: Any, lane: Any, record: Any) -> Callable[..., Any]:
         for i, name in enumerate(record.instance_class._fields)
         if name not in KNOWN
     )
-    return _function("\n".join(("def written_out(ws, place, lane, record):", *lines)), None)
+    return function_of("\n".join(("def store(ws, place, lane, record):", *lines)))
 
 
-def _function(source: str, record: Any) -> Callable[..., Any]:
-    names = {"Record": record}
-    exec(source, names)
-    return names["written_out"]
+@inlined
+def copy_lane(ws: np.ndarray, lane: int, other: int, first: int, end: int) -> None:
+    """Copy the numbers of one lane to another, from a place to before another."""
+    for place in range(first, end, LANES):
+        ws[place + other] = ws[place + lane]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from boulder_kernels import OutcomeTable, Status, simulate_table
-from boulder_kernels.table import empty_outcomes, estimate_errors
+from boulder_kernels.table import estimate_errors
 from boulder_sweep.judge.verdict import Limits, judge
 from docs.studies.coverage import coverages, grid_table, random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
@@ -35,8 +35,8 @@ def test_named_accuracies_keep_their_promises_on_the_grid() -> None:
 
 
 def outcomes(status: list[int], theta: list[float]) -> OutcomeTable:
-    out = empty_outcomes(len(status))
-    out.status[:] = status
+    n = len(status)
+    out = OutcomeTable(np.array(status, np.int8), *(np.full(n, np.nan) for _ in OutcomeTable._fields[1:]))
     for column in (out.theta_max, out.x_b_max, out.x_v_max, out.F_v_max, out.crush_max, out.t_limit, out.t_end):
         column[:] = theta
     return out

@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.after_step import cross_event, keep_up_to_event, rate_of
+from boulder_kernels.after_step import enter_modes, keep_step, rate_of
 from boulder_kernels.dense_output import dense_output
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import State
-from boulder_kernels.gaps import gap_factors
-from boulder_kernels.modes import Modes, switches_of
-from boulder_kernels.outcomes import no_maxima
+from boulder_kernels.events import SHORTEN
+from boulder_kernels.modes import Modes
+from boulder_kernels.outcomes import compression_at, no_maxima
+from boulder_kernels.transitions import change_mode
 
 from .samples import compression
 
@@ -38,24 +39,29 @@ def with_compression(y: State, u: float, c: bk.Constants) -> State:
     return y._replace(x_v=u - compression(y, c))
 
 
-def advance(start: Start, T: float, steps: int, locate_yield: bool = False) -> tuple[np.ndarray, list[int]]:
+def advance(begin: Start, T: float, steps: int, locate_yield: bool = False) -> tuple[np.ndarray, list[int]]:
     """Follow a motion for T [s] by equal steps, cut at events; return its last state and the events met."""
-    c, readings, y, modes = start
-    switches = switches_of(modes, readings, c)
-    factors = gap_factors(modes, c, NO_LIMIT, locate_yield)
+    c, readings, y, modes = begin
+    switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, c)
     k = rate_of(y, switches, c)
     t, met = 0.0, []
     h_full = T / steps
+    h_next = h_full
     while T - t > 1e-12 * T:
-        h = min(h_full, T - t)
+        h = min(h_next, T - t)
         y_end, k_end = step(y, k, h, switches, c)
-        dense = dense_output(y, k, y_end, k_end, h)
-        event, tau, y, _ = keep_up_to_event(t, h, y, k.M, y_end, k_end.M, dense, factors, switches, no_maxima(), c)
-        t += tau * h
-        k = k_end
-        if event >= 0:
-            met.append(event)
-            y, modes, switches, factors, k = cross_event(event, y, modes, switches, readings, NO_LIMIT, locate_yield, c)
+        dense, start = dense_output(y, k, y_end, k_end, h), compression_at(y, switches, c)
+        kept = keep_step(t, y, k.M, y_end, k_end.M, start, no_maxima(), dense, factors, switches, locate_yield, c)
+        if kept.event == SHORTEN:
+            h_next = kept.tau * h
+            continue
+        t += kept.tau * h
+        h_next, y, k = h_full, kept.y, k_end
+        if kept.event >= 0:
+            met.append(int(kept.event))
+            y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
+            switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, c)
+            k = rate_of(y, switches, c)
     return np.array(y), met
 
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels.lanes import attempt_steps, take_over_steps
-from boulder_kernels.workspace import SIZE
+from boulder_kernels.lane_events import begin_searches, keep_steps, search_on, start_steps
+from boulder_kernels.lanes import attempt_steps, simulate_lanes, take_over_steps
+from boulder_kernels.workspace import SIZE, WHOLE
 
 from .samples import control, random_designs, table_of
 
@@ -90,6 +91,26 @@ def test_taking_over_is_vectorised(take_over_code: str) -> None:
         assert found[f"fma {register}"] > 20
 
 
+SEARCHES = {
+    begin_searches: (False,),
+    search_on: (),
+    keep_steps: (),
+    start_steps: (),
+}
+
+
+@pytest.mark.parametrize("kernel", SEARCHES, ids=lambda kernel: kernel.__name__)
+def test_events_are_vectorised(kernel) -> None:
+    """Searches for events, peaks and fresh accelerations: whole registers, next to nothing for one lane at a time."""
+    code = assembly(kernel, np.zeros(WHOLE), *SEARCHES[kernel])
+    assert not CALL.search(code)
+    found, register = widths(code), widest()
+    if register and register != "xmm":
+        packed = sum(count for name, count in found.items() if name.endswith(register))
+        assert packed > 100
+        assert len(SCALAR.findall(code)) < packed / 10
+
+
 def test_wide_vectors_are_asked_for() -> None:
     """On processors that have them, unless the user has said otherwise."""
     if llvmlite.binding.get_host_cpu_features().get("avx512f") and numba.config.CPU_NAME is None:
@@ -100,6 +121,6 @@ def test_kernels_leave_the_interpreter_lock_free() -> None:
     """All kernels are compiled without the interpreter: they run side by side in threads."""
     table = table_of(random_designs(2, seed=141))
     bk.simulate_table(table, bk.corrected(), control(8e-3, 0.1, 0.3, stop_at_limit=True))
-    assert len(bk.simulate_table.nopython_signatures) == len(bk.simulate_table.signatures) > 0
-    for kernel in (bk.simulate_table, bk.simulate_design, attempt_steps, take_over_steps):
+    assert len(simulate_lanes.nopython_signatures) == len(simulate_lanes.signatures) > 0
+    for kernel in (simulate_lanes, bk.simulate_design, attempt_steps, take_over_steps):
         assert kernel.targetoptions["nogil"]

@@ -22,7 +22,7 @@ import boulder_kernels as bk
 boulder, soil, truck = (1.65, 1.68, 3.44, 2596.0), (1859.9, 0.754, 95.0, 1.0), (6722.0, 14.5, 3103.3e3, 138.91e3)
 table = bk.DesignTable(*(np.array([x]) for x in (*boulder, 2.03, 0.938, *soil, *truck, 0.5)))
 found = bk.simulate_table(table, bk.corrected(), bk.Control(8e-3, 0.5, 0.35, 0, False))
-stats = bk.simulate_table.stats
+stats = bk.table.simulate_lanes.stats
 print(found.theta_max[0].hex(), sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
 

@@ -1,0 +1,209 @@
+"""Steps that need more than to be accepted, side by side in a group of lanes of their own.
+
+Lanes whose steps met an event, set a peak or reached the end are copied into this group. The search for the first event
+goes on until it has closed in all of them; a lane in which it has closed is left alone meanwhile, so that its result
+does not depend on its neighbours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._jit import inlined, kernel
+from .after_step import RUNNING, Ending, Kept, at_limit, decide, enter_modes, is_finite, kept_up_to, rate_of
+from .dense_output import DenseOutput, dense_output
+from .events import (
+    NONE,
+    SHORTEN,
+    begin_search,
+    first_event,
+    gaps_within,
+    go_on_searching,
+    least_gap,
+    tolerance_of,
+    weights_of,
+)
+from .gaps import gaps_at
+from .outcomes import Status, compression_at
+from .readings import Readings
+from .roots import ITERATIONS
+from .transitions import change_mode
+from .workspace import (
+    ATTEMPTS_LEFT,
+    BARRIER,
+    BOULDER,
+    BRACKET,
+    COMPRESSION,
+    CONSTANTS,
+    END,
+    END_GAPS,
+    END_STATE,
+    EVENT,
+    FACTORS,
+    HORIZON,
+    LANES,
+    MAXIMA,
+    MODES,
+    MOMENT,
+    OPEN,
+    ROTATION,
+    START,
+    STATE,
+    STEP,
+    STEP_FULL,
+    SWITCHES,
+    TAU,
+    TIME,
+    TRUCK,
+    WEIGHTS,
+    field,
+    load,
+    put,
+    store,
+)
+
+
+@inlined
+def motion_within(ws: np.ndarray, lane: int) -> DenseOutput:
+    """Motion within the step of a lane."""
+    return DenseOutput(field(ws, STEP, lane), load(ws, BOULDER, lane), load(ws, ROTATION, lane), load(ws, TRUCK, lane))
+
+
+@kernel
+def begin_searches(ws: np.ndarray, locate_yield: bool) -> None:
+    """Work out the motion within every step, and begin the search for its first event."""
+    for lane in range(LANES):
+        c, g = load(ws, CONSTANTS, lane), load(ws, FACTORS, lane)
+        y, k = load(ws, STATE, lane), load(ws, START, lane)
+        y_end, k_end = load(ws, END_STATE, lane), load(ws, END, lane)
+        dense = dense_output(y, k, y_end, k_end, field(ws, STEP, lane))
+        end = gaps_at(y_end, k_end.M, g, c)
+        weights = weights_of(end, dense, g, locate_yield, c)
+        b, tau, searching = begin_search(gaps_at(y, k.M, g, c), weights, tolerance_of(g))
+        store(ws, BOULDER, lane, dense.boulder)
+        store(ws, ROTATION, lane, dense.rotation)
+        store(ws, TRUCK, lane, dense.truck)
+        store(ws, END_GAPS, lane, end)
+        store(ws, WEIGHTS, lane, weights)
+        store(ws, BRACKET, lane, b)
+        put(ws, TAU, lane, tau)
+        put(ws, OPEN, lane, 1.0 if searching else 0.0)
+
+
+@kernel
+def search_on(ws: np.ndarray) -> None:
+    """Narrow the bracket of every search that is open."""
+    for lane in range(LANES):
+        c, s, g = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane), load(ws, FACTORS, lane)
+        tau = field(ws, TAU, lane)
+        weights = load(ws, WEIGHTS, lane)
+        least, _ = least_gap(gaps_within(tau, motion_within(ws, lane), g, s, c), weights)
+        b, following, searching = go_on_searching(load(ws, BRACKET, lane), tau, least, tolerance_of(g))
+        if field(ws, OPEN, lane) != 0.0:
+            store(ws, BRACKET, lane, b)
+            put(ws, TAU, lane, following)
+            put(ws, OPEN, lane, 1.0 if searching else 0.0)
+
+
+@kernel
+def is_open(ws: np.ndarray, count: int) -> bool:
+    """Whether a search is open in one of the first lanes."""
+    searches = 0.0
+    for lane in range(count):
+        searches += field(ws, OPEN, lane)
+    return searches > 0.0
+
+
+@kernel
+def keep_steps(ws: np.ndarray) -> None:
+    """Keep every step up to its first event; the state kept takes the place of that at the end of the step."""
+    for lane in range(LANES):
+        c, s = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane)
+        dense, start = motion_within(ws, lane), load(ws, COMPRESSION, lane)
+        event, tau = first_event(
+            load(ws, BRACKET, lane),
+            field(ws, TAU, lane),
+            load(ws, WEIGHTS, lane),
+            load(ws, END_GAPS, lane),
+            dense,
+            load(ws, FACTORS, lane),
+            s,
+            c,
+        )
+        y_end, m = load(ws, END_STATE, lane), load(ws, MAXIMA, lane)
+        kept = kept_up_to(event, tau, field(ws, TIME, lane), y_end, start, m, dense, s, c)
+        put(ws, EVENT, lane, kept.event)
+        put(ws, TAU, lane, kept.tau)
+        put(ws, MOMENT, lane, rate_of(kept.y, s, c).M)
+        store(ws, END_STATE, lane, kept.y)
+        store(ws, MAXIMA, lane, kept.m)
+
+
+@kernel
+def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, locate_yield: bool) -> int:
+    """Decide what follows from the step of a lane, and go over into the modes that follow its event.
+
+    Returns
+    -------
+    int
+        RUNNING, or the status with which the simulation ended; time and maxima are left in the lane.
+    """
+    y = load(ws, END_STATE, lane)
+    if not is_finite(y):
+        return Status.UNSTABLE.value
+    if field(ws, ATTEMPTS_LEFT, lane) <= 0.0:
+        return Status.STEP_BUDGET.value
+    put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
+    event, tau, h = field(ws, EVENT, lane), field(ws, TAU, lane), field(ws, STEP, lane)
+    if event == SHORTEN:
+        return RUNNING
+    c, g, m = load(ws, CONSTANTS, lane), load(ws, FACTORS, lane), load(ws, MAXIMA, lane)
+    kept = Kept(event, tau, y, m)
+    decided = decide(
+        field(ws, TIME, lane),
+        h,
+        load(ws, STATE, lane),
+        kept,
+        field(ws, BARRIER, lane),
+        field(ws, HORIZON, lane),
+        ending,
+        c,
+    )
+    put(ws, TIME, lane, decided.t)
+    put(ws, BARRIER, lane, decided.barrier)
+    put(ws, HORIZON, lane, decided.horizon)
+    put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), decided.horizon - decided.t))
+    if decided.status == Status.LIMIT.value:
+        store(ws, MAXIMA, lane, at_limit(m, decided.t, g.limit))
+    if event > NONE and decided.status == RUNNING:
+        y, modes = change_mode(int(event), y, field(ws, MOMENT, lane), load(ws, MODES, lane), c)
+        switches, factors = enter_modes(modes, readings, g.limit, locate_yield, c)
+        store(ws, MODES, lane, modes)
+        store(ws, SWITCHES, lane, switches)
+        store(ws, FACTORS, lane, factors)
+    store(ws, STATE, lane, y)
+    return decided.status
+
+
+@kernel
+def start_steps(ws: np.ndarray) -> None:
+    """Work out what every next step starts with: its acceleration, anew after an event, and its compression."""
+    for lane in range(LANES):
+        c, s = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane)
+        y, k_end = load(ws, STATE, lane), load(ws, END, lane)
+        fresh = rate_of(y, s, c)
+        crossed = field(ws, EVENT, lane) > NONE
+        k = fresh if crossed else k_end
+        store(ws, START, lane, k)
+        store(ws, COMPRESSION, lane, compression_at(y, s, c))
+
+
+@kernel
+def work_out(ws: np.ndarray, count: int, locate_yield: bool) -> None:
+    """Find what is kept of the steps in the first lanes of the group."""
+    begin_searches(ws, locate_yield)
+    for _ in range(ITERATIONS):
+        if not is_open(ws, count):
+            break
+        search_on(ws)
+    keep_steps(ws)
