@@ -25,11 +25,12 @@ from boulder_kernels import (
     simulate_design,
 )
 from boulder_kernels._jit import inlined, kernel
-from boulder_kernels.design import design_at
+from boulder_kernels.design import design_in
 from boulder_kernels.dynamics import State, acceleration
 from boulder_kernels.energy import stored_energies
 from boulder_kernels.modes import Modes, switches_of
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors, write_outcome
+from boulder_kernels.outcomes import write_outcome
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
 
 DESIGN = Design._fields
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
@@ -98,18 +99,18 @@ def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at:
     """
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, estimated = readings_from(s), s[9] > 0.0
-    table = table_from(carray(designs_at, (15, n)))
-    fine, coarse = outcomes_from(carray(fine_at, (10, n))), outcomes_from(carray(coarse_at, (10, n)))
+    designs, finer, coarser = carray(designs_at, (15, n)), carray(fine_at, (10, n)), carray(coarse_at, (10, n))
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)))
     for row in range(n):
-        design = design_at(table, row)
-        fine.theta_error[row] = fine.x_error[row] = np.nan
-        write_outcome(fine, row, simulate_design(design, readings, control_from(s, estimated), record))
+        design = design_in(designs, row)
+        finer[:, row] = np.nan
+        write_outcome(finer, row, simulate_design(design, readings, control_from(s, estimated), record))
         if estimated:
-            write_outcome(coarse, row, simulate_design(design, readings, control_from(s, False), record))
+            write_outcome(coarser, row, simulate_design(design, readings, control_from(s, False), record))
     if not estimated:
         return
+    table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
     estimate_errors(coarse, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)
     for row in range(n):
         # A simulation that goes on beyond the limit does not tell by its status that it got there.
@@ -158,7 +159,7 @@ def history(
     """
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, control = readings_from(s), control_from(s, s[9] > 0.0)
-    design = design_at(table_from(carray(design_from, (15, 1))), 0)
+    design = design_in(carray(design_from, (15, 1)), 0)
     out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
     record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], carray(exchanged_at, (n, 4)))
     out[:] = np.nan

@@ -21,6 +21,7 @@ from .lane_events import conclude, start_steps, work_out
 from .outcomes import (
     STATUS,
     Maxima,
+    Outcome,
     Status,
     compression_at,
     compression_of,
@@ -210,7 +211,7 @@ def write_lane(ws: np.ndarray, lane: int, status: int, out: np.ndarray, row: int
         out[STATUS, row] = status
     else:
         t_limit = t if status == Status.LIMIT.value else np.nan
-        write_outcome(out, row, status, load(ws, MAXIMA, lane), t_limit, t)
+        write_outcome(out, row, Outcome(status, load(ws, MAXIMA, lane), t_limit, t, 0))
 
 
 @kernel

@@ -141,16 +141,16 @@ def empty_outcomes(n: int) -> np.ndarray:
 
 
 @kernel
-def write_outcome(out: np.ndarray, row: int, status: int, m: Maxima, t_limit: float, t_end: float) -> None:
+def write_outcome(out: np.ndarray, row: int, o: Outcome) -> None:
     """Write one outcome into the array of `empty_outcomes`; the rows of errors are left alone."""
-    out[STATUS, row] = status
-    out[THETA_MAX, row] = m.theta
-    out[X_B_MAX, row] = m.x_b
-    out[X_V_MAX, row] = m.x_v
-    out[F_V_MAX, row] = m.F_v
-    out[CRUSH_MAX, row] = m.crush
-    out[T_LIMIT, row] = t_limit
-    out[T_END, row] = t_end
+    out[STATUS, row] = o.status
+    out[THETA_MAX, row] = o.maxima.theta
+    out[X_B_MAX, row] = o.maxima.x_b
+    out[X_V_MAX, row] = o.maxima.x_v
+    out[F_V_MAX, row] = o.maxima.F_v
+    out[CRUSH_MAX, row] = o.maxima.crush
+    out[T_LIMIT, row] = o.t_limit
+    out[T_END, row] = o.t_end
 
 
 @kernel

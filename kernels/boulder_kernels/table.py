@@ -26,8 +26,7 @@ def simulate_rows(designs: np.ndarray, readings: Readings, control: Control) -> 
     """Simulate designs one by one, with any representation of the soil; arguments as of `simulate_lanes`."""
     out = empty_outcomes(designs.shape[1])
     for row in range(designs.shape[1]):
-        o = simulate_design(design_in(designs, row), readings, control, no_record())
-        write_outcome(out, row, o.status, o.maxima, o.t_limit, o.t_end)
+        write_outcome(out, row, simulate_design(design_in(designs, row), readings, control, no_record()))
     return out
 
 
