@@ -34,7 +34,6 @@ YIELD_BASE = 6
 """The same at the base of the boulder."""
 LIMIT = 7
 """The rotation reaches the limit."""
-EVENTS = 8
 
 NEVER = 1e300
 """Gap of an event that cannot happen in the present mode."""
