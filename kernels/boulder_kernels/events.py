@@ -265,7 +265,8 @@ def first_event(
     event = float(SHORTEN) if kink else (float(YIELD_TOP) if yields else event)
     tau = min(BEYOND * tau, 1.0) if kink else tau
     top = turning_point(dense.rotation, 1.0)
-    over = (abs(displacement_at(dense.rotation, top)) >= g.limit) & (end.limit >= 0.0) & (top < tau)
+    # As printed the event is the turning point itself, found with another rounding.
+    over = (abs(displacement_at(dense.rotation, top)) >= g.limit) & (end.limit >= 0.0) & (top < tau + 1e-9)
     event, tau = float(LIMIT) if over else event, limit_before(top, g, dense) if over else tau
     return event, tau
 
