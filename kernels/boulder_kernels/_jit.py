@@ -10,7 +10,7 @@
     occur: a state that has become non-finite must be seen and reported. Sums are reordered in one place
     only (`summing_kernel`), so a design gives the same bits wherever in a block it is computed.
 ``no_cfunc_wrapper``
-    Nothing calls a kernel from C; a wrapper for it would take a tenth of the time to compile.
+    Nothing calls a kernel from C, and wrappers for that would have to be compiled, too.
 ``cache``
     Compiled code is kept in a folder named by a hash of all kernel sources, because a cached function does
     not notice that a function it calls has changed in another file. Only a folder that nobody else can write is used.
