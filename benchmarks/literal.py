@@ -14,7 +14,7 @@ import numpy as np
 
 from boulder_kernels import Constants, DesignTable, Readings
 from boulder_kernels.dense_output import Track, displacement_at, slope_at, track
-from boulder_kernels.design import constants_of, design_at
+from boulder_kernels.design import constants_of, design_in
 from boulder_kernels.dynamics import Acceleration, State
 from boulder_kernels.restoring import holding_moment
 from boulder_kernels.soil import soil_kinematics, soil_reaction
@@ -139,6 +139,18 @@ def literal_maxima(
 
 
 @_compiled
+def _literal_maxima(
+    designs: np.ndarray, readings: Readings, h: float, t_end: np.ndarray, theta_limit: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Do the work of `literal_table` on an array, shape (15, n)."""
+    n = designs.shape[1]
+    theta, x_b, x_v = np.zeros(n), np.zeros(n), np.zeros(n)
+    for row in range(n):
+        c = constants_of(design_in(designs, row), readings, 0)
+        theta[row], x_b[row], x_v[row] = literal_maxima(c, readings, h, t_end[row], theta_limit)
+    return theta, x_b, x_v
+
+
 def literal_table(
     table: DesignTable, readings: Readings, h: float, t_end: np.ndarray, theta_limit: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -157,9 +169,4 @@ def literal_table(
     theta_limit
         Rotation at which a simulation ends [rad].
     """
-    n = table.L.size
-    theta, x_b, x_v = np.zeros(n), np.zeros(n), np.zeros(n)
-    for row in range(n):
-        c = constants_of(design_at(table, row), readings, 0)
-        theta[row], x_b[row], x_v[row] = literal_maxima(c, readings, h, t_end[row], theta_limit)
-    return theta, x_b, x_v
+    return _literal_maxima(np.stack(table), readings, h, t_end, theta_limit)

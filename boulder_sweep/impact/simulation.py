@@ -22,7 +22,8 @@ from boulder_kernels import (
     simulate_design,
 )
 from boulder_kernels.design import design_at
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, empty_outcomes, estimate_errors, write_outcome
+from boulder_kernels.outcomes import empty_outcomes, write_outcome
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
@@ -217,7 +218,7 @@ def _outcome_row(outcome: Outcome) -> OutcomeTable:
     """Return one outcome as a table of one row, without an estimate of its error."""
     row = empty_outcomes(1)
     write_outcome(row, 0, outcome)
-    return row
+    return OutcomeTable(row[0].astype(np.int8), *row[1:])
 
 
 def _estimate(row: OutcomeTable, coarser: OutcomeTable, table: DesignTable, how: Readings) -> None:
