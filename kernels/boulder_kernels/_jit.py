@@ -100,6 +100,8 @@ def _own_folder(folder: Path) -> Path:
     folder = Path(os.path.realpath(folder))
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
     for place in reversed(missing):
+        if not place.parent.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{place.parent} is not a folder")
         place.mkdir(mode=0o700, exist_ok=True)
     for place in (folder, *folder.parents):
         found = place.lstat()
