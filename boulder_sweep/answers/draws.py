@@ -11,6 +11,7 @@ from scipy.special import ndtr
 
 from boulder_sweep.answers.trials import Judges, Rows
 from boulder_sweep.designs import block_of
+from boulder_sweep.judge.judged import UNDECIDED
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.spread import Spread
@@ -118,7 +119,8 @@ class Draws:
 def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:
     margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
     found = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
-    # On a limit, or undecided: neither on the side of passing.
+    # On a limit, or undecided: neither on the side of passing. An undecided row may have no margin.
+    found = np.where(np.isnan(margin) & (judged.verdict == UNDECIDED), 0.0, found)
     smallest = np.finfo(float).tiny
     return np.where(judges.holds(judged), np.maximum(found, smallest), np.minimum(found, -smallest))
 
