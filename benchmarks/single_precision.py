@@ -42,8 +42,11 @@ ORDER = (
     "lanes",
 )
 CHANGES = {
-    # Its square must not be zero.
-    "soil": (("TINY = 1e-30", "TINY = 1e-15"), ("    if c.elements > 0:\n        return element_sums(k, c)\n", "")),
+    "soil": (
+        ("TINY = 1e-30", "TINY = 1e-15"),  # its square must not be zero
+        ("    if c.elements > 0:\n        return element_sums(k, c)\n", ""),
+        ("    if c.elements > 0:\n        return summed_potential(A, slope_x, c)\n", ""),
+    ),
     "workspace": (("LANES = 8", "LANES = 16"),),
     "lanes": (("np.zeros(WHOLE)", "np.zeros(WHOLE, np.float32)"),),
 }

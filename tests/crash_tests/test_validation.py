@@ -154,7 +154,7 @@ def test_command_overlays_measured_data(sweep: Command, tmp_path: Path) -> None:
     [
         (["--measured", "x.csv"], "go together"),
         (["--case", "rwg"], "go together"),
-        (["--measured", "missing.csv", "--case", "rwg"], "cannot be read"),
+        (["--measured", "missing.csv", "--case", "rwg"], "there is no such file"),
         (["--measured", "film.csv", "--case", "missing.yaml"], "missing.yaml"),
         (["--measured", "film.csv", "--case", "m30"], "holds 107,008 designs"),
     ],
