@@ -44,7 +44,7 @@ def test_the_main_job_counts_what_the_readme_shows(m30: tuple[Path, str]) -> Non
 
 
 def test_the_first_answer() -> None:
-    assert sweep("need", "configs/site.yaml").rstrip() == marked("need")
+    assert sweep("need", "configs/site.yaml", "--margin", "25%").rstrip() == marked("need")
 
 
 def test_the_number_of_designs(m30: tuple[Path, str]) -> None:
