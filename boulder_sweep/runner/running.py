@@ -42,6 +42,8 @@ Report = Callable[[Progress], None]
 _LOOK_EVERY_S = 0.1
 _PATIENCE_S = 0.6
 """How long an interrupted run waits for what is being written."""
+_PATIENCE_AFTER_PROBLEM_S = 6.0
+"""The same for a run stopped by a problem: nobody waits, and no worker should still write into a folder given up."""
 
 
 class Run:
@@ -101,16 +103,17 @@ class Run:
             else:
                 workers.start()
             self._coordinate(workers, committer, progress)
-        except BaseException:
+        except BaseException as stop:
+            patience = _PATIENCE_S if isinstance(stop, KeyboardInterrupt) else _PATIENCE_AFTER_PROBLEM_S
             if workers is not None:
                 workers.stop()
-                workers.join(_PATIENCE_S / 3)
+                workers.join(patience / 3)
                 while not workers.messages.empty():  # parts written meanwhile
                     message = workers.messages.get()
                     if isinstance(message, StagedPart):
                         committer.put(message)
             committer.stop()
-            committer.join(_PATIENCE_S)
+            committer.join(patience)
             raise
 
     def end(self, how: str) -> int:

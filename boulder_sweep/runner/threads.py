@@ -54,6 +54,17 @@ class ThreadWorkers(threading.Thread):
         self._assembly = assembly
         self._folder = folder
         self._stopped = threading.Event()
+        self._in_progress = 0
+        self._changed = threading.Condition()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait until everything has ended, blocks in progress included, but not longer than twice the timeout [s].
+
+        joblib does not wait for its threads when one of them has raised.
+        """
+        super().join(timeout)
+        with self._changed:
+            self._changed.wait_for(lambda: self._in_progress == 0, timeout)
 
     def stop(self) -> None:
         """Hand out no more blocks; those in progress are dropped."""
@@ -99,6 +110,16 @@ class ThreadWorkers(threading.Thread):
 
     def _compute(self, start: int, stop: int) -> int:
         """Compute a block, and write the parts it completes; return the number of rows."""
+        with self._changed:
+            self._in_progress += 1
+        try:
+            return self._computed(start, stop)
+        finally:
+            with self._changed:
+                self._in_progress -= 1
+                self._changed.notify_all()
+
+    def _computed(self, start: int, stop: int) -> int:
         if self._stopped.is_set():
             return 0
         judged = self._computation.judged(start, stop)
