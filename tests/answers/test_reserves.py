@@ -42,7 +42,9 @@ def test_a_design_passes_at_what_it_withstands_and_not_beyond(column: str, own: 
     assert len(there) > 100
     assert passes(there, **{own: there[column].to_numpy()}).all()
     inside = there[~np.isclose(there[column], ends[0]) & ~np.isclose(there[column], ends[1])]
-    assert not passes(inside, **{own: inside[column].to_numpy() + worse}).any()
+    # The very value that was judged: a boulder that rocks near its limit for long may turn over by the last bit.
+    beside = np.round((inside[column].to_numpy() + worse) / abs(worse)) / round(1.0 / abs(worse))
+    assert not passes(inside, **{own: beside}).any()
     assert (frame[frame.verdict == "pass"][column].notna()).all()
 
 
