@@ -74,7 +74,9 @@ def taken() -> tuple[str, ...]:
 
 
 def in_site(name: str) -> str:
-    """Return the place in the site of a file of the repository."""
+    """Return the place in the site of a file of the repository; notebooks become pages."""
+    if name.startswith("notebooks/"):
+        name = name.replace(".ipynb", ".md")
     return RENAMED.get(name, name.removeprefix("docs/"))
 
 

@@ -85,7 +85,9 @@ def curvature_at(q: Track, tau: float) -> float:
 @exact_inlined
 def closer(q: Track, tau: float, tau_end: float) -> float:
     """One step of Newton's method to the zero of a velocity, within 0 ... tau_end."""
-    return min(max(tau - slope_at(q, tau) / curvature_at(q, tau), 0.0), tau_end)
+    curvature = curvature_at(q, tau)
+    ahead = slope_at(q, tau) / curvature if curvature != 0.0 else 0.0
+    return min(max(tau - ahead, 0.0), tau_end)
 
 
 @exact_inlined
@@ -95,7 +97,7 @@ def turning_point(q: Track, tau_end: float) -> float:
     Three steps from the chord: the velocity bends little within a step, and what is left counts by its square.
     """
     end = slope_at(q, tau_end)
-    tau = tau_end * q.x1 / (q.x1 - end)
+    tau = tau_end * q.x1 / (q.x1 - end) if q.x1 != end else tau_end
     tau = closer(q, closer(q, closer(q, tau, tau_end), tau_end), tau_end)
     return tau if q.x1 * end < 0.0 else tau_end
 

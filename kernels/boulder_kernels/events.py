@@ -186,7 +186,7 @@ def newton(
     slope = slope_at(dense.rotation, tau)
     value = a_0 + a_theta * displacement_at(dense.rotation, tau) + a_omega * per_second * slope
     change = a_theta * slope + a_omega * per_second * curvature_at(dense.rotation, tau)
-    return min(max(tau - value / change, low), high)
+    return min(max(tau - (value / change if change != 0.0 else 0.0), low), high)
 
 
 @inlined
@@ -219,7 +219,7 @@ def limit_before(top: float, g: GapFactors, dense: DenseOutput) -> float:
     theta = displacement_at(dense.rotation, top)
     side = 1.0 if theta > 0.0 else -1.0
     beyond, bend = abs(theta) - g.limit, abs(curvature_at(dense.rotation, top))
-    tau = max(top - math.sqrt(max(2.0 * beyond / bend, 0.0)), 0.0)
+    tau = max(top - math.sqrt(max(2.0 * beyond / bend if bend > 0.0 else 0.0, 0.0)), 0.0)
     tau = newton(tau, 0.0, top, g.limit, -side, 0.0, dense)
     tau = newton(tau, 0.0, top, g.limit, -side, 0.0, dense)
     return newton(tau, 0.0, top, g.limit, -side, 0.0, dense)
