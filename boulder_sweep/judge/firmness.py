@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 DESIGNS = 2048
 """Designs of the sample, with the soil in closed form; the steps of `balanced` and their error take 0.1 s."""
+FEWEST_DESIGNS = 1024
+"""And at least, where the sweep has so many."""
+SHARE = 50
+"""The sample is no more than one in so many designs of the sweep, so that it stays a small part of the run."""
 SHORTEST_STEP_S = 1e-3
 """Where steps are shorter, the sample for the numerical error is smaller in proportion."""
 ANGLE_DEG = 1.0
@@ -75,16 +79,15 @@ class Firmness:
         return asdict(self)
 
 
-def firmness_of(sweep: Sweep, count: int = DESIGNS) -> Firmness:
-    """Find out how firm the verdicts of a sweep are.
+def firmness_of(sweep: Sweep) -> Firmness:
+    """Find out how firm the verdicts of a sweep are, from a sample of its designs.
 
     Parameters
     ----------
     sweep
         The sweep.
-    count
-        Designs of the sample, about.
     """
+    count = min(DESIGNS, max(FEWEST_DESIGNS, sweep.n_designs // SHARE))
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     designs, limits = sampled_designs(sweep, count), evaluation.limits
     control, readings = evaluation.control._replace(elements=0), evaluation.readings

@@ -50,7 +50,7 @@ class ClaimedFolder:
         manifest
             Describes the run, without parts.
         session
-            Describes this session.
+            When, where and by which command the run was started.
 
         Raises
         ------
