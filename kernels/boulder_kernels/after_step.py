@@ -14,12 +14,15 @@ from .dense_output import DenseOutput, state_at
 from .design import Constants
 from .dynamics import Acceleration, State, acceleration
 from .events import begin_search, first_event, gaps_within, go_on_searching, least_gap, tolerance_of, weights_of
-from .gaps import LIMIT, GapFactors, gap_factors, gaps_at
+from .gaps import LIMIT, GapFactors, gap_factors, gaps_at, gaps_of
 from .modes import Modes, Switches, switches_of
-from .outcomes import Compression, Maxima, Status, updated_maxima
+from .outcomes import Compression, Maxima, Status, compression_of, grown, highest, updated_maxima
 from .readings import Readings
+from .restoring import signed_arm
 from .roots import ITERATIONS
 from .settling import barrier_energy, boulder_energy, inside_maxima, stays_below
+from .soil import soil_kinematics
+from .trigonometry import sine_versine
 
 RUNNING = -1
 """Status of a simulation that has not ended."""
@@ -100,6 +103,69 @@ def horizon_status(y: State, m: Maxima, ending: Ending, c: Constants) -> int:
 def turned_back(y: State, y_end: State) -> bool:
     """Whether a motion that is reported changed its direction in a step, so that its maximum may now be final."""
     return y.omega_b * y_end.omega_b < 0.0 or y.v_b > 0.0 >= y_end.v_b or y.v_v > 0.0 >= y_end.v_v
+
+
+@inlined
+def passes(
+    y: State, y_end: State, k_end: Acceleration, g: GapFactors, switches: Switches, c: Constants
+) -> tuple[bool, Compression]:
+    """Whether a step meets no event and turns nowhere, so that it may be kept as it is; and the compression at its end.
+
+    Parameters
+    ----------
+    y, y_end, k_end
+        States at its ends, and the acceleration at its end. A comparison with NaN is false, so a step to a state that
+        is not a number does not pass.
+    g, switches, c
+        The step.
+    """
+    sin, versin = sine_versine(y_end.theta_b)
+    end = compression_of(y_end, sin, versin, switches, c)
+    k = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
+    arm = signed_arm(sin, versin, c)
+    gaps = gaps_of(k.A, k.slope_x, y_end.theta_b, y_end.omega_b, end.u, k_end.M, arm, g)
+    plain = (
+        (gaps.contact >= 0.0)
+        & (gaps.rotation >= 0.0)
+        & (gaps.couple >= 0.0)
+        & (gaps.corner >= 0.0)
+        & (gaps.arm >= 0.0)
+        & (gaps.top >= 0.0)
+        & (gaps.base >= 0.0)
+        & (gaps.limit >= 0.0)
+        & (y.omega_b * y_end.omega_b >= 0.0)
+        & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
+        & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
+    )
+    return plain, end
+
+
+@inlined
+def passed_maxima(
+    m: Maxima, t: float, h: float, y: State, y_end: State, start: Compression, end: Compression, switches: Switches
+) -> Maxima:
+    """Maxima after a step that passes: what is reported grows or falls all through it, but for force and crush.
+
+    Parameters
+    ----------
+    m
+        Maxima before it.
+    t, h
+        Its start and its length [s].
+    y, y_end, start, end
+        States and compressions at its ends.
+    switches
+        Factors of its modes.
+    """
+    t_end = t + h
+    theta, t_theta = grown(m.theta, m.t_theta, abs(y_end.theta_b), t_end)
+    x_b, t_x_b = grown(m.x_b, m.t_x_b, y_end.x_b, t_end)
+    x_v, t_x_v = grown(m.x_v, m.t_x_v, y_end.x_v, t_end)
+    u, share = highest(start.u, start.rate, end.u, end.rate, h)
+    F_v, t_F_v = grown(m.F_v, m.t_F_v, switches.k_contact * u, t + share * h)
+    deepest, share = highest(start.crush, start.crush_rate, end.crush, end.crush_rate, h)
+    crush, t_crush = grown(m.crush, m.t_crush, deepest if y.v_v > 0.0 else 0.0, t + share * h)
+    return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v, crush, t_crush)
 
 
 @inlined

@@ -8,7 +8,21 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .after_step import RUNNING, Ending, at_limit, decide, enter_modes, initial_state, is_finite, keep_step, rate_of
+from .after_step import (
+    RUNNING,
+    Decided,
+    Ending,
+    Kept,
+    at_limit,
+    decide,
+    enter_modes,
+    initial_state,
+    is_finite,
+    keep_step,
+    passed_maxima,
+    passes,
+    rate_of,
+)
 from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
@@ -17,7 +31,7 @@ from .events import NONE, SHORTEN, locate_limit
 from .modes import Modes, Switches
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
 from .readings import Readings
-from .settling import NO_PROOF, proof_is_possible
+from .settling import NO_PROOF, boulder_energy, proof_is_possible
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
 from .transitions import change_mode, initial_modes
 
@@ -204,7 +218,7 @@ def simulate_by_steps(
     budget = attempt_budget(h_full, ending.longest)
     y, modes = initial_state(c), initial_modes(readings, c)
     switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
-    k1 = rate_of(y, switches, c)
+    k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
     m = no_maxima()
     exchanged = nothing_exchanged()
     recording = record.times.size > 0
@@ -217,31 +231,41 @@ def simulate_by_steps(
         attempts += 1
         h = min(h_next, horizon - t)
         y_end, k_end = step(y, k1, h, switches, c)
-        if not is_finite(y_end):
+        passing, end = passes(y, y_end, k_end, factors, switches, c)
+        # Where nothing proves that the motion may end, there is no energy to compare.
+        provable = barrier > NO_PROOF and y_end.v_v <= 0.0
+        if passing and h < horizon - t and not (provable and not boulder_energy(y_end, c) >= barrier):
+            kept = Kept(float(NONE), 1.0, y_end, passed_maxima(m, t, h, y, y_end, start, end, switches))
+            decided = Decided(RUNNING, t + h, barrier, horizon)
+        elif not is_finite(y_end):
             return failed(Status.UNSTABLE.value)
-        dense = dense_output(y, k1, y_end, k_end, h)
-        start = compression_at(y, switches, c)
-        kept = keep_step(t, y, k1.M, y_end, k_end.M, start, m, dense, factors, switches, control.locate_yield, c)
-        if kept.event == SHORTEN:
-            h_next = kept.tau * h
-            continue
-        decided = decide(t, h, y, kept, barrier, horizon, ending, c)
+        else:
+            dense = dense_output(y, k1, y_end, k_end, h)
+            kept = keep_step(t, y, k1.M, y_end, k_end.M, start, m, dense, factors, switches, control.locate_yield, c)
+            if kept.event == SHORTEN:
+                h_next = kept.tau * h
+                continue
+            decided = decide(t, h, y, kept, barrier, horizon, ending, c)
+            end = compression_at(kept.y, switches, c)
         h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
-        if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
-            gap_start, gap = control.theta_limit - abs(y.theta_b), control.theta_limit - m.theta
-            t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, (m.t_theta - t) / h)
-        if recording:
-            written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
-            exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
+        if recording or not control.stop_at_limit:
+            dense = dense_output(y, k1, y_end, k_end, h)
+            if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
+                gap_start, gap = control.theta_limit - abs(y.theta_b), control.theta_limit - m.theta
+                tau = (m.t_theta - t) / h
+                t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, tau)
+            if recording:
+                written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
+                exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
         t = decided.t
         if decided.status != RUNNING:
             if decided.status == Status.LIMIT.value:
                 m = at_limit(m, t, theta_stop)
                 t_limit = t if control.stop_at_limit else t_limit
             return Outcome(decided.status, m, t_limit, t, attempts)
-        y, k1 = kept.y, k_end
+        y, k1, start = kept.y, k_end, end
         if kept.event > NONE:
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
             switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
-            k1 = rate_of(y, switches, c)
+            k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
     return failed(Status.STEP_BUDGET.value)

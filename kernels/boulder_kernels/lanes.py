@@ -11,32 +11,25 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import inlined, kernel
-from .after_step import RUNNING, enter_modes, initial_state, rate_of
+from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
 from .design import constants_of, design_in, is_computable
 from .dormand_prince import step
 from .events import SHORTEN
-from .gaps import gaps_of
 from .impact import Control, attempt_budget, ending_of, first_step
 from .lane_events import conclude, start_steps, work_out
 from .outcomes import (
     STATUS,
-    Maxima,
     Outcome,
     Status,
     compression_at,
-    compression_of,
     empty_outcomes,
-    highest,
     no_maxima,
     write_outcome,
 )
 from .readings import Readings
-from .restoring import signed_arm
 from .settling import NO_PROOF, boulder_energy
-from .soil import soil_kinematics
 from .stability import ACCEPTED, MOST_STEPS, RETRY
 from .transitions import initial_modes
-from .trigonometry import sine_versine
 from .workspace import (
     ATTEMPTS_LEFT,
     ATTENTION,
@@ -97,39 +90,11 @@ def take_over_steps(ws: np.ndarray) -> None:
         s = load(ws, SWITCHES, lane)
         y, y_end = load(ws, STATE, lane), load(ws, END_STATE, lane)
         k_end = load(ws, END, lane)
-        sin, versin = sine_versine(y_end.theta_b)
         start = load(ws, COMPRESSION, lane)
-        end = compression_of(y_end, sin, versin, s, c)
-        k = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
-        gaps = gaps_of(
-            k.A,
-            k.slope_x,
-            y_end.theta_b,
-            y_end.omega_b,
-            end.u,
-            k_end.M,
-            signed_arm(sin, versin, c),
-            load(ws, FACTORS, lane),
-        )
+        passing, end = passes(y, y_end, k_end, load(ws, FACTORS, lane), s, c)
         t, h, horizon = field(ws, TIME, lane), field(ws, STEP, lane), field(ws, HORIZON, lane)
-        # A comparison with NaN is false, so a state that is not a number is marked, too.
-        plain = (
-            (gaps.contact >= 0.0)
-            & (gaps.rotation >= 0.0)
-            & (gaps.couple >= 0.0)
-            & (gaps.corner >= 0.0)
-            & (gaps.arm >= 0.0)
-            & (gaps.top >= 0.0)
-            & (gaps.base >= 0.0)
-            & (gaps.limit >= 0.0)
-            & (y.omega_b * y_end.omega_b >= 0.0)
-            & ((y.v_b <= 0.0) | (y_end.v_b >= 0.0))
-            & ((y.v_v <= 0.0) | (y_end.v_v >= 0.0))
-            & (h < horizon - t)
-            & ((y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, lane)))
-        )
-        u, _ = highest(start.u, start.rate, end.u, end.rate, h)
-        deepest, _ = highest(start.crush, start.crush_rate, end.crush, end.crush_rate, h)
+        lively = (y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, lane))
+        plain = passing & (h < horizon - t) & lively
         t_next = t + h
         put(ws, ATTENTION, lane, 0.0 if plain else 1.0)
         if plain:
@@ -139,10 +104,7 @@ def take_over_steps(ws: np.ndarray) -> None:
             store(ws, COMPRESSION, lane, end)
             put(ws, TIME, lane, t_next)
             put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t_next))
-            m = load(ws, MAXIMA, lane)
-            theta, x_b, x_v = max(m.theta, abs(y_end.theta_b)), max(m.x_b, y_end.x_b), max(m.x_v, y_end.x_v)
-            F_v, crush = max(m.F_v, s.k_contact * u), max(m.crush, deepest if y.v_v > 0.0 else 0.0)
-            m = Maxima(theta, m.t_theta, x_b, m.t_x_b, x_v, m.t_x_v, F_v, m.t_F_v, crush, m.t_crush)
+            m = passed_maxima(load(ws, MAXIMA, lane), t, h, y, y_end, start, end, s)
             store(ws, MAXIMA, lane, m)
 
 
