@@ -23,8 +23,8 @@ FEWEST_DESIGNS = 256
 """Smallest number of designs, for any number of soil elements."""
 QUANTILE = 0.999
 """Fraction of the designs whose estimated error must not exceed the requested accuracy."""
-AT_ONCE = 256
-"""Designs simulated per call: an interruption waits for the current call."""
+AT_ONCE, AT_ONCE_CLOSED = 256, 4096
+"""Designs simulated per call, with element sums and in closed form: an interruption waits for the current call."""
 
 
 def accuracy_of(sweep: Sweep) -> Accuracy:
@@ -97,9 +97,10 @@ def sampled_designs(sweep: Sweep, count: int) -> Designs:
 
 def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate a table in pieces, so that an interruption need not wait long."""
+    size = AT_ONCE if control.elements else AT_ONCE_CLOSED
     pieces = [
-        simulate_table(DesignTable(*(column[at : at + AT_ONCE] for column in table)), readings, control)
-        for at in range(0, table.L.size, AT_ONCE)
+        simulate_table(DesignTable(*(column[at : at + size] for column in table)), readings, control)
+        for at in range(0, table.L.size, size)
     ]
     if not pieces:
         return simulate_table(table, readings, control)

@@ -27,13 +27,14 @@ BLOCK_S = 0.1
 TASK_S = 2.0
 """Work of one task of a cluster [s]: long compared with scheduling it, short enough to lose little with a worker."""
 _SAMPLE_S = 0.1
-_FIRST_SIZES = (1, 8, 64, 64, 64, 64)
+_FIRST_SIZES = (1, 8, 64)
 """Rows at places all over the table, for a first guess of the time per row."""
-_PIECES, _LARGEST_PIECE = 24, 1024
-"""Pieces of equal size all over the table, computed after that; of many rows each, because short pieces take more time
-and more bytes per row than the whole table."""
+_PIECES, _LARGEST_PIECE = (6, 24), 1024
+"""Pieces of equal size all over the table, computed after that, from the fewest of a small table to the most;"""
+_SHORT_PIECE = 256
+"""of at least so many rows each, because short pieces take more time and more bytes per row than the whole table."""
 _SHARE = 0.05
-"""Largest share of a small table that is sampled: the run computes these rows again."""
+"""Share of a table that is sampled, up to the pieces above: the run computes these rows again."""
 _BYTES_IN_PROGRESS = 400
 """Memory per row between being handed out and being written: inputs, outcomes and encoding."""
 _LEAST_BYTES_PER_ROW = 1
@@ -118,6 +119,8 @@ def take_sample(
 ) -> Sample:
     """Compute a few rows spread over the table and measure the time; the kernels must be warm.
 
+    The time is that of the processor: while other programs keep it busy, blocks must not become shorter.
+
     Parameters
     ----------
     evaluation
@@ -138,13 +141,13 @@ def take_sample(
     def computed(place: float, size: int) -> tuple[float, pa.Table | None]:
         """Compute some rows at a place between 0 and 1 of the table; return the time and what would be written."""
         start = int(place * (rows - size))
-        begun = time.perf_counter()
+        begun = time.thread_time()
         try:
             block = make_block(start, start + size)
             judged = evaluation(block)
         except Exception:  # the run itself will retry and name the rows
             return 0.0, None
-        return time.perf_counter() - begun, part_table(block, judged, metadata)
+        return time.thread_time() - begun, part_table(block, judged, metadata)
 
     tried = 0.0
     per_row: dict[int, float] = {}
@@ -156,11 +159,13 @@ def take_sample(
         per_row[size] = max(seconds / size, per_row.get(size, 0.0))
         if tried > _SAMPLE_S:
             break
-    by_time = int(_SAMPLE_S / _PIECES / max(per_row[max(per_row)], 1e-9))
-    by_share = max(_FIRST_SIZES[-1], int(_SHARE * rows / _PIECES))
+    fewest, most = _PIECES
+    pieces = min(max(int(_SHARE * rows) // _SHORT_PIECE, fewest), most)
+    by_time = int(_SAMPLE_S / pieces / max(per_row[max(per_row)], 1e-9))
+    by_share = max(_SHORT_PIECE, int(_SHARE * rows / pieces))
     size = max(1, min(by_time, by_share, _LARGEST_PIECE, rows))
     spent, tables = 0.0, []
-    for number in range(_PIECES):
+    for number in range(pieces):
         seconds, table = computed((0.5 + number * _GOLDEN) % 1.0, size)
         if table is not None:
             spent += seconds

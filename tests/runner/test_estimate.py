@@ -116,7 +116,7 @@ class Clock:
         self.now = 0.0
         self._free_up_to, self._per_row, self._per_block = free_up_to, seconds_per_row, seconds_per_block
 
-    def perf_counter(self) -> float:
+    def thread_time(self) -> float:
         return self.now
 
     def simulate(self, table, readings, control):
