@@ -36,7 +36,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     """
     from boulder_sweep.cli.console import COLD_START, is_cold, value_lines
     from boulder_sweep.impact.explanation import explain as compute_again
-    from boulder_sweep.report.export import shown_values
+    from boulder_sweep.settings.shown_units import shown_values
 
     if is_cold():
         say(COLD_START)

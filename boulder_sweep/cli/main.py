@@ -27,6 +27,7 @@ from boulder_sweep.cli.plot import plot
 from boulder_sweep.cli.report import report
 from boulder_sweep.cli.run import run
 from boulder_sweep.cli.simulate import simulate
+from boulder_sweep.cli.starting import start_light
 from boulder_sweep.cli.status import status
 from boulder_sweep.cli.tradeoff import tradeoff
 from boulder_sweep.cli.uncertainty import uncertainty
@@ -77,6 +78,7 @@ for command in COMMANDS:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and end the process with its exit code."""
+    start_light()
     sys.exit(execute(arguments))
 
 

@@ -59,7 +59,7 @@ def simulate(
     if verbose:
         say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design
-    from boulder_sweep.report.export import shown_values
+    from boulder_sweep.settings.shown_units import shown_values
 
     if not quiet and console.is_cold():
         say(console.COLD_START)

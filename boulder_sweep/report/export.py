@@ -5,14 +5,12 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.columns import BY_NAME, column_spec
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report.contents import setting_lines
-from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.settings.shown_units import Shown, shown_column
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.views.wording import NOT_A_TEST
 
@@ -24,19 +22,6 @@ MOST_SHEET_ROWS = 1_048_575
 """Rows of a sheet of a spreadsheet, its head apart."""
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """How a text begins that spreadsheets take for a formula."""
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A column of the exported table."""
-
-    stored: str
-    """Its name in the result."""
-    name: str
-    unit: str
-    size: float
-    """One of its unit in that of the result."""
-    meaning: str
 
 
 def export(out: str | Path, file: str | Path, *, units: str = "si") -> int:
@@ -81,28 +66,6 @@ def export(out: str | Path, file: str | Path, *, units: str = "si") -> int:
     return rows
 
 
-def shown_column(stored: str, units: str) -> Shown:
-    """Return how a column of the result is shown: its name ends in the unit."""
-    spec = column_spec(stored)
-    if units == "si" or not spec.unit:
-        return Shown(stored, stored, spec.unit, 1.0, spec.meaning)
-    unit, size = shown_unit(spec.unit, units)
-    name = stored if size == 1.0 else stored.removesuffix(_suffix(spec.unit)) + _suffix(unit)
-    return Shown(stored, name, unit, size, spec.meaning)
-
-
-def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
-    """Return values by names of columns in the units asked for; what is no column stays as it is."""
-    found = {}
-    for name, value in values.items():
-        if name not in BY_NAME:
-            found[name] = value
-            continue
-        column = shown_column(name, units)
-        found[column.name] = value / column.size if isinstance(value, float) else value
-    return found
-
-
 def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[str, str, str]]:
     """Yield what a reader must know of a table: three texts a line."""
     identity: Mapping[str, Any] = finished.identity
@@ -120,11 +83,6 @@ def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[st
     yield "settings", "", ""
     for line in setting_lines(identity["settings"]):
         yield line, "", ""
-
-
-def _suffix(unit: str) -> str:
-    """End of the name of a column in this unit: ``_kg_m3`` for kg/m^3."""
-    return "_" + unit.replace("^", "").replace("*", "_").replace("/", "_")
 
 
 def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:

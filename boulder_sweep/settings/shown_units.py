@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
+from boulder_sweep.columns import BY_NAME, column_spec
 from boulder_sweep.settings.units import factor
 
 SYSTEMS = ("si", "us")
@@ -30,6 +32,18 @@ class ShownUnit(NamedTuple):
     size: float
 
 
+class Shown(NamedTuple):
+    """A column of a result as it is shown."""
+
+    stored: str
+    """Its name in the result."""
+    name: str
+    unit: str
+    size: float
+    """One of its unit in that of the result."""
+    meaning: str
+
+
 def shown_unit(unit: str, system: str) -> ShownUnit:
     """Return the unit in which values of a unit of the table are shown.
 
@@ -53,3 +67,30 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
         return ShownUnit(unit, 1.0)
     shown = _SHOWN[unit][place]
     return ShownUnit(shown, float(factor(shown, unit)))
+
+
+def shown_column(stored: str, units: str) -> Shown:
+    """Return how a column of the result is shown: its name ends in the unit."""
+    spec = column_spec(stored)
+    if units == "si" or not spec.unit:
+        return Shown(stored, stored, spec.unit, 1.0, spec.meaning)
+    unit, size = shown_unit(spec.unit, units)
+    name = stored if size == 1.0 else stored.removesuffix(_suffix(spec.unit)) + _suffix(unit)
+    return Shown(stored, name, unit, size, spec.meaning)
+
+
+def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
+    """Return values by names of columns in the units asked for; what is no column stays as it is."""
+    found = {}
+    for name, value in values.items():
+        if name not in BY_NAME:
+            found[name] = value
+            continue
+        column = shown_column(name, units)
+        found[column.name] = value / column.size if isinstance(value, float) else value
+    return found
+
+
+def _suffix(unit: str) -> str:
+    """End of the name of a column in this unit: ``_kg_m3`` for kg/m^3."""
+    return "_" + unit.replace("^", "").replace("*", "_").replace("/", "_")

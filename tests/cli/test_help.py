@@ -10,6 +10,22 @@ import pytest
 ROOT = Path(__file__).parents[2]
 COMMANDS = ("new", "run", "check", "need", "uncertainty", "which", "boundary", "simulate", "status")
 HEAVY = ("numba", "pandas", "scipy", "pyarrow", "matplotlib", "joblib", "rich", "pint", "pydantic", "dask")
+BESIDE_THE_KERNELS = ("scipy.linalg", "pandas", "pyarrow", "matplotlib", "joblib", "rich", "dask", "bokeh", "jinja2")
+
+
+def in_a_process_of_the_command(words: list[str], found: str) -> str:
+    """What an expression gives in a process that has just run a command without a problem."""
+    code = (
+        "import os, sys, time\n"
+        "from boulder_sweep.cli.main import main\n"
+        "try:\n"
+        "    main(sys.argv[1:])\n"
+        "except SystemExit as end:\n"
+        f"    sys.exit(end.code or 'found: ' + repr(({found})))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
+    assert "found: " in done.stderr, done.stderr
+    return done.stderr.split("found: ")[-1].strip()
 
 
 def test_help_names_every_command_and_the_exit_codes(sweep):
@@ -47,26 +63,33 @@ def test_version(sweep):
 
 
 @pytest.mark.parametrize(
-    ("words", "light"),
+    ("words", "unused"),
     [
-        (["--help"], True),
-        (["run", "--help"], True),
-        (["--version"], True),
-        (["check", str(ROOT / "configs" / "m30_sizing.yaml")], False),
-        (["check", str(ROOT / "configs" / "crash_tests.yaml")], False),
+        (["--help"], (*HEAVY, "numpy")),
+        (["run", "--help"], (*HEAVY, "numpy")),
+        (["--version"], (*HEAVY, "numpy")),
+        (["check", str(ROOT / "configs" / "m30_sizing.yaml")], HEAVY),
+        (["check", str(ROOT / "configs" / "crash_tests.yaml")], HEAVY),
+        (["simulate", str(ROOT / "configs" / "rwg.yaml")], BESIDE_THE_KERNELS),
     ],
 )
-def test_nothing_heavy_is_loaded(words, light):
-    names = (*HEAVY, "numpy") if light else HEAVY
-    code = (
-        "import sys\n"
-        "from boulder_sweep.cli.main import execute\n"
-        "code = execute(sys.argv[1:])\n"
-        f"loaded = sorted(set({names!r}) & set(sys.modules))\n"
-        "sys.exit(f'loaded: {loaded}' if loaded or code else 0)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+def test_nothing_heavy_is_loaded(words, unused):
+    done = in_a_process_of_the_command(words, f"sorted(set({unused!r}) & set(sys.modules))")
+    assert done == "[]"
+
+
+def test_no_threads_are_started_for_linear_algebra():
+    """OpenBLAS starts them when NumPy is imported; on one core there are none anyway."""
+    # The thread in which the command worked takes a moment to end.
+    alone = "any(len(os.listdir('/proc/self/task')) == 1 or time.sleep(0.1) for _ in range(100))"
+    words = ["check", str(ROOT / "configs" / "rwg.yaml")]
+    assert in_a_process_of_the_command(words, f"({alone}, 'numpy' in sys.modules)") == "(True, True)"
+
+
+def test_only_the_command_keeps_scipy_from_numba():
+    """A program that imports the package may multiply matrices in its own compiled code."""
+    code = "import boulder_kernels, sys, numba.np.arraymath as a; sys.exit(0 if a._HAVE_BLAS else 'no BLAS')"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_importing_the_package_loads_nothing_heavy():

@@ -12,7 +12,8 @@ import boulder_sweep
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import export as module
-from boulder_sweep.report.export import export, shown_column
+from boulder_sweep.report.export import export
+from boulder_sweep.settings.shown_units import shown_column
 from boulder_sweep.settings.units import factor
 
 US = {

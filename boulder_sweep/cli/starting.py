@@ -1,0 +1,50 @@
+"""What a process of the command leaves out at its start; programs that import the package keep all of it."""
+
+from __future__ import annotations
+
+import atexit
+import gc
+import os
+import sys
+from collections.abc import Sequence
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+
+THREADS_OF_OPENBLAS = "OPENBLAS_NUM_THREADS"
+_ASKS_FOR_BLAS = "numba.np.arraymath"
+"""The module of Numba that imports scipy.linalg to find out whether compiled code can multiply matrices."""
+_OBJECTS_BETWEEN_COLLECTIONS = 100_000
+"""How many new objects Python's search for unused circles of objects waits for; by default 700."""
+
+
+class _NoMatrices:
+    """Answers Numba's question for a BLAS with no when it is about to be asked; finds no module itself."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Note the import of the module that asks."""
+        if name == _ASKS_FOR_BLAS:
+            from numba.np import linalg
+
+            linalg.ensure_blas = _no_blas
+        return None
+
+
+def _no_blas() -> None:
+    """Refuse a BLAS, in the way that Numba expects."""
+    raise ImportError("the command sweep starts without the linear algebra of SciPy")
+
+
+def start_light() -> None:
+    """Halve the time of a short command, before anything heavy is imported.
+
+    No kernel multiplies matrices, but at its start Numba imports scipy.linalg to see whether one could. NumPy's own
+    linear algebra starts a thread for each core, and the systems solved here have a few unknowns; a number of threads
+    that the user has set stands. Imports make hundreds of thousands of objects that stay until the end. By default
+    Python searches them for unused ones hundreds of times, and thrice more at the end, where the system takes all back.
+    """
+    os.environ.setdefault(THREADS_OF_OPENBLAS, "1")
+    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
+    atexit.register(gc.freeze)
+    sys.meta_path.insert(0, _NoMatrices())
