@@ -16,8 +16,8 @@ from boulder_sweep.text import duration_text, printable, size_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
+    from boulder_sweep.places import Place
     from boulder_sweep.runner.estimate import Estimate
     from boulder_sweep.runner.summary import Progress, Summary
     from boulder_sweep.settings import Sweep
@@ -198,7 +198,7 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
     return [found, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
-def dry_run_lines(sweep: Sweep, out: Path, effort: Estimate) -> list[str]:
+def dry_run_lines(sweep: Sweep, out: Place, effort: Estimate) -> list[str]:
     """Return what a run would do, and the time and space it needs."""
     return [
         *grid_lines(sweep),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.places import beside, place_of
 
 EXAMPLES = """\b
 Examples:
@@ -45,10 +44,9 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None)
     from boulder_sweep.views.wording import terms_line
 
     require_matplotlib()
-    folder = Path(out)
+    folder = place_of(out)
     finished = FinishedRows(folder)
-    beside = folder if folder.name else folder.resolve()
-    target = checked_kind(picture or f"{str(beside).removesuffix('.sweep')}.png")
+    target = checked_kind(picture or beside(folder, ".png"))
     if finished.rows_done == 0:
         raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
     settings = finished.identity["settings"]

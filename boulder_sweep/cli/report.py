@@ -10,6 +10,7 @@ import click
 
 from boulder_sweep.cli.options import units_option
 from boulder_sweep.cli.output import show
+from boulder_sweep.places import beside, place_of
 
 EXAMPLES = """\b
 Examples:
@@ -39,9 +40,8 @@ def report(out: str, page: str | None, designs: tuple[int, ...], units: str) -> 
     """
     from boulder_sweep.report import write_report
 
-    folder = Path(out)
-    beside = folder if folder.name else folder.resolve()
-    target = Path(page or f"{str(beside).removesuffix('.sweep')}.html")
+    folder = place_of(out)
+    target = Path(page) if page else beside(folder, ".html")
     command = shlex.join(["sweep", *sys.argv[1:]])
     written = write_report(folder, target, designs=designs, units=units, command=command)
     show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")

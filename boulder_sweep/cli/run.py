@@ -6,7 +6,6 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +13,7 @@ import click
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import RUN_EXAMPLES, json_option, run_options, set_option, talk_options
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.places import Place, place_of
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -44,7 +44,7 @@ def run(
     if options["scheduler"] and options["backend"] != "dask":
         raise click.UsageError("--scheduler needs --backend dask")
     sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
-    target = Path(out or f"{sweep.name.replace(' ', '-')}.sweep")
+    target = place_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
         return _dry_run(sweep, target, options, as_json)
     if verbose:
@@ -72,7 +72,7 @@ def run(
     return summary.exit_code
 
 
-def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) -> int:
+def _dry_run(sweep: Sweep, out: Place, options: dict[str, Any], as_json: bool) -> int:
     """Show what a run would do."""
     from boulder_sweep.cli import console
     from boulder_sweep.runner.sweeper import estimate
@@ -87,7 +87,7 @@ def _dry_run(sweep: Sweep, out: Path, options: dict[str, Any], as_json: bool) ->
 
 
 def _resume_command(
-    grid: str, out: Path, overrides: Sequence[str], accuracy: str | None, options: dict[str, Any]
+    grid: str, out: Place, overrides: Sequence[str], accuracy: str | None, options: dict[str, Any]
 ) -> str:
     """Return the command that resumes this run."""
     words = ["sweep", "run", grid, "-o", str(out)]

@@ -18,6 +18,7 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import limits_of
+from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import Criterion, Model, ReadingChoice, SolverSettings
 from boulder_sweep.store.errors import OtherVersionError
@@ -79,7 +80,7 @@ class Explanation:
         }
 
 
-def explain(out: str | Path, design_id: int) -> Explanation:
+def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     """Compute one row of a result again, from the result alone.
 
     Parameters
@@ -101,7 +102,7 @@ def explain(out: str | Path, design_id: int) -> Explanation:
     IndexError
         The table has no such row, or not yet.
     """
-    folder = Path(out)
+    folder = place_of(out)
     there = load_manifest(folder).identity
     row = read_row(folder, design_id)
     values = row.to_pylist()[0]

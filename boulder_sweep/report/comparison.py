@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.places import Place, RemotePath, place_of
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.provenance import differences
 from boulder_sweep.store.reader import read
@@ -71,7 +72,7 @@ class Comparison:
         }
 
 
-def compare(before: str | Path, after: str | Path) -> Comparison:
+def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> Comparison:
     """Compare two results, design by design.
 
     Parameters
@@ -89,12 +90,12 @@ def compare(before: str | Path, after: str | Path) -> Comparison:
     StoreError
         There is no result in a folder, or it is damaged.
     """
-    tables = [_table(Path(folder)) for folder in (before, after)]
+    tables = [_table(place_of(folder)) for folder in (before, after)]
     keys = [f"key_{name}" for name in INPUT_COLUMNS]
     matched = tables[0].merge(
         tables[1].drop(columns=[*INPUT_COLUMNS, "mass_kg"]), on=[*keys, "nth"], suffixes=("_before", "_after")
     )
-    identities = [FinishedRows(Path(folder)).identity for folder in (before, after)]
+    identities = [FinishedRows(place_of(folder)).identity for folder in (before, after)]
     passing = [table[table.verdict == "pass"] for table in tables]
     return Comparison(
         matched=matched.drop(columns=[*keys, "nth"]),
@@ -108,7 +109,7 @@ def compare(before: str | Path, after: str | Path) -> Comparison:
     )
 
 
-def _table(folder: Path) -> pd.DataFrame:
+def _table(folder: Place) -> pd.DataFrame:
     """Read a result with what its designs are matched by; designs that are there twice are numbered."""
     table = read(folder, ["design_id", *INPUT_COLUMNS, *OUTCOMES])
     for name in ("verdict", "reason"):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import ReportError
+from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, shown_column
 from boulder_sweep.store.finished import FinishedRows
@@ -24,7 +25,7 @@ FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """How a text begins that spreadsheets take for a formula."""
 
 
-def export(out: str | Path, file: str | Path, *, units: str = "si") -> int:
+def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si") -> int:
     """Write a result as one table.
 
     Parameters
@@ -48,7 +49,7 @@ def export(out: str | Path, file: str | Path, *, units: str = "si") -> int:
     StoreError
         There is no result in the folder, or it is damaged.
     """
-    target, finished = Path(file), FinishedRows(Path(out))
+    target, finished = Path(file), FinishedRows(place_of(out))
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from boulder_sweep.judge.validity import flag_counts
+from boulder_sweep.places import Place
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.reader import read_row
@@ -43,7 +43,7 @@ class Rows:
 
     Attributes
     ----------
-    folder : Path
+    folder : Place
         Where they are.
     finished : FinishedRows
         Those that were there when they were read.
@@ -63,7 +63,7 @@ class Rows:
         against each other, and for a grid against its shape.
     """
 
-    folder: Path
+    folder: Place
     finished: FinishedRows
     names: tuple[str, ...]
     codes: np.ndarray
@@ -123,7 +123,7 @@ class Rows:
         return read_row(self.folder, number).to_pylist()[0]
 
 
-def read_rows(folder: Path) -> Rows:
+def read_rows(folder: Place) -> Rows:
     """Read what the page needs of a result.
 
     Raises

@@ -13,6 +13,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.report.answers import Named, answer_of
 from boulder_sweep.report.rows import read_rows, thinned
 from boulder_sweep.settings import Sweep
@@ -24,7 +25,7 @@ PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
 
 
 def write_report(
-    out: str | Path, page: str | Path, *, designs: Sequence[int] = (), units: str = "si", command: str = ""
+    out: str | Path | RemotePath, page: str | Path, *, designs: Sequence[int] = (), units: str = "si", command: str = ""
 ) -> Path:
     """Write the report of a result: one HTML file that needs no network.
 
@@ -54,7 +55,7 @@ def write_report(
         There is no result in the folder, or it is damaged.
     """
     assembled = _page_maker()
-    rows = read_rows(Path(out))
+    rows = read_rows(place_of(out))
     if rows.finished.rows_done == 0:
         raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` says how far it is")
     answer = answer_of(rows)

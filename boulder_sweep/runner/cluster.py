@@ -11,14 +11,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
+from boulder_sweep.places import place_of
 from boulder_sweep.runner.computing import Computation, EncodedPart, failed_rows
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
+from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.lock import LOCK_NAME
-from boulder_sweep.store.manifest import hidden_name
+from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.writer import OutputFolder, StagedPart, stage
 from boulder_sweep.text import one_line
 
@@ -339,10 +340,10 @@ def _compute(work: _Work, start: int, stop: int, relayed: bool) -> _Done:
     part = work.computation.encoded(start, pieces)
     if relayed:
         return _Done(None, part._replace(content=bytes(part.content)))
-    folder = Path(work.folder)
+    folder = place_of(work.folder)
     if not (folder / LOCK_NAME).exists():
         return _Done(None, None)
-    return _Done(stage(folder, work.table_rows, part.first, part.content, part.rows, part.verdicts), None)
+    return _Done(stage(storage_of(folder), work.table_rows, part.first, part.content, part.rows, part.verdicts), None)
 
 
 def _wait_for_a_worker(client: Any, address: str) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from boulder_sweep.places import Place
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -17,7 +18,7 @@ def repeat_command(sweep: Sweep) -> str:
     return shlex.join(["sweep", "run", sweep.path.name, *_overrides(sweep)])
 
 
-def resume_command(sweep: Sweep, out: Path, jobs: int | None, backend: str, scheduler: str | None) -> str:
+def resume_command(sweep: Sweep, out: Place, jobs: int | None, backend: str, scheduler: str | None) -> str:
     """Return the command that resumes a run with the given arguments."""
     if sweep.path is None:
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.judge.evaluation import Evaluation
+from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
 from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.writer import ROWS_PER_PART
@@ -185,7 +186,7 @@ def estimated(
     rows: int,
     rows_to_compute: int,
     jobs: int,
-    out: Path | None,
+    out: Place | None,
     rows_per_part: int = ROWS_PER_PART,
 ) -> Estimate:
     """Estimate what a run needs from a sample.
@@ -235,7 +236,7 @@ def rows_per_task(estimate: Estimate, rows_per_part: int) -> int:
     return max(1, min(rows_per_part, by_time, by_share))
 
 
-def refuse_hopeless(rows: int, rows_to_compute: int, out: Path) -> None:
+def refuse_hopeless(rows: int, rows_to_compute: int, out: Place) -> None:
     """Refuse, without computing anything, a table that cannot fit on the disk at a byte per row.
 
     Raises
@@ -244,7 +245,7 @@ def refuse_hopeless(rows: int, rows_to_compute: int, out: Path) -> None:
         Says how much is needed at least, and how much is free.
     """
     least, free = rows_to_compute * _LEAST_BYTES_PER_ROW, _disk_free(out)
-    if least > free:
+    if free is not None and least > free:
         raise DoesNotFitError(
             f"the table of {rows:,} rows needs at least {size_text(least)} of disk, and {size_text(free)} are free. "
             f"Use --force to run anyway"
@@ -263,8 +264,10 @@ def blocks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, 
             yield first, min(first + size, stop)
 
 
-def _disk_free(out: Path) -> int:
-    """Free space on the disk where a folder is, or would be created."""
+def _disk_free(out: Place) -> int | None:
+    """Free space on the disk where a folder is, or would be created; None for an object store."""
+    if isinstance(out, RemotePath):
+        return None
     place = out
     while not place.exists() and place != place.parent:
         place = place.parent

@@ -15,6 +15,7 @@ from boulder_sweep.errors import ClusterLostError, Interrupted
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
 from boulder_sweep.runner.backends import available_cores, check_backend
 from boulder_sweep.runner.commands import repeat_command
@@ -37,7 +38,7 @@ __all__ = ["Estimate", "Interrupted", "Progress", "Summary", "estimate", "run"]
 
 def run(
     sweep: Sweep,
-    out: str | Path,
+    out: str | Path | RemotePath,
     *,
     jobs: int | None = None,
     backend: str = "threading",
@@ -59,7 +60,7 @@ def run(
     sweep
         What `boulder_sweep.load` returned.
     out
-        Folder of the table; it is made.
+        Folder of the table; it is made. A path, or a URL such as ``s3://bucket/m30.sweep``.
     jobs
         Workers; as many as this process may use cores by default.
     backend
@@ -106,7 +107,7 @@ def run(
         SIGINT or SIGTERM arrived (main thread only); the run can be resumed.
     """
     begun = time.monotonic()
-    out = Path(out)
+    out = place_of(out)
     _check_arguments(sweep, jobs, rows_per_part, commit_every_s, progress)
     sweep.require_values()
     check_backend(backend, scheduler)
@@ -159,7 +160,7 @@ def run(
 
 def estimate(
     sweep: Sweep,
-    out: str | Path | None = None,
+    out: str | Path | RemotePath | None = None,
     *,
     jobs: int | None = None,
     resume: bool = False,
@@ -182,7 +183,7 @@ def estimate(
     sweep.require_values()
     accuracy = accuracy_of(sweep)
     evaluation = evaluation_of(sweep, accuracy, simulate)
-    folder = None if out is None else Path(out)
+    folder = None if out is None else place_of(out)
     rows_there, rows_per_part = 0, ROWS_PER_PART
     if resume and folder is not None:
         try:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, BoulderSweepError
+from boulder_sweep.places import Place
 
 
 class StoreError(BoulderSweepError):
@@ -16,7 +15,7 @@ class OutputExistsError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Path, rows_done: int, rows: int):
+    def __init__(self, out: Place, rows_done: int, rows: int):
         self.out, self.rows_done, self.rows = out, rows_done, rows
         state = "is finished" if rows_done == rows else f"holds {rows_done:,} of {rows:,} rows"
         super().__init__(f"{out} exists and {state}: use --resume to continue it or --overwrite to start again")
@@ -35,7 +34,7 @@ class SettingsDifferError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Path, differences: list[str]):
+    def __init__(self, out: Place, differences: list[str]):
         self.out, self.differences = out, differences
         lines = "".join(f"\n  {difference}" for difference in differences)
         super().__init__(
@@ -56,7 +55,7 @@ class ForeignFilesError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Path, names: list[str]):
+    def __init__(self, out: Place, names: list[str]):
         self.out, self.names = out, names
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
         super().__init__(f"{out} contains files that no sweep wrote ({shown}): choose another folder or move them")
@@ -81,7 +80,7 @@ class OtherVersionError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, path: Path, why: str, version: str | None = None):
+    def __init__(self, path: Place, why: str, version: str | None = None):
         self.path, self.why, self.version = path, why, version
         noted = f", {version}" if version else ""
         super().__init__(

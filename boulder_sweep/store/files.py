@@ -20,6 +20,11 @@ _PIECE = 8 << 20
 _FATAL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
+def hidden_name(name: str) -> str:
+    """Return the temporary name of a staged part, or of a merged one while the parts it replaces still exist."""
+    return f"_{name}{WRITING_SUFFIX}"
+
+
 @contextmanager
 def opened_folder(folder: Path) -> Iterator[int]:
     """Give a descriptor of a folder, to flush it and to create files relative to it."""

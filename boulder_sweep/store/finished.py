@@ -11,11 +11,12 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import IO, TYPE_CHECKING, Any
 
+from boulder_sweep.places import Place
 from boulder_sweep.store.errors import DamagedError, StoreError
-from boulder_sweep.store.manifest import Manifest, Part, hidden_name, load
+from boulder_sweep.store.files import hidden_name
+from boulder_sweep.store.manifest import Manifest, Part, load
 from boulder_sweep.store.verify import load_checked, wrong_bytes
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class FinishedRows:
         Its manifest cannot be trusted, or not be read by this version.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Place):
         manifest = load(folder)
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
         self.labels = manifest.labels
@@ -115,7 +116,7 @@ class FinishedRows:
             first = end
         return found
 
-    def _opened(self, row: int) -> tuple[str, Part, BinaryIO]:
+    def _opened(self, row: int) -> tuple[str, Part, IO[bytes]]:
         """Open the file that holds a row. An open file stays readable, even if it is removed."""
         places = self._places
         while True:
@@ -134,7 +135,7 @@ class FinishedRows:
                 raise DamagedError(_damage_text(self._folder, {name: "missing"}))
             self._places = places
 
-    def _read(self, file: BinaryIO, name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
+    def _read(self, file: IO[bytes], name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
         """Read a part from its open file."""
         import pyarrow as pa  # heavy, and only readers need it
         import pyarrow.parquet as pq
@@ -177,7 +178,7 @@ class _Places:
                 yield name, merge.part
 
 
-def _damage_text(folder: Path, damaged: dict[str, str]) -> str:
+def _damage_text(folder: Place, damaged: dict[str, str]) -> str:
     """Describe what is damaged and what to do."""
     first, what = next(iter(damaged.items()))
     more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""

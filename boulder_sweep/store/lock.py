@@ -20,7 +20,8 @@ from boulder_sweep.store.errors import FolderInUseError, WriteError
 LOCK_NAME = "_lock"
 HEARTBEAT_S = 10.0
 """How often the holder renews the time of the lock file [s]."""
-_DEAD_AFTER_S = 6 * HEARTBEAT_S
+DEAD_AFTER_S = 6 * HEARTBEAT_S
+"""Time without a heartbeat after which a run on another machine counts as dead [s]."""
 _ATTEMPTS = 4
 _NOT_SUPPORTED = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 
@@ -65,11 +66,11 @@ class FolderLock:
                 break
             os.close(descriptor)
         elsewhere = last_host is not None and last_host != socket.gethostname()
-        if (elsewhere or not shared) and self.stale and age < _DEAD_AFTER_S:
+        if (elsewhere or not shared) and self.stale and age < DEAD_AFTER_S:
             os.close(descriptor)
             raise FolderInUseError(
                 f"{folder} seems to be written by {holder}: its last heartbeat was {age:.0f} s ago. "
-                f"If that run is dead, try again in {_DEAD_AFTER_S:.0f} s"
+                f"If that run is dead, try again in {DEAD_AFTER_S:.0f} s"
             )
         self._descriptor: int | None = descriptor
         self._renewed = time.monotonic()

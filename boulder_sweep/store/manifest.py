@@ -10,18 +10,21 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import Any
+from io import BytesIO
+from typing import IO, Any
 
 from boulder_sweep.columns import COLUMNS
+from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError
-from boulder_sweep.store.files import WRITING_SUFFIX, put_file
+from boulder_sweep.store.files import WRITING_SUFFIX
+from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
 from boulder_sweep.store.lock import LOCK_NAME
+from boulder_sweep.store.object_lock import is_probe
 from boulder_sweep.store.records import entries_of, version_of
+from boulder_sweep.store.storage import Storage
 
-MANIFEST_NAME = "_manifest.parquet"
 _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
 _PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
@@ -167,16 +170,12 @@ def part_name(first: int, stop: int, table_rows: int) -> str:
     return f"{_PART_PREFIX}{first:0{digits}d}-{stop:0{digits}d}{_PART_SUFFIX}"
 
 
-def hidden_name(name: str) -> str:
-    """Return the temporary name of a staged part, or of a merged one while the parts it replaces still exist."""
-    return f"_{name}{WRITING_SUFFIX}"
-
-
 def is_ours(name: str) -> bool:
     """Whether a sweep gives its files such a name, temporary names included."""
     if name.endswith(WRITING_SUFFIX):
         return name.startswith("_") and is_ours(name[1 : -len(WRITING_SUFFIX)])
-    return bool(_PART_NAME.fullmatch(name)) or name in (MANIFEST_NAME, LOCK_NAME)
+    known = is_part_name(name) or is_generation(name) or is_probe(name)
+    return known or name in (MANIFEST_NAME, LOCK_NAME)
 
 
 def is_part_name(name: str) -> bool:
@@ -184,14 +183,21 @@ def is_part_name(name: str) -> bool:
     return bool(_PART_NAME.fullmatch(name))
 
 
-def save(manifest: Manifest, folder: Path) -> None:
+def save(manifest: Manifest, storage: Storage) -> None:
     """Replace the manifest of a folder in one step.
 
     Raises
     ------
     OSError
         The previous one is unchanged then.
+    FolderInUseError
+        Another run has replaced it; on object stores only.
     """
+    storage.put_manifest(lambda more: _encoded(manifest, more))
+
+
+def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
+    """Return the bytes of the file of a manifest, with some more metadata."""
     import pyarrow as pa  # heavy, and only runs need it
     import pyarrow.parquet as pq
 
@@ -199,14 +205,14 @@ def save(manifest: Manifest, folder: Path) -> None:
 
     text = json.dumps({"format": _FORMAT, **asdict(manifest)}, separators=(",", ":"))
     value = hashlib.sha256(text.encode()).hexdigest() + text
-    schema = table_schema({_KEY: value.encode()}, manifest.labels)
+    schema = table_schema({_KEY: value.encode(), **more}, manifest.labels)
     sink = pa.BufferOutputStream()
     with pq.ParquetWriter(sink, schema):
         pass  # columns, and no rows
-    put_file(folder, MANIFEST_NAME, memoryview(sink.getvalue()))
+    return memoryview(sink.getvalue())
 
 
-def load(folder: Path) -> Manifest:
+def load(folder: Place) -> Manifest:
     """Read the manifest of a folder.
 
     Raises
@@ -223,7 +229,7 @@ def load(folder: Path) -> Manifest:
 
     path = folder / MANIFEST_NAME
     try:
-        with path.open("rb") as file:  # pyarrow takes no names that are not Unicode
+        with _opened(folder) as file:  # pyarrow takes no names that are not Unicode
             found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
         raise NotASweepError(_no_result(folder)) from None
@@ -246,7 +252,12 @@ def load(folder: Path) -> Manifest:
         raise OtherVersionError(path, str(unfamiliar), version_of(content)) from None
 
 
-def _no_result(folder: Path) -> str:
+def _opened(folder: Place) -> IO[bytes]:
+    """Open the file of a manifest."""
+    return BytesIO(newest(folder).content) if isinstance(folder, RemotePath) else (folder / MANIFEST_NAME).open("rb")
+
+
+def _no_result(folder: Place) -> str:
     """Describe why a path holds no result."""
     if not folder.exists():
         return f"there is no {folder}; the result of a sweep is a folder, such as m30-sizing.sweep"

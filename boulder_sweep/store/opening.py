@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
+from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import check_writable, flush_folder
-from boulder_sweep.store.lock import LOCK_NAME, FolderLock
+from boulder_sweep.store.generations import is_generation
+from boulder_sweep.store.lock import LOCK_NAME
 from boulder_sweep.store.manifest import (
     MANIFEST_NAME,
     Manifest,
     Session,
-    hidden_name,
     is_ours,
     is_part_name,
     load,
@@ -21,6 +20,7 @@ from boulder_sweep.store.manifest import (
 )
 from boulder_sweep.store.merging import recover_merge
 from boulder_sweep.store.provenance import PREFIX, differences
+from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
 from boulder_sweep.store.writer import OutputFolder
 
@@ -34,13 +34,13 @@ class ClaimedFolder:
         Rows that a resumed run keeps, if their parts are intact.
     """
 
-    def __init__(self, out: Path, lock: FolderLock, resume: bool, overwrite: bool, created: bool):
-        self._out, self._lock, self._created = out, lock, created
-        self._names = sorted(entry.name for entry in out.iterdir())
-        there = _allowed(out, self._names, resume, overwrite)
+    def __init__(self, out: Place, storage: Storage, lock: Lock, resume: bool, overwrite: bool, created: bool):
+        self._out, self._storage, self._lock, self._created = out, storage, lock, created
+        self._names = storage.names()
+        there = _allowed(out, storage, self._names, resume, overwrite)
         self._there = None if overwrite else there
         self.rows_done = 0 if self._there is None else self._there.rows_done
-        check_writable(out, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
+        storage.check_writable()
 
     def open(self, manifest: Manifest, session: Session) -> OutputFolder:
         """Begin the run.
@@ -61,13 +61,12 @@ class ClaimedFolder:
         """
         try:
             if self._there is None:
-                old = [name for name in self._names if is_ours(name) and name not in (LOCK_NAME, MANIFEST_NAME)]
-                _remove(self._out, old)
-                folder = OutputFolder(self._out, self._lock, manifest, self._created)
+                self._storage.remove(name for name in self._names if is_ours(name) and not _is_kept(name))
+                folder = OutputFolder(self._out, self._storage, self._lock, manifest, self._created)
             else:
-                folder = _resumed(self._out, self._lock, manifest, self._there, self._names)
+                folder = self._resumed(manifest, self._there)
             folder.manifest.sessions.append(session)
-            save(folder.manifest, self._out)
+            save(folder.manifest, self._storage)
         except OSError as problem:
             raise errors.WriteError(f"cannot write into {self._out}: {problem.strerror}") from problem
         return folder
@@ -76,12 +75,29 @@ class ClaimedFolder:
         """Release the folder as it was; return the rows in it."""
         self._lock.release()
         if self._created:
-            with suppress(OSError):
-                self._out.rmdir()
+            self._storage.unmake()
         return self.rows_done
 
+    def _resumed(self, manifest: Manifest, there: Manifest) -> OutputFolder:
+        """Resume the run in the folder, if it is the same."""
+        out, storage = self._out, self._storage
+        different = differences(there.identity, manifest.identity)
+        if there.rows != manifest.rows:
+            different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
+        if different:
+            raise errors.SettingsDifferError(out, different)
+        recover_merge(there, out, storage)
+        # An object store checks its content itself, and reading all of it again may take hours.
+        damaged = damaged_parts(out, there.parts, read_parts=not isinstance(out, RemotePath))
+        there.parts = {name: part for name, part in there.parts.items() if name not in damaged}
+        there.resume_command = manifest.resume_command
+        storage.remove(name for name in self._names if is_ours(name) and name not in there.parts and not _is_kept(name))
+        folder = OutputFolder(out, storage, self._lock, there, created=False)
+        folder.damaged = damaged
+        return folder
 
-def claim_output(out: Path, *, resume: bool = False, overwrite: bool = False) -> ClaimedFolder:
+
+def claim_output(out: Place, *, resume: bool = False, overwrite: bool = False) -> ClaimedFolder:
     """Lock a folder for a run, and check that it can be used.
 
     Parameters
@@ -100,24 +116,24 @@ def claim_output(out: Path, *, resume: bool = False, overwrite: bool = False) ->
     """
     if resume and overwrite:
         raise errors.StoreError("--resume and --overwrite exclude each other")
-    created = _make(out)
+    storage = storage_of(out)
+    created = storage.make()
     lock = None
     try:
-        lock = _locked(out)
-        return ClaimedFolder(out, lock, resume, overwrite, created)
+        lock = _locked(out, storage)
+        return ClaimedFolder(out, storage, lock, resume, overwrite, created)
     except BaseException as problem:
         if lock is not None:
             lock.release()
         if created:
-            with suppress(OSError):
-                out.rmdir()
+            storage.unmake()
         if isinstance(problem, OSError):
             raise errors.WriteError(f"cannot write into {out}: {problem.strerror}") from problem
         raise
 
 
 def open_output(
-    out: Path, manifest: Manifest, session: Session, *, resume: bool = False, overwrite: bool = False
+    out: Place, manifest: Manifest, session: Session, *, resume: bool = False, overwrite: bool = False
 ) -> OutputFolder:
     """Open a folder for a run at once: `claim_output`, then `ClaimedFolder.open`."""
     claimed = claim_output(out, resume=resume, overwrite=overwrite)
@@ -128,26 +144,7 @@ def open_output(
         raise
 
 
-_PROBE_BYTES = 1 << 16
-"""More than a first manifest takes."""
-
-
-def _make(out: Path) -> bool:
-    """Create the folder if it does not exist; True if it was created."""
-    if not out.parent.is_dir():
-        raise errors.StoreError(f"the folder {out.parent} does not exist: {out.name} cannot be created in it")
-    try:
-        out.mkdir()
-    except FileExistsError:
-        if not out.is_dir():
-            raise errors.StoreError(f"{out} is a file; the output of a sweep is a folder") from None
-        return False
-    except OSError as problem:
-        raise errors.WriteError(f"cannot create the folder {out}: {problem.strerror}") from problem
-    return True
-
-
-def _locked(out: Path) -> FolderLock:
+def _locked(out: Place, storage: Storage) -> Lock:
     """Lock the folder; an error names who else may hold it."""
     holder, host = "another run", None
     with suppress(errors.StoreError):
@@ -155,15 +152,16 @@ def _locked(out: Path) -> FolderLock:
         if sessions and sessions[-1].ended is None:
             last = sessions[-1]
             holder, host = f"process {last.pid} on {last.host} since {last.started}", last.host
-    return FolderLock(out, host, holder)
+    return storage.lock(host, holder)
 
 
-def _allowed(out: Path, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
+def _allowed(out: Place, storage: Storage, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
     """Check that a run may use a folder; return its manifest, None if there is none to resume from."""
-    foreign = [name for name in names if not is_ours(name) or (out / name).is_dir()]
+    foreign = [name for name in names if not is_ours(name) or storage.is_folder(name)]
     there = None
-    if MANIFEST_NAME in names and not (overwrite and not _is_readable(out)):
-        there = load(out)
+    if not (overwrite and not _is_readable(out)):
+        with suppress(errors.NotASweepError):
+            there = load(out)
     parts = [name for name in names if is_part_name(name)]
     if there is None and not overwrite and parts:
         raise errors.DamagedError(f"{out} contains parts but no {MANIFEST_NAME}; use --overwrite to start again")
@@ -177,42 +175,21 @@ def _allowed(out: Path, names: list[str], resume: bool, overwrite: bool) -> Mani
     return there
 
 
-def _resumed(out: Path, lock: FolderLock, manifest: Manifest, there: Manifest, names: list[str]) -> OutputFolder:
-    """Resume the run in the folder, if it is the same."""
-    different = differences(there.identity, manifest.identity)
-    if there.rows != manifest.rows:
-        different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
-    if different:
-        raise errors.SettingsDifferError(out, different)
-    recover_merge(there, out)
-    damaged = damaged_parts(out, there.parts, read_parts=True)
-    there.parts = {name: part for name, part in there.parts.items() if name not in damaged}
-    there.resume_command = manifest.resume_command
-    keep = {*there.parts, MANIFEST_NAME, LOCK_NAME}
-    _remove(out, [name for name in names if is_ours(name) and name not in keep])
-    folder = OutputFolder(out, lock, there, created=False)
-    folder.damaged = damaged
-    return folder
+def _is_kept(name: str) -> bool:
+    """Whether a file stays when a run begins: the lock and the manifest, which is replaced in one step."""
+    return name in (LOCK_NAME, MANIFEST_NAME) or is_generation(name)
 
 
-def _remove(out: Path, names: list[str]) -> None:
-    """Remove files and make that durable."""
-    for name in names:
-        (out / name).unlink(missing_ok=True)
-    if names:
-        flush_folder(out)
-
-
-def _is_readable(out: Path) -> bool:
+def _is_readable(out: Place) -> bool:
     """Whether the manifest is intact and in this version's format."""
     try:
         load(out)
-    except (errors.DamagedError, errors.OtherVersionError):
+    except (errors.DamagedError, errors.OtherVersionError, errors.NotASweepError):
         return False
     return True
 
 
-def _is_written_by_us(path: Path) -> bool:
+def _is_written_by_us(path: Place) -> bool:
     """Whether the metadata of a file that is named like a part shows that a sweep wrote it."""
     import pyarrow as pa  # heavy, and only needed where a manifest is missing
     import pyarrow.parquet as pq

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boulder_sweep.columns import OUTCOMES, column_spec
+from boulder_sweep.places import Place, RemotePath, place_of
 from boulder_sweep.store.finished import FinishedRows
 
 if TYPE_CHECKING:
@@ -14,13 +15,14 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool = True) -> pd.DataFrame:
+def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, verify: bool = True) -> pd.DataFrame:
     """Read the result of a sweep.
 
     Parameters
     ----------
     out
-        Folder that `boulder_sweep.run` or ``sweep run`` wrote, or is still writing.
+        Folder that `boulder_sweep.run` or ``sweep run`` wrote, or is still writing; a path, or a URL such as
+        ``s3://bucket/m30.sweep``.
     columns
         Names of the columns wanted; all by default.
     verify
@@ -39,7 +41,7 @@ def read(out: str | Path, columns: Sequence[str] | None = None, *, verify: bool 
     DamagedError
         A part is missing, truncated or changed.
     """
-    table, rows = _read(Path(out), columns, verify)
+    table, rows = _read(place_of(out), columns, verify)
     # Split into blocks: consolidating columns of one type would copy the whole table once more.
     frame = table.to_pandas(split_blocks=True, self_destruct=True)
     for spec in OUTCOMES:
@@ -61,12 +63,12 @@ def _ordered(words: pd.Series, known: Sequence[str]) -> pd.Series:
     return words if wanted == there else words.cat.reorder_categories(wanted)
 
 
-def read_table(folder: Path, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
+def read_table(folder: Place, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
     """Read the finished parts of a folder as one Arrow table; otherwise as `read`."""
     return _read(folder, columns, verify)[0]
 
 
-def read_row(folder: Path, design_id: int) -> pa.Table:
+def read_row(folder: Place, design_id: int) -> pa.Table:
     """Read one row of a result, from the one part that holds it.
 
     Raises
@@ -85,7 +87,7 @@ def read_row(folder: Path, design_id: int) -> pa.Table:
     return row
 
 
-def _read(folder: Path, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, int]:
+def _read(folder: Place, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, int]:
     """Return the finished parts, in the order of the designs, and the rows of the whole table."""
     import pyarrow as pa  # heavy, and only readers need it
 

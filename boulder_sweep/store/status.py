@@ -6,8 +6,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import Session
+from boulder_sweep.store.object_lock import is_held
 from boulder_sweep.store.verify import load_checked
 
 
@@ -76,7 +78,7 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
     Parameters
     ----------
     out
-        The folder.
+        The folder, by path or URL.
     verify
         Read every part and compare its checksum: finds changed bytes, not only missing ones.
 
@@ -87,8 +89,8 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
     DamagedError
         The manifest cannot be trusted.
     """
-    folder = Path(out)
-    running = is_locked(folder)
+    folder = place_of(out)
+    running = is_held(folder) if isinstance(folder, RemotePath) else is_locked(folder)
     manifest, damaged = load_checked(folder, read_parts=verify)
     missing: list[tuple[int, int]] = []
     for start, stop in manifest.missing():

@@ -13,19 +13,18 @@ ever seen twice, and a run killed in the middle can finish the merge.
 from __future__ import annotations
 
 import hashlib
-import os
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import NamedTuple
 
+from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import WRITING_SUFFIX, opened_folder, put_file
-from boulder_sweep.store.lock import FolderLock
-from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest, Merge, Part, hidden_name, is_ours, part_name, save
+from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
+from boulder_sweep.store.manifest import Manifest, Merge, Part, is_ours, is_part_name, part_name, save
 from boulder_sweep.store.merging import finish_merge
 from boulder_sweep.store.provenance import now
+from boulder_sweep.store.storage import Lock, Storage
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
@@ -40,14 +39,14 @@ class StagedPart(NamedTuple):
 
 
 def stage(
-    folder: Path, table_rows: int, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]
+    storage: Storage, table_rows: int, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]
 ) -> StagedPart:
     """Write a part under its temporary name; other machines that share the folder may do that, too.
 
     Parameters
     ----------
-    folder
-        The output folder.
+    storage
+        How the output folder is written.
     table_rows
         Rows of the whole table.
     first
@@ -65,15 +64,16 @@ def stage(
         The disk is full or the folder cannot be written; nothing has changed.
     """
     name = part_name(first, first + rows, table_rows)
-    put_file(folder, hidden_name(name), content)
+    storage.put(hidden_name(name), content)
     return StagedPart(name, _part(first, content, rows, verdicts))
 
 
 class OutputFolder:
     """The folder of a run, open for writing until `close`; made by `opening.open_output`."""
 
-    def __init__(self, path: Path, lock: FolderLock, manifest: Manifest, created: bool):
+    def __init__(self, path: Place, storage: Storage, lock: Lock, manifest: Manifest, created: bool):
         self.path = path
+        self._storage = storage
         self.manifest = manifest
         self.damaged: dict[str, str] = {}
         """Parts found damaged when the folder was opened, and what was wrong; their rows count as missing."""
@@ -103,11 +103,11 @@ class OutputFolder:
             The disk is full or the folder cannot be written; earlier parts are unchanged.
         """
         try:
-            staged = stage(self.path, self.manifest.rows, first, content, rows, verdicts)
+            staged = stage(self._storage, self.manifest.rows, first, content, rows, verdicts)
         except OSError as problem:
             raise self.write_error(problem) from problem
         if not self._open:  # the run was stopped meanwhile
-            (self.path / hidden_name(staged.name)).unlink(missing_ok=True)
+            self._storage.remove([hidden_name(staged.name)])
         return staged
 
     def commit(self, staged: Sequence[StagedPart]) -> None:
@@ -118,20 +118,18 @@ class OutputFolder:
         WriteError
             As for `stage`.
         """
-        with self._writing() as is_open, opened_folder(self.path) as at:
+        names = [name for name, _ in staged]
+        with self._writing() as is_open:
             if not is_open:  # the run was stopped while these parts were written
-                for name, _ in staged:
-                    with suppress(OSError):
-                        os.unlink(hidden_name(name), dir_fd=at)
+                with suppress(OSError):
+                    self._storage.remove(map(hidden_name, names))
                 return
-            for name, _ in staged:
-                os.rename(hidden_name(name), name, src_dir_fd=at, dst_dir_fd=at)
-            os.fsync(at)
+            self._storage.publish(names)
             self.manifest.parts.update(staged)
             try:
-                save(self.manifest, self.path)
-            except OSError:
-                for name, _ in staged:
+                save(self.manifest, self._storage)
+            except (OSError, errors.StoreError):
+                for name in names:
                     del self.manifest.parts[name]
                 raise
 
@@ -163,16 +161,22 @@ class OutputFolder:
             name = part_name(merged.first, merged.stop, self.manifest.rows)
             self.manifest.merge = Merge(name, merged, names)
             try:
-                save(self.manifest, self.path)
-                put_file(self.path, hidden_name(name), content)
-            except OSError:
+                save(self.manifest, self._storage)
+                self._storage.put(hidden_name(name), content)
+            except (OSError, errors.StoreError):
                 self.manifest.merge = None
                 raise
-            finish_merge(self.manifest, self.path)
-            save(self.manifest, self.path)
+            finish_merge(self.manifest, self.path, self._storage)
+            save(self.manifest, self._storage)
 
     def heartbeat(self) -> None:
-        """Show that the run is alive; cheap, call it often."""
+        """Show that the run is alive; cheap, call it often.
+
+        Raises
+        ------
+        FolderInUseError
+            Another run has taken the folder; on object stores only.
+        """
         self._lock.renew()
 
     def close(self, how: str, patience_s: float = 0.2) -> None:
@@ -195,8 +199,8 @@ class OutputFolder:
                 session = self.manifest.sessions[-1]
                 session.ended, session.how = now(), self._ended
                 self._remove_staged()
-                with suppress(OSError):  # a full disk must not hide what stopped the run
-                    save(self.manifest, self.path)
+                with suppress(OSError, errors.StoreError):  # a full disk must not hide what stopped the run
+                    save(self.manifest, self._storage)
                 self._lock.release()
         finally:
             self._busy.release()
@@ -208,11 +212,10 @@ class OutputFolder:
             return
         self._open = False
         with suppress(OSError):
-            (self.path / MANIFEST_NAME).unlink()
+            self._storage.discard_manifest()
         self._lock.release()
         if self._created:
-            with suppress(OSError):
-                self.path.rmdir()
+            self._storage.unmake()
 
     @contextmanager
     def _writing(self) -> Iterator[bool]:
@@ -229,18 +232,22 @@ class OutputFolder:
     def write_error(self, problem: OSError) -> errors.WriteError:
         """Describe why the folder cannot be written, and how to resume."""
         done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
+        advice = "resume" if isinstance(self.path, RemotePath) else "free some space and resume"
         return errors.WriteError(
-            f"cannot write into {self.path}: {problem.strerror}. {done}; free some space and resume with: "
-            f"{self.manifest.resume_command}"
+            f"cannot write into {self.path}: {problem.strerror}. {done}; {advice} with: {self.manifest.resume_command}"
         )
 
     def _remove_staged(self) -> None:
         """Remove parts that were staged and not committed."""
-        merging = None if self.manifest.merge is None else hidden_name(self.manifest.merge.name)
+        merge = self.manifest.merge
+        keep = set(self.manifest.parts) | (set() if merge is None else {merge.name, hidden_name(merge.name)})
         with suppress(OSError):
-            for path in self.path.iterdir():
-                if path.name.endswith(WRITING_SUFFIX) and is_ours(path.name) and path.name != merging:
-                    path.unlink(missing_ok=True)
+            self._storage.remove(name for name in self._storage.names() if _is_staged(name) and name not in keep)
+
+
+def _is_staged(name: str) -> bool:
+    """Whether a name is that of a part, final or temporary."""
+    return is_part_name(name) or (name.endswith(WRITING_SUFFIX) and is_ours(name))
 
 
 def _part(first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> Part:

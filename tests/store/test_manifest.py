@@ -25,6 +25,7 @@ from boulder_sweep.store.manifest import (
     part_name,
     save,
 )
+from boulder_sweep.store.storage import DiskStorage
 from tests.store.folders import OTHER_FORMS, rewrite_records
 
 
@@ -43,7 +44,7 @@ def test_what_is_saved_is_loaded(tmp_path, merging):
     if merging:
         name, part = next(iter(manifest.parts.items()))
         manifest.merge = Merge("x", part, [name])
-    save(manifest, tmp_path)
+    save(manifest, DiskStorage(tmp_path))
     assert load(tmp_path) == manifest
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST_NAME]
 
@@ -61,7 +62,7 @@ def test_a_folder_without_one_is_no_result(tmp_path):
 
 
 def test_every_flipped_byte_of_the_records_is_noticed(tmp_path):
-    save(manifest_with_parts(), tmp_path)
+    save(manifest_with_parts(), DiskStorage(tmp_path))
     path = tmp_path / MANIFEST_NAME
     content = path.read_bytes()
     first = content.index(b'"format"')
@@ -79,7 +80,7 @@ def test_records_of_another_version_are_not_guessed_at(tmp_path, form):
     change, words = OTHER_FORMS[form]
     manifest = manifest_with_parts()
     manifest.identity["versions"] = {"boulder-sweep": "7.8.9"}
-    save(manifest, tmp_path)
+    save(manifest, DiskStorage(tmp_path))
     rewrite_records(tmp_path, lambda records: None)
     assert load(tmp_path) == manifest
     rewrite_records(tmp_path, change)
@@ -91,7 +92,7 @@ def test_records_of_another_version_are_not_guessed_at(tmp_path, form):
 
 
 def test_a_table_with_other_columns_is_of_another_version(tmp_path):
-    save(manifest_with_parts(), tmp_path)
+    save(manifest_with_parts(), DiskStorage(tmp_path))
     path = tmp_path / MANIFEST_NAME
     schema = pq.read_schema(path)
     for other in (schema.remove(3), schema.append(pa.field("colour", pa.string()))):
@@ -103,7 +104,7 @@ def test_a_table_with_other_columns_is_of_another_version(tmp_path):
 
 def test_records_that_are_no_records(tmp_path):
     for nonsense in ([], "x", {"format": 1, "identity": 3}):
-        save(manifest_with_parts(), tmp_path)
+        save(manifest_with_parts(), DiskStorage(tmp_path))
         path = tmp_path / MANIFEST_NAME
         schema = pq.read_schema(path)
         text = json.dumps(nonsense).encode()
@@ -116,7 +117,7 @@ def test_records_that_are_no_records(tmp_path):
 
 @pytest.mark.parametrize("keep", [0, 3, 100, -1])
 def test_a_truncated_one_is_noticed(tmp_path, keep):
-    save(manifest_with_parts(), tmp_path)
+    save(manifest_with_parts(), DiskStorage(tmp_path))
     path = tmp_path / MANIFEST_NAME
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(DamagedError):

@@ -7,7 +7,7 @@ import errno
 import pyarrow as pa
 import pytest
 
-from boulder_sweep.store import merging, status, verify, writer
+from boulder_sweep.store import status, storage, verify, writer
 from boulder_sweep.store.errors import DamagedError, StoreError, WriteError
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.manifest import MANIFEST_NAME, load
@@ -68,10 +68,10 @@ def killed_at(monkeypatch, step: int):
         return maybe
 
     monkeypatch.setattr(writer, "save", watched(writer.save))
-    monkeypatch.setattr(writer, "put_file", watched(writer.put_file))
-    monkeypatch.setattr(merging, "flush_folder", watched(merging.flush_folder))
-    monkeypatch.setattr(type(merging.Path()), "unlink", watched(type(merging.Path()).unlink))
-    monkeypatch.setattr(type(merging.Path()), "rename", watched(type(merging.Path()).rename))
+    monkeypatch.setattr(storage, "flush_folder", watched(storage.flush_folder))
+    monkeypatch.setattr(storage.DiskStorage, "put", watched(storage.DiskStorage.put))
+    monkeypatch.setattr(storage.DiskStorage, "publish", watched(storage.DiskStorage.publish))
+    monkeypatch.setattr(storage.Path, "unlink", watched(storage.Path.unlink))
 
 
 @pytest.mark.parametrize("step", range(9))
@@ -89,7 +89,7 @@ def test_a_merge_killed_at_any_step_loses_and_doubles_nothing(out, monkeypatch, 
         else:
             killed = False
     folder._lock.release()
-    assert killed == (step < 8)  # announce, put, three unlinks, rename, flush, record
+    assert killed == (step < 8)  # announce, put, three unlinks, flush, rename, record
     for deep in (False, True):
         assert status(out, verify=deep).rows_done == 100
         assert status(out, verify=deep).damaged == {}
@@ -113,7 +113,7 @@ def test_a_full_disk_leaves_the_small_parts(out, monkeypatch, failing):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(writer, failing, full)
+        patch.setattr({"save": writer, "put_file": storage}[failing], failing, full)
         with pytest.raises(WriteError, match="No space left"):
             folder.merge(group, part_bytes(0, 100)[0])
     folder.close("stopped")

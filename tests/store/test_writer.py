@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from boulder_sweep.store import status, writer
+from boulder_sweep.store import status, storage, writer
 from boulder_sweep.store.errors import (
     DamagedError,
     FolderInUseError,
@@ -190,7 +190,7 @@ def test_a_full_disk_says_what_is_safe_and_how_to_go_on(tmp_path, monkeypatch):
     def full(*arguments):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(writer, "put_file", full)
+    monkeypatch.setattr(storage, "put_file", full)
     with pytest.raises(WriteError, match=r"No space left.*100 of 441 rows are safe.*--resume"):
         commit(folder, 100)
     monkeypatch.undo()

@@ -1,0 +1,254 @@
+"""Files and folders by path or by URL: ``out``, ``file:///data/out``, ``s3://bucket/out``.
+
+Everything with ``://`` but ``file://`` goes through fsspec. Credentials come from where the library of the file system
+looks for them (environment variables, its own files, the role of a machine). A URL that contains any is refused, so
+that none can get into a manifest, a log or a message.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import re
+import stat
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+from urllib.parse import unquote
+
+from boulder_sweep.errors import BoulderSweepError
+from boulder_sweep.text import one_line
+
+Result = TypeVar("Result")
+_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.\-]*)://([^/?#]*)([^?#]*)(.*)", re.DOTALL)
+_TRIES = 4
+FIRST_WAIT_S = 0.2
+"""Wait after the first failure of a request; three times longer after each one [s]."""
+_FINAL = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError, PermissionError)
+"""Answers of a store, not failures: trying again does not help."""
+
+
+class PlaceError(BoulderSweepError):
+    """A URL cannot be used; the text never repeats a user name, password or query from it."""
+
+
+class RemoteStat(NamedTuple):
+    """What `RemotePath.stat` returns."""
+
+    st_size: int
+    st_mode: int
+
+
+class RemotePath:
+    """A file or folder of an fsspec file system, with the methods of `pathlib.Path` that readers use.
+
+    Made by `place_of`. Every request is tried again a few times. Failures are raised as `OSError`, without the chain
+    of causes, which may quote what was sent.
+    """
+
+    def __init__(self, filesystem: Any, path: str, url: str):
+        self._filesystem, self._path, self._url = filesystem, path.rstrip("/"), url.rstrip("/")
+
+    def __str__(self) -> str:
+        return self._url
+
+    def __repr__(self) -> str:
+        return f"place_of({self._url!r})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, RemotePath) and other._url == self._url
+
+    def __hash__(self) -> int:
+        return hash(self._url)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return place_of, (self._url,)
+
+    def __truediv__(self, name: str) -> RemotePath:
+        return RemotePath(self._filesystem, f"{self._path}/{name}", f"{self._url}/{name}")
+
+    @property
+    def name(self) -> str:
+        """The last part of the URL."""
+        return self._path.rpartition("/")[2]
+
+    @property
+    def suffix(self) -> str:
+        """The ending of the name, with its dot."""
+        return Path(self.name).suffix
+
+    @property
+    def parent(self) -> RemotePath:
+        """The folder."""
+        return RemotePath(self._filesystem, self._path.rpartition("/")[0], self._url.rpartition("/")[0])
+
+    def resolve(self) -> RemotePath:
+        """Return the same place: URLs are absolute."""
+        return self
+
+    def exists(self) -> bool:
+        """Whether there is a file of this name, or a folder with a file in it."""
+        return bool(self._request(self._filesystem.exists, self._path))
+
+    def is_dir(self) -> bool:
+        """Whether there is a file below this name."""
+        return bool(self._request(self._filesystem.isdir, self._path))
+
+    def stat(self) -> RemoteStat:
+        """Return size and kind.
+
+        Raises
+        ------
+        OSError
+            There is no such file, or the store does not answer.
+        """
+        found = self._request(self._filesystem.info, self._path)
+        kind = stat.S_IFDIR if found.get("type") == "directory" else stat.S_IFREG
+        return RemoteStat(int(found.get("size") or 0), kind)
+
+    def read_bytes(self) -> bytes:
+        """Return the content of a file."""
+        return bytes(self._request(self._filesystem.cat_file, self._path))
+
+    def open(self, mode: str = "r", encoding: str | None = None, newline: str | None = None) -> Any:
+        """Open a file for reading; its content is fetched at once."""
+        content = io.BytesIO(self.read_bytes())
+        return content if "b" in mode else io.TextIOWrapper(content, encoding=encoding, newline=newline)
+
+    def names(self) -> list[str]:
+        """Return the names in a folder, those of folders with a slash at the end; none if there is no folder."""
+        try:
+            found = self._request(self._filesystem.ls, self._path, detail=True)
+        except FileNotFoundError:
+            return []
+        here = ((entry["name"].rstrip("/").rpartition("/")[2], entry["type"]) for entry in found)
+        return sorted(f"{name}/" if kind == "directory" else name for name, kind in here if name)
+
+    def put(self, content: memoryview | bytes, *, only_new: bool = False) -> None:
+        """Write a file in one step.
+
+        Parameters
+        ----------
+        content
+            All of it.
+        only_new
+            Leave it to the store to refuse a name that is taken; not every store can.
+
+        Raises
+        ------
+        FileExistsError
+            The name is taken; also after a first try whose answer was lost.
+        """
+        how = {"mode": "create"} if only_new else {}
+        self._request(self._filesystem.pipe_file, self._path, bytes(content), **how)
+
+    def copy_to(self, target: RemotePath) -> None:
+        """Copy a file within the store."""
+        self._request(self._filesystem.cp_file, self._path, target._path)
+
+    def unlink(self, missing_ok: bool = False) -> None:
+        """Remove a file."""
+        try:
+            self._request(self._filesystem.rm_file, self._path)
+        except FileNotFoundError:
+            if not missing_ok:
+                raise
+
+    def _request(self, request: Callable[..., Result], *arguments: Any, **options: Any) -> Result:
+        """Send a request, again if it fails.
+
+        Raises
+        ------
+        OSError
+            What the store answered, or the last failure.
+        """
+        wait = FIRST_WAIT_S
+        for left in range(_TRIES - 1, -1, -1):
+            try:
+                return request(*arguments, **options)
+            except _FINAL as answer:
+                failure = OSError(answer.errno or _NUMBERS[_kind(answer)], str(answer.strerror or one_line(answer)))
+                break
+            except Exception as problem:  # file systems raise whatever their libraries raise
+                failure = OSError(getattr(problem, "errno", None) or errno.EIO, one_line(problem))
+            if left:
+                time.sleep(wait)
+                wait *= 3
+        raise failure from None
+
+
+Place = Path | RemotePath
+"""Where a file or a folder is."""
+
+_NUMBERS = {
+    FileNotFoundError: errno.ENOENT,
+    FileExistsError: errno.EEXIST,
+    IsADirectoryError: errno.EISDIR,
+    NotADirectoryError: errno.ENOTDIR,
+    PermissionError: errno.EACCES,
+}
+
+
+def _kind(answer: OSError) -> type[OSError]:
+    """Return the class in `_NUMBERS` that an answer belongs to."""
+    return next(kind for kind in _NUMBERS if isinstance(answer, kind))
+
+
+def is_url(text: str) -> bool:
+    """Whether a text is meant as a URL."""
+    return "://" in text
+
+
+def place_of(text: str | Path | RemotePath) -> Place:
+    """Return the file or folder that a path or URL names.
+
+    Raises
+    ------
+    PlaceError
+        The URL has a user name, password or query in it, or no package can open it.
+    """
+    if not isinstance(text, str):
+        return text
+    if not is_url(text):
+        return Path(text)
+    found = _URL.fullmatch(text.strip())
+    if found is None:
+        raise PlaceError(f"{text.partition('://')[0]}:// is not the beginning of a URL")
+    scheme, host, path, rest = found[1].lower(), found[2], found[3], found[4]
+    shown = f"{scheme}://{host.rpartition('@')[2]}{path}"
+    if "@" in host or rest:
+        what = "a user name or password" if "@" in host else "a query or fragment"
+        raise PlaceError(
+            f"{shown}: the URL was given with {what}, which would be written down in many places; leave credentials "
+            f"where the library of the file system looks for them, such as AWS_ACCESS_KEY_ID or ~/.aws for s3"
+        )
+    if scheme == "file":
+        if host not in ("", "localhost"):
+            raise PlaceError(f"{shown}: files of another machine; write file:///folder")
+        return Path(unquote(path))
+    filesystem = _filesystem(scheme, shown)
+    return RemotePath(filesystem, filesystem._strip_protocol(shown), shown)
+
+
+def beside(place: Place, suffix: str) -> Path:
+    """Return the path of a file made from a result: beside it, or in the current directory for a URL."""
+    if isinstance(place, RemotePath):
+        return Path(f"{place.name.removesuffix('.sweep')}{suffix}")
+    return Path(f"{str(place if place.name else place.resolve()).removesuffix('.sweep')}{suffix}")
+
+
+def _filesystem(scheme: str, shown: str) -> Any:
+    """Return the file system of a URL, which remembers no lists of folders: others write, too."""
+    try:
+        import fsspec  # an extra: most users keep their results on a disk
+        from fsspec.asyn import AsyncFileSystem
+
+        kind = fsspec.get_filesystem_class(scheme)
+        fresh = {"use_listings_cache": False} if issubclass(kind, AsyncFileSystem) else {}
+        return fsspec.url_to_fs(shown, **fresh)[0]
+    except ImportError as missing:
+        extra = "pip install 'boulder-sweep[s3]'" if scheme in ("s3", "s3a", "memory") else one_line(missing)
+        raise PlaceError(f"{shown}: {scheme}:// needs another package: {extra}") from None
+    except ValueError as unknown:
+        raise PlaceError(f"{shown} cannot be opened: {one_line(unknown)}") from None

@@ -1,0 +1,177 @@
+"""One writer per folder on an object store: an object with the name of the holder and the time of its last heartbeat.
+
+The lock keeps two runs from working at the same time. Should one believe that the other is dead while it is not, it
+still cannot spoil the table: a version of the manifest is written once, see `generations`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import threading
+import time
+from contextlib import suppress
+from typing import Any
+
+from boulder_sweep.places import RemotePath
+from boulder_sweep.store.errors import FolderInUseError
+from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, LOCK_NAME
+
+_PROBE = "_probe-"
+
+
+class ObjectLock:
+    """The right to write into a folder, held from construction to `release`.
+
+    Parameters
+    ----------
+    folder
+        The output folder.
+    token
+        Unique name of this run.
+    only_new
+        Whether the store itself refuses to write an object that exists.
+    holder
+        Description of the run that seems to hold the lock.
+
+    Raises
+    ------
+    FolderInUseError
+        Another run holds it.
+    OSError
+        The folder cannot be written.
+    """
+
+    def __init__(self, folder: RemotePath, token: str, only_new: bool, holder: str):
+        self._folder, self._path, self._token = folder, folder / LOCK_NAME, token
+        self._lost = False
+        self._released = threading.Event()
+        there = _record(self._path)
+        if there is not None and _is_alive(there):
+            raise FolderInUseError(_in_use_text(folder, holder, there))
+        with suppress(FileExistsError):  # another was quicker, or the answer to the first try was lost
+            self._path.put(self._content(), only_new=only_new and there is None)
+        if (_record(self._path) or {}).get("token") != token:
+            raise FolderInUseError(f"{folder} is being written by {holder}")
+        threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
+
+    def is_ours(self) -> bool:
+        """Look whether the lock is still held: another run takes it from one that was silent for long."""
+        try:
+            return (_record(self._path) or {}).get("token") == self._token
+        except OSError:
+            return False
+
+    def renew(self) -> None:
+        """Check that the lock is still held; its heartbeat is sent by a thread.
+
+        Raises
+        ------
+        FolderInUseError
+            Another run has taken it.
+        """
+        if self._lost:
+            raise FolderInUseError(f"{self._folder} was taken over by another run while this one was silent")
+
+    def release(self) -> None:
+        """Release the lock; may be called twice."""
+        if self._released.is_set():
+            return
+        self._released.set()
+        with suppress(OSError):
+            if (_record(self._path) or {}).get("token") == self._token:
+                self._path.unlink(missing_ok=True)
+
+    def _beat(self) -> None:
+        """Renew the lock until it is released or taken."""
+        while not self._released.wait(HEARTBEAT_S):
+            with suppress(OSError):
+                there = _record(self._path)
+                self._lost = there is not None and there.get("token") != self._token
+                if self._lost:
+                    return
+                if not self._released.is_set():
+                    self._path.put(self._content())
+
+    def _content(self) -> bytes:
+        record = {"token": self._token, "host": socket.gethostname(), "pid": os.getpid(), "time": time.time()}
+        return json.dumps(record).encode()
+
+
+def is_held(folder: RemotePath) -> bool:
+    """Whether a run seems to be writing into a folder."""
+    there = _record(folder / LOCK_NAME)
+    return there is not None and _is_alive(there)
+
+
+def is_probe(name: str) -> bool:
+    """Whether a name is that of an object that `refuses_existing` wrote."""
+    return name.startswith(_PROBE)
+
+
+def refuses_existing(folder: RemotePath, token: str) -> bool:
+    """Find out whether the store can refuse to write an object that exists; and whether it can be written at all.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    probe = folder / f"{_PROBE}{token}"
+    try:
+        probe.put(b"1", only_new=True)
+    except FileExistsError:
+        pass  # the answer to a first try was lost
+    except OSError:
+        probe.put(b"1")  # the store may not know such requests
+        probe.unlink(missing_ok=True)
+        return False
+    try:
+        probe.put(b"2", only_new=True)
+    except FileExistsError:
+        return True
+    except OSError:
+        return False
+    else:
+        return False
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
+
+
+def _record(path: RemotePath) -> dict[str, Any] | None:
+    """Return what a lock says; None if there is no lock."""
+    try:
+        found = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _is_alive(there: dict[str, Any]) -> bool:
+    """Whether the holder of a lock may still be at work: not if its process is gone, or silent for long."""
+    if there.get("host") == socket.gethostname() and isinstance(there.get("pid"), int):
+        try:
+            os.kill(there["pid"], 0)
+        except ProcessLookupError:
+            return False
+        except OSError:
+            pass  # somebody else's process
+    return _age(there) < DEAD_AFTER_S
+
+
+def _age(there: dict[str, Any]) -> float:
+    """Return the time since the last heartbeat [s]."""
+    moment = there.get("time")
+    return abs(time.time() - moment) if isinstance(moment, int | float) else float("inf")
+
+
+def _in_use_text(folder: RemotePath, holder: str, there: dict[str, Any]) -> str:
+    """Say who holds the lock."""
+    return (
+        f"{folder} seems to be written by {holder}: its last heartbeat was {_age(there):.0f} s ago. "
+        f"If that run is dead, try again in {DEAD_AFTER_S:.0f} s"
+    )

@@ -1,0 +1,247 @@
+"""What a run does to its output folder, for folders on a disk and for folders on an object store.
+
+On a disk a file gets its final name by renaming, see `files`. An object store has no renaming: a part is put under its
+temporary name and copied to the final one within the store, and the manifest is written as numbered versions, see
+`generations`.
+"""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from stat import S_ISREG
+from typing import Any, Protocol
+
+from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.store import errors
+from boulder_sweep.store.files import check_writable, flush_folder, hidden_name, opened_folder, put_file
+from boulder_sweep.store.generations import MANIFEST_NAME, Encode, Generations, OtherWriterError
+from boulder_sweep.store.lock import FolderLock
+from boulder_sweep.store.object_lock import ObjectLock, refuses_existing
+
+_PROBE_BYTES = 1 << 16
+"""More than a first manifest takes."""
+_REQUESTS = 16
+"""Requests to a store at the same time."""
+
+
+class Lock(Protocol):
+    """The right to write into a folder."""
+
+    def renew(self) -> None:
+        """Show that the run is alive; cheap, call it often."""
+
+    def release(self) -> None:
+        """Give the right back; may be called twice."""
+
+
+class Storage(Protocol):
+    """What a run does to its output folder."""
+
+    def make(self) -> bool:
+        """Create the folder if it does not exist; True if it was created."""
+
+    def unmake(self) -> None:
+        """Remove the folder if it is empty and can be removed."""
+
+    def lock(self, last_host: str | None, holder: str) -> Lock:
+        """Become the only writer."""
+
+    def check_writable(self) -> None:
+        """Raise OSError if the folder cannot be written."""
+
+    def names(self) -> list[str]:
+        """Return the names in the folder."""
+
+    def is_folder(self, name: str) -> bool:
+        """Whether one of the names is that of a folder."""
+
+    def put(self, name: str, content: memoryview | bytes) -> None:
+        """Write a file whole or not at all, durably."""
+
+    def publish(self, names: Iterable[str]) -> None:
+        """Give staged files their final names, durably."""
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove files that may exist, durably."""
+
+    def put_manifest(self, encode: Encode) -> None:
+        """Replace the manifest in one step."""
+
+    def discard_manifest(self) -> None:
+        """Remove the manifest."""
+
+
+def storage_of(place: Place) -> Storage:
+    """Return how a run writes into a folder."""
+    return DiskStorage(place) if isinstance(place, Path) else ObjectStorage(place)
+
+
+class DiskStorage:
+    """A folder on a disk, local or shared."""
+
+    def __init__(self, path: Path):
+        self._path = path
+
+    def make(self) -> bool:
+        """Create the folder if it does not exist; True if it was created."""
+        path = self._path
+        if not path.parent.is_dir():
+            raise errors.StoreError(f"the folder {path.parent} does not exist: {path.name} cannot be created in it")
+        try:
+            path.mkdir()
+        except FileExistsError:
+            if not path.is_dir():
+                raise errors.StoreError(f"{path} is a file; the output of a sweep is a folder") from None
+            return False
+        except OSError as problem:
+            raise errors.WriteError(f"cannot create the folder {path}: {problem.strerror}") from problem
+        return True
+
+    def unmake(self) -> None:
+        """Remove the folder if it is empty and can be removed."""
+        with suppress(OSError):
+            self._path.rmdir()
+
+    def lock(self, last_host: str | None, holder: str) -> Lock:
+        """Become the only writer."""
+        return FolderLock(self._path, last_host, holder)
+
+    def check_writable(self) -> None:
+        """Raise OSError if the folder cannot be written."""
+        check_writable(self._path, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
+
+    def names(self) -> list[str]:
+        """Return the names in the folder."""
+        return sorted(entry.name for entry in self._path.iterdir())
+
+    def is_folder(self, name: str) -> bool:
+        """Whether one of the names is that of a folder."""
+        return (self._path / name).is_dir()
+
+    def put(self, name: str, content: memoryview | bytes) -> None:
+        """Write a file whole or not at all, durably."""
+        put_file(self._path, name, content)
+
+    def publish(self, names: Iterable[str]) -> None:
+        """Give staged files their final names, durably."""
+        with opened_folder(self._path) as at:
+            for name in names:
+                os.rename(hidden_name(name), name, src_dir_fd=at, dst_dir_fd=at)
+            os.fsync(at)
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove files that may exist, durably."""
+        names = list(names)
+        for name in names:
+            (self._path / name).unlink(missing_ok=True)
+        if names:
+            flush_folder(self._path)
+
+    def put_manifest(self, encode: Encode) -> None:
+        """Replace the manifest in one step."""
+        put_file(self._path, MANIFEST_NAME, encode({}))
+
+    def discard_manifest(self) -> None:
+        """Remove the manifest."""
+        (self._path / MANIFEST_NAME).unlink()
+
+
+class ObjectStorage:
+    """A folder on an object store, or on any other file system of fsspec."""
+
+    def __init__(self, path: RemotePath):
+        self._path = path
+        self._token = uuid.uuid4().hex
+        self._generations: Generations | None = None
+        self._lock: ObjectLock | None = None
+
+    def make(self) -> bool:
+        """Create nothing, for folders exist by their files only; True if there are none."""
+        try:
+            if S_ISREG(self._path.stat().st_mode):
+                raise errors.StoreError(f"{self._path} is a file; the output of a sweep is a folder")
+        except FileNotFoundError:
+            return True
+        except OSError as problem:
+            raise errors.WriteError(f"cannot write into {self._path}: {problem.strerror}") from None
+        return not self.names()
+
+    def unmake(self) -> None:
+        """Do nothing."""
+
+    def lock(self, last_host: str | None, holder: str) -> Lock:
+        """Become the only writer; then look which version of the manifest is the newest."""
+        try:
+            only_new = refuses_existing(self._path, self._token)
+            lock = ObjectLock(self._path, self._token, only_new, holder)
+        except OSError as problem:
+            raise errors.WriteError(f"cannot write into {self._path}: {problem.strerror}") from None
+        self._lock = lock
+        self._generations = Generations(self._path, self._token, only_new)
+        try:
+            self._generations.look()
+        except BaseException:
+            lock.release()
+            raise
+        return lock
+
+    def check_writable(self) -> None:
+        """Do nothing: `lock` has written."""
+
+    def names(self) -> list[str]:
+        """Return the names in the folder."""
+        return self._path.names()
+
+    def is_folder(self, name: str) -> bool:
+        """Whether one of the names is that of a folder."""
+        return name.endswith("/")
+
+    def put(self, name: str, content: memoryview | bytes) -> None:
+        """Write a file whole or not at all."""
+        (self._path / name).put(content)
+
+    def publish(self, names: Iterable[str]) -> None:
+        """Copy staged files to their final names and remove the staged ones."""
+        self._each(self._publish, names)
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove files that may exist."""
+        if self._lock is not None and not self._lock.is_ours():
+            return  # they may be another run's now
+        self._each(lambda name: (self._path / name).unlink(missing_ok=True), names)
+
+    def put_manifest(self, encode: Encode) -> None:
+        """Write the next version of the manifest."""
+        if self._generations is None:
+            raise RuntimeError("a manifest is written with the lock held only")
+        try:
+            self._generations.put(encode)
+        except OtherWriterError:
+            raise errors.FolderInUseError(f"{self._path} was taken over by another run") from None
+
+    def discard_manifest(self) -> None:
+        """Remove the manifest."""
+        if self._generations is not None:
+            self._generations.discard()
+
+    def _publish(self, name: str) -> None:
+        """Copy one staged file to its final name; right if repeated."""
+        staged, final = self._path / hidden_name(name), self._path / name
+        try:
+            staged.copy_to(final)
+        except FileNotFoundError:
+            if not final.exists():
+                raise
+        with suppress(OSError):
+            staged.unlink(missing_ok=True)
+
+    def _each(self, act: Callable[[str], Any], names: Iterable[str]) -> None:
+        """Send requests for several files at the same time."""
+        with ThreadPoolExecutor(_REQUESTS) as pool:
+            for _ in pool.map(act, names):
+                pass
