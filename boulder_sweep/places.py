@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import io
+import os
 import re
 import stat
 import time
@@ -22,6 +23,9 @@ from boulder_sweep.text import one_line
 
 Result = TypeVar("Result")
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.\-]*)://([^/?#]*)([^?#]*)(.*)", re.DOTALL)
+_SECRET_IN_URL = re.compile(r"""://([^/\s'"]*@)|(?<=[^\s'"])\?[^\s'"]+=[^\s'"]*""")
+_SECRET_NAME = re.compile("KEY|SECRET|TOKEN|PASSW|CREDENTIAL|CONNECTION_STRING")
+_SHORTEST_SECRET = 8
 _TRIES = 4
 FIRST_WAIT_S = 0.2
 """Wait after the first failure of a request; three times longer after each one [s]."""
@@ -168,10 +172,10 @@ class RemotePath:
             try:
                 return request(*arguments, **options)
             except _FINAL as answer:
-                failure = OSError(answer.errno or _NUMBERS[_kind(answer)], str(answer.strerror or one_line(answer)))
+                failure = OSError(answer.errno or _NUMBERS[_kind(answer)], harmless(answer))
                 break
             except Exception as problem:  # file systems raise whatever their libraries raise
-                failure = OSError(getattr(problem, "errno", None) or errno.EIO, one_line(problem))
+                failure = OSError(getattr(problem, "errno", None) or errno.EIO, harmless(problem))
             if left:
                 time.sleep(wait)
                 wait *= 3
@@ -193,6 +197,15 @@ _NUMBERS = {
 def _kind(answer: OSError) -> type[OSError]:
     """Return the class in `_NUMBERS` that an answer belongs to."""
     return next(kind for kind in _NUMBERS if isinstance(answer, kind))
+
+
+def harmless(problem: BaseException) -> str:
+    """Describe a failure in one line, without what a library may have quoted of credentials."""
+    text = one_line(problem)
+    for name, value in os.environ.items():
+        if len(value) >= _SHORTEST_SECRET and _SECRET_NAME.search(name):
+            text = text.replace(value, "***")
+    return _SECRET_IN_URL.sub(lambda found: "://" if found[1] else "?***", text)
 
 
 def is_url(text: str) -> bool:
@@ -229,6 +242,11 @@ def place_of(text: str | Path | RemotePath) -> Place:
         return Path(unquote(path))
     filesystem = _filesystem(scheme, shown)
     return RemotePath(filesystem, filesystem._strip_protocol(shown), shown)
+
+
+def source_of(place: Place) -> Any:
+    """Return what libraries can read a file from: its path, or its content opened."""
+    return place if isinstance(place, Path) else place.open("rb")
 
 
 def beside(place: Place, suffix: str) -> Path:

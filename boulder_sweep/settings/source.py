@@ -5,6 +5,7 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
+from boulder_sweep.places import RemotePath
 from boulder_sweep.settings.problems import Problem, SettingsError
 
 MAX_BYTES = 500_000
@@ -23,12 +24,12 @@ def refuse(file: str, message: str, line: int | None = None, column: int | None 
     return SettingsError([Problem(file, line, column, "", message)])
 
 
-def check_regular_file(path: Path, max_bytes: int, what: str) -> None:
+def check_regular_file(path: Path | RemotePath, max_bytes: int, what: str) -> None:
     """Refuse anything but a regular file of at most `max_bytes`, before a byte is read.
 
     Parameters
     ----------
-    path : Path
+    path : Path or RemotePath
         The file.
     max_bytes : int
         Largest size admitted.

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.designs import Label
+from boulder_sweep.places import Place as FilePlace
+from boulder_sweep.places import PlaceError, is_url, place_of, source_of
 from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, shorten
 from boulder_sweep.settings.source import check_regular_file, refuse
 from boulder_sweep.settings.sweep import DesignList
@@ -36,7 +38,7 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
     Parameters
     ----------
     node : Scalar
-        The file's name as written in the settings.
+        The file's name as written in the settings, or its URL.
     folder : Path
         Where relative names begin.
     problems : ProblemList
@@ -47,7 +49,12 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
     DesignList or None
         None where the table cannot be used; the problems say why.
     """
-    path = folder / Path(node.text.strip())
+    text = node.text.strip()
+    try:
+        path = place_of(text) if is_url(text) else folder / Path(text)
+    except PlaceError as refused:
+        problems.add(node.place, "table", str(refused))
+        return None
     before = len(problems.problems)
     suffix = path.suffix.lower()
     reader = _READERS.get(suffix)
@@ -68,7 +75,7 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
     return None if len(problems.problems) > before else found
 
 
-def _read_parquet(path: Path, problems: ProblemList) -> DesignList:
+def _read_parquet(path: FilePlace, problems: ProblemList) -> DesignList:
     # pyarrow takes a third of a second to import: only for tables in this format.
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -78,7 +85,7 @@ def _read_parquet(path: Path, problems: ProblemList) -> DesignList:
     alike = Alike(problems)
     found = DesignList(path.name, {})
     try:
-        file = pq.ParquetFile(path)
+        file = pq.ParquetFile(source_of(path))
         rows = file.metadata.num_rows
         if rows > MAX_TABLE_ROWS:
             raise refuse(label, f"has {rows} rows; a table takes at most {MAX_TABLE_ROWS}")
@@ -125,7 +132,7 @@ def _label(cells: pa.ChunkedArray) -> Label:
     return Label(words.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], words.words)
 
 
-_READERS: dict[str, Callable[[Path, ProblemList], DesignList]] = {
+_READERS: dict[str, Callable[[FilePlace, ProblemList], DesignList]] = {
     ".csv": read_csv,
     ".xlsx": read_xlsx,
     ".parquet": _read_parquet,

@@ -7,12 +7,13 @@ import re
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
 from boulder_sweep.designs import Label
+from boulder_sweep.places import Place as FilePlace
+from boulder_sweep.places import source_of
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.leaf import outside
 from boulder_sweep.settings.numbers import NumberError, split_number
@@ -83,7 +84,7 @@ def converted(values: np.ndarray, column: TableColumn) -> np.ndarray:
 class _Rows:
     """Turns rows of text into columns of numbers, a chunk at a time."""
 
-    def __init__(self, path: Path, problems: ProblemList, place: Callable[[Origin, int], Place]) -> None:
+    def __init__(self, path: FilePlace, problems: ProblemList, place: Callable[[Origin, int], Place]) -> None:
         self.path = path
         self.place = place
         self.label = str(path)
@@ -200,12 +201,12 @@ class _Lines:
             yield line
 
 
-def read_csv(path: Path, problems: ProblemList) -> DesignList:
+def read_csv(path: FilePlace, problems: ProblemList) -> DesignList:
     """Return the designs of a CSV file.
 
     Parameters
     ----------
-    path : Path
+    path : Path or RemotePath
         UTF-8 text, comma, semicolon or tab between the cells, first line the column names. Lines that begin
         with # and empty lines are skipped.
     problems : ProblemList
@@ -226,7 +227,7 @@ def read_csv(path: Path, problems: ProblemList) -> DesignList:
         raise refuse(label, f"cannot be read ({error.strerror})") from None
 
 
-def _read_lines(source: _Lines, path: Path, problems: ProblemList) -> DesignList:
+def _read_lines(source: _Lines, path: FilePlace, problems: ProblemList) -> DesignList:
     """Take the lines of a CSV file."""
     label = str(path)
     lines = iter(source)
@@ -254,12 +255,12 @@ def _place(label: str, line: int, cells: list[str], index: int) -> Place:
     return Place(label, line, sum(len(cell) + 1 for cell in cells[:index]) + 1)
 
 
-def read_xlsx(path: Path, problems: ProblemList) -> DesignList:
+def read_xlsx(path: FilePlace, problems: ProblemList) -> DesignList:
     """Return the designs of the first sheet of a spreadsheet; row and column of a cell are its place.
 
     Parameters
     ----------
-    path : Path
+    path : Path or RemotePath
         Excel workbook; first row the column names. Empty rows are skipped, formulas count by their stored value.
     problems : ProblemList
         Receives mistakes.
@@ -276,10 +277,11 @@ def read_xlsx(path: Path, problems: ProblemList) -> DesignList:
         raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
     rows = _Rows(path, problems, lambda origin, index: Place(label, origin[0], index + 1))
     try:
-        with zipfile.ZipFile(path) as archive:
+        source = source_of(path)
+        with zipfile.ZipFile(source) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > MAX_UNPACKED_BYTES:
                 raise refuse(label, f"has more than {MAX_UNPACKED_BYTES / 1e9:g} GB once unpacked; save it as CSV")
-        book = load_workbook(path, read_only=True, data_only=True)
+        book = load_workbook(source, read_only=True, data_only=True)
         for number, cells in enumerate(book.worksheets[0].iter_rows(values_only=True), 1):
             texts = ["" if cell is None else str(cell) for cell in cells]
             origin = (number, "")

@@ -105,7 +105,12 @@ class Generations:
         while True:
             number = self._number + 1
             content = bytes(encode({_NUMBER_KEY: str(number).encode(), _WRITER_KEY: self._writer.encode()}))
-            there = self._created(number, content)
+            try:
+                there = self._created(number, content)
+            except OSError:
+                if not self._only_new:
+                    self._number = number  # it may arrive late, and must then not replace another
+                raise
             if there != content and _metadata(there).get(_WRITER_KEY, b"").decode() != self._writer:
                 raise OtherWriterError
             self._number = number

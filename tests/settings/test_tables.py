@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from boulder_sweep.places import place_of
 from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.fields import INPUTS
 
@@ -387,3 +388,38 @@ def test_an_empty_spreadsheet(write_xlsx, messages_of):
     assert "is empty; the first row" in messages_of(None, "designs.xlsx")[0]
     write_xlsx(HEADER.strip().split(","))
     assert "no rows below the column names" in messages_of(None, "designs.xlsx")[0]
+
+
+@pytest.mark.parametrize("suffix", ["csv", "xlsx", "parquet"])
+def test_a_table_may_be_named_by_a_url(load_table, tmp_path, suffix):
+    names, *rows = [line.split(",") for line in (HEADER + ROWS).splitlines()]
+    columns = {name: [float(row[place]) for row in rows] for place, name in enumerate(names)}
+    local = tmp_path / f"designs.{suffix}"
+    if suffix == "csv":
+        local.write_text(HEADER + ROWS)
+    elif suffix == "parquet":
+        pq.write_table(pa.table(columns), local)
+    else:
+        book = openpyxl.Workbook()
+        for row in [names, *[[float(cell) for cell in row] for row in rows]]:
+            book.active.append(row)
+        book.save(local)
+    url = f"memory://tables/designs.{suffix}"
+    place_of(url).put(local.read_bytes())
+    sweep, same = load_table(None, url), load_table(None, local.name)
+    assert _column(sweep, "boulder_height_m") == [2.2, 3.44]
+    assert sweep.resolved() == same.resolved()
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("memory://tables/none.csv", "memory://tables/none.csv: there is no such file"),
+        ("s3://KEY:SECRET@bucket/designs.csv", "s3://bucket/designs.csv: the URL was given with a user name"),
+        ("memory://tables/designs.doc", "is none of these"),
+    ],
+)
+def test_a_url_that_gives_no_table_is_told_without_its_secrets(messages_of, url, words):
+    (message,) = messages_of(None, url)
+    assert words in message
+    assert "SECRET" not in message

@@ -1,0 +1,33 @@
+"""Commands that take a folder take a URL."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+
+@pytest.fixture
+def out(sweep, possible_grid):
+    url = "memory://results/possible.sweep"
+    code, *_ = sweep("run", possible_grid, "-q", "-o", url, "--overwrite")
+    assert code == 0
+    return url
+
+
+def test_status_plot_report_explain_and_export_take_the_url_of_a_result(sweep, out, tmp_path):
+    code, told, _ = sweep("status", out, "--verify", "--json")
+    found = json.loads(told)
+    assert (code, found["out"], found["complete"], found["damaged"]) == (0, out, True, {})
+    assert sweep("plot", out)[0] == 0
+    assert sweep("report", out)[0] == 0
+    assert sweep("explain", out, "3")[0] == 0
+    assert sweep("export", out, "-o", "table.csv")[0] == 0
+    assert {path.name for path in tmp_path.iterdir()} >= {"possible.png", "possible.html", "table.csv"}
+
+
+def test_a_url_with_credentials_is_refused_before_anything_is_done(sweep, possible_grid):
+    code, out, err = sweep("run", possible_grid, "-o", "s3://KEY:SECRET@bucket/out")
+    assert (code, out) == (2, "")
+    assert err.startswith("error: s3://bucket/out: the URL was given with a user name or password")
+    assert "SECRET" not in err

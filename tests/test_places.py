@@ -1,0 +1,79 @@
+"""Paths and URLs: what they name, what is refused, and that no message repeats a secret."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import pytest
+
+from boulder_sweep.places import PlaceError, RemotePath, beside, place_of
+
+
+@pytest.mark.parametrize(
+    ("text", "path"),
+    [
+        ("out", "out"),
+        ("/data/m30.sweep", "/data/m30.sweep"),
+        ("file:///data/my%20out", "/data/my out"),
+        ("file://localhost/data/out", "/data/out"),
+    ],
+)
+def test_paths_and_file_urls_are_paths(text, path):
+    assert place_of(text) == Path(path)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "s3://AKIA:SECRET@bucket/out",
+        "s3://SECRET@bucket/out",
+        "s3://bucket/out?X-Amz-Signature=SECRET",
+        "s3://bucket/out#SECRET",
+        "memory://user:SECRET@x/out",
+        "file://user:SECRET@host/out",
+    ],
+)
+def test_a_url_with_credentials_is_refused_without_repeating_them(url):
+    with pytest.raises(PlaceError, match="leave credentials where the library") as refused:
+        place_of(url)
+    assert "SECRET" not in str(refused.value)
+    assert "AKIA" not in str(refused.value)
+    assert refused.value.__cause__ is None
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("file://host/out", "another machine"),
+        ("nosuch://x/out", "cannot be opened.*nosuch"),
+        ("a b://x", "not the beginning of a URL"),
+    ],
+)
+def test_urls_that_cannot_be_opened_are_refused(url, words):
+    with pytest.raises(PlaceError, match=words):
+        place_of(url)
+
+
+def test_a_url_behaves_like_a_path_and_can_be_sent():
+    place = place_of("memory://places/m30.sweep/")
+    assert isinstance(place, RemotePath)
+    assert str(place / "a.csv") == "memory://places/m30.sweep/a.csv"
+    assert ((place / "a.csv").name, (place / "a.csv").suffix, (place / "a.csv").parent) == ("a.csv", ".csv", place)
+    assert pickle.loads(pickle.dumps(place)) == place
+    assert not (place / "a.csv").exists()
+    (place / "a.csv").put("a,é\n".encode())
+    assert (place / "a.csv").open(encoding="utf-8").read() == "a,é\n"
+    assert (place / "a.csv").stat().st_size == 5
+    assert place.is_dir()
+    assert place.names() == ["a.csv"]
+    with pytest.raises(FileExistsError):
+        (place / "a.csv").put(b"", only_new=True)
+    (place / "a.csv").unlink()
+    with pytest.raises(FileNotFoundError):
+        (place / "a.csv").read_bytes()
+
+
+def test_files_made_from_a_result_lie_beside_it_or_here():
+    assert beside(Path("runs/m30.sweep"), ".png") == Path("runs/m30.png")
+    assert beside(place_of("memory://x/m30.sweep"), ".html") == Path("m30.html")
