@@ -221,9 +221,9 @@ def place_of(text: str | Path | RemotePath) -> Place:
     PlaceError
         The URL has a user name, password or query in it, or no package can open it.
     """
-    if not isinstance(text, str):
+    if isinstance(text, RemotePath):
         return text
-    if not is_url(text):
+    if not isinstance(text, str) or not is_url(text):
         return Path(text)
     found = _URL.fullmatch(text.strip())
     if found is None:
