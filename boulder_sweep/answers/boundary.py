@@ -1,10 +1,10 @@
-"""The map of a grid from a few per cent of its designs: simulated only near where the verdict changes.
+"""The verdict map of a grid, simulated only near the places where the verdict changes.
 
-One axis, the longest, is taken as a line: along it designs begin to pass at some place. On a few lines, spread over the
-grid, that place is located between the values of the axis; for all others it is interpolated. Then every design is
-simulated that lies nearer to the interpolated place of its line than the interpolation can be trusted, and where one of
-them is a surprise, its neighbours are, too, until there is none. The rest follows. A patch of other verdicts far from
-every change, or a second change along a line, is not seen.
+The longest axis of the grid is cut into lines. Along a line, designs begin to pass at some place. That place is located
+on a few lines spread over the grid and interpolated for all others. Every design closer to the interpolated place than
+the interpolation error is simulated; where a result contradicts the interpolation, its neighbours are simulated too,
+until none does. All other verdicts follow. A patch of different verdicts far from any change, or a second change along
+a line, is missed.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ if TYPE_CHECKING:
 MOST_CELLS = 20_000_000
 AT_ONCE = 2048
 WORSE_UPWARDS = ("impact_speed_m_s", "vehicle_mass_kg", "impact_height_m")
-"""Inputs of which small values pass."""
+"""Inputs for which small values pass."""
 UNKNOWN = -1
 FINENESS = 16
-"""Into so many parts of the distance of two values a change is located."""
+"""A change is located to this fraction of the spacing of the axis."""
 MOST_SPREAD = 4
-"""Values of each other axis on whose lines changes are located."""
+"""Number of values of each other axis whose lines have their change located."""
 LEAST_DOUBT = 0.2
-"""Distance from an interpolated change, in distances of two values, within which designs are simulated at least."""
+"""Smallest distance from an interpolated change, in spacings of the axis, within which designs are simulated."""
 BOUND_DOUBT = 0.05
-"""And more beside lines of which none or all pass, as a share of their length."""
+"""Extra distance next to lines where all or none pass, as a share of their length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +57,11 @@ class Boundary:
     verdict : ndarray of int8, shape (n,)
         Code of the verdict of every design, in the order of the grid.
     reason : ndarray of int8, shape (n,)
-        Code of its reason; of designs that were not simulated that of the nearest one along the line.
+        Code of its reason; for designs that were not simulated, that of the nearest one along the line.
     simulated : ndarray of bool, shape (n,)
-        Whether the design was simulated; the others are told from their neighbours.
+        Whether the design was simulated; the others are inferred from their neighbours.
     simulations : int
-        Designs simulated, those between the values of the axis included.
+        Designs simulated, including those between the values of the axis.
     """
 
     sweep: Sweep
@@ -76,7 +76,7 @@ class Boundary:
         return self.simulations / len(self.verdict)
 
     def counts(self) -> dict[str, int]:
-        """Return how many designs have which verdict."""
+        """Return the number of designs of each verdict."""
         counts = np.bincount(self.verdict, minlength=len(VERDICTS))
         return {verdict: int(count) for verdict, count in zip(VERDICTS, counts, strict=True)}
 
@@ -118,7 +118,7 @@ class Boundary:
 
 
 def boundary(sweep: Sweep, *, jobs: int | None = None) -> Boundary:
-    """Map which designs of a grid pass, from few of them.
+    """Map which designs of a grid pass by simulating only a few of them.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def boundary(sweep: Sweep, *, jobs: int | None = None) -> Boundary:
         raise QuestionError("a map needs a grid with at least one axis")
     if sweep.n_designs > MOST_CELLS:
         raise QuestionError(f"a map of {sweep.n_designs:,} designs is too large; at most {MOST_CELLS:,}")
-    # Too little overlap is known from the inputs alone, and puts an end to what passes along a line: it is added last.
+    # Too little overlap is known from the inputs alone and ends the passing stretch of a line, so it is added last.
     judges = judges_of(replace(sweep, criterion=replace(sweep.criterion, min_overlap_m=0.0)))
     judges.own.warm_up()
     lines = _Lines(sweep, judges, threads(jobs))
@@ -161,7 +161,7 @@ def _without_overlap(found: Boundary) -> Boundary:
 
 
 class _Lines:
-    """The lines of a grid along its longest axis, and where along each of them designs begin to pass."""
+    """The lines of a grid along its longest axis, and the place on each where designs begin to pass."""
 
     def __init__(self, sweep: Sweep, judges: Judges, parallel: joblib.Parallel) -> None:
         self.sweep, self.judges, self.parallel = sweep, judges, parallel
@@ -182,23 +182,23 @@ class _Lines:
         self.verdict = np.where(over, FAIL, UNKNOWN).astype(np.int8)
         self.reason = np.where(over, NO_CONTACT, 0).astype(np.int8)
         self.simulated = np.zeros(over.shape, dtype=bool)
-        # Buried ever deeper, a boulder passes until the truck passes over it.
+        # A boulder buried deeper and deeper passes until the truck goes over it.
         self.over_is_beyond = self.name in EMBEDMENT
         self.extra = 0
         """Designs simulated between the values of the axis."""
 
     def by_line(self, values: np.ndarray) -> np.ndarray:
-        """Return values of all designs by line and place along it, from what fails to what passes."""
+        """Rearrange values of all designs by line and position, from failing to passing."""
         moved = np.moveaxis(values.reshape(self.shape), self.axis, -1).reshape(self.count, self.length)
         return np.ascontiguousarray(moved if self.upwards else moved[:, ::-1])
 
     def by_number(self, values: np.ndarray) -> np.ndarray:
-        """Return what `by_line` was given."""
+        """Undo `by_line`."""
         ordered = values if self.upwards else values[:, ::-1]
         return np.moveaxis(ordered.reshape(*self.others, self.length), -1, self.axis).reshape(-1)
 
     def simulate(self, lines: np.ndarray, places: np.ndarray) -> None:
-        """Simulate designs that are not known."""
+        """Simulate the designs that have not been simulated yet."""
         new = np.unique(lines * self.length + places)
         new = new[self.verdict.reshape(-1)[new] == UNKNOWN]
         verdict, reason = self.judged(new // self.length, (new % self.length).astype(float))
@@ -235,9 +235,9 @@ class _Lines:
         return judged.verdict.astype(np.int8), judged.reason.astype(np.int8)
 
     def located(self, lines: np.ndarray) -> np.ndarray:
-        """Return where designs begin to pass along some lines, to a part of the distance of two values.
+        """Return where designs begin to pass along some lines, to a fraction of the spacing of the axis.
 
-        From -1, where all pass, to the number of values, where none does.
+        The result is -1 where all pass and the number of values where none does.
         """
         low, high = np.full(len(lines), -1.0), np.full(len(lines), float(self.length))
         for _ in range(math.ceil(math.log2((self.length + 1) * FINENESS))):
@@ -258,12 +258,12 @@ class _Lines:
         return 0.5 * (low + high)
 
     def holds(self, lines: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return whether known designs pass, or lie beyond what can pass."""
+        """Return whether simulated designs pass, or lie beyond the passing stretch."""
         verdict, reason = self.verdict[lines, places], self.reason[lines, places]
         return (verdict == PASS) | (self.over_is_beyond & (reason == NO_CONTACT))
 
     def fill(self) -> None:
-        """Find out all that cannot be told from its neighbours."""
+        """Simulate every design whose verdict cannot be inferred from its neighbours."""
         chosen = [_spread(length) for length in self.others]
         grids = np.meshgrid(*chosen, indexing="ij")
         lines = (
@@ -278,16 +278,17 @@ class _Lines:
             self.simulate(*np.nonzero(near))
             known = self.verdict != UNKNOWN
             holds = (self.verdict == PASS) | (self.over_is_beyond & (self.reason == NO_CONTACT))
-            # A surprise is what is known and not as told; all beside it, on its line and those around it, is tried.
+            # Where a simulated design contradicts its inferred verdict, its neighbours on this line and the next are
+            # simulated.
             surprise = self.simulated & (holds != told)
             told = np.where(known, holds, told)
             near = _beside(surprise.reshape(*self.others, self.length)).reshape(surprise.shape) & ~known
         self.told = told
 
     def _interpolated(self, chosen: list[np.ndarray], at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return where designs begin to pass on every line, and how far that may be off."""
+        """Return where designs begin to pass on every line, and the error of that estimate."""
         smooth, plain = at, at
-        # Where none or all of a line pass, what is known of it is a bound, and its neighbours are told badly from it.
+        # A line where all or none pass gives only a bound, from which its neighbours are poorly interpolated.
         bound = ((at < 0.0) | (at > self.length - 1)).astype(float)
         for axis, own in enumerate(chosen):
             wanted = np.arange(self.others[axis])
@@ -299,7 +300,7 @@ class _Lines:
         return smooth.reshape(-1), doubt.reshape(-1)
 
     def map(self) -> Boundary:
-        """Return the map with all designs that were not simulated told from the places of the lines."""
+        """Return the map, inferring the verdicts of designs that were not simulated."""
         unknown = self.verdict == UNKNOWN
         verdict = np.where(unknown, np.where(self.told, PASS, FAIL), self.verdict).astype(np.int8)
         failed = self.reason[self.simulated & (self.verdict == FAIL)]
@@ -315,7 +316,7 @@ class _Lines:
 
 
 def _spread(length: int) -> np.ndarray:
-    """Return some places of an axis, both ends among them."""
+    """Return some positions of an axis, including both ends."""
     return np.unique(
         np.rint(np.linspace(0, length - 1, min(length, MOST_SPREAD if length > 4 else 3))).astype(np.int64)
     )

@@ -1,8 +1,8 @@
-"""The chance of an event by scrambled Sobol points, with an interval, stopped when the interval is narrow enough.
+"""The probability of an event from scrambled Sobol points, sampled until its confidence interval is narrow enough.
 
-Several independent scramblings of the same sequence are drawn. Each gives one estimate, and the spread of the estimates
-gives the interval (Student's t). Where hardly any point lies on the one side, the estimates say too little about
-themselves, and the exact binomial interval of Clopper and Pearson is taken.
+Several independent scramblings of the sequence give one estimate each; their spread gives the interval (Student's t).
+Where hardly any point lies on one side, their spread is not reliable and the exact binomial interval of Clopper and
+Pearson is used.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from scipy.stats import qmc
 SCRAMBLINGS = 16
 """Independent estimates."""
 FIRST = 32
-"""Points of each at first; doubled until the interval is narrow enough."""
+"""Initial points of each; doubled until the interval is narrow enough."""
 FEWEST = 2 * SCRAMBLINGS
-"""Points on either side with fewer of which the binomial interval is taken."""
+"""With fewer points than this on either side, the binomial interval is used."""
 SMALLEST = 1e-12
-"""Points are kept so far from the ends of the unit cube."""
+"""Distance kept from the faces of the unit cube."""
 
 Event = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Rows, shape (m,), and standard normal numbers, shape (m, d), to whether it happens, bool, shape (m,)."""
+"""Maps row numbers, shape (m,), and standard normals, shape (m, d), to whether the event occurs, bool, shape (m,)."""
 
 
 class Points:
@@ -33,7 +33,7 @@ class Points:
     Parameters
     ----------
     dimensions
-        Numbers of a point.
+        Dimensions of a point.
     seed
         The same seed gives the same points.
     """
@@ -55,14 +55,14 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Chance:
-    """Chances of n rows.
+    """Probabilities of n rows.
 
     Attributes
     ----------
     estimate, low, high : ndarray, shape (n,)
-        The chance and its interval.
+        The probability and its confidence interval.
     points : ndarray of int64, shape (n,)
-        Points that were tried.
+        Points used.
     """
 
     estimate: np.ndarray
@@ -81,29 +81,29 @@ def chance(
     most: int = 1 << 16,
     first: int = FIRST,
 ) -> Chance:
-    """Estimate the chance of an event in n rows.
+    """Estimate the probability of an event in n rows.
 
     Parameters
     ----------
     event
-        Tells whether it happens.
+        Returns whether it occurs.
     rows
-        How many rows; all of them see the same points, so that they can be compared.
+        Number of rows; all use the same points, so that they can be compared.
     points
         The points.
     half_width
-        Half of the widest interval that is accepted.
+        Largest half-width of the interval that is accepted.
     confidence
-        Share of intervals that hold the chance.
+        Confidence level of the interval.
     most
-        Points of a row at most.
+        Most points used for a row.
     first
-        Points of each scrambling at first.
+        Initial points of each scrambling.
 
     Returns
     -------
     Chance
-        Where `most` points do not suffice, the interval is wider than asked for.
+        If `most` points are not enough, the interval is wider than requested.
     """
     happened = np.zeros((rows, SCRAMBLINGS))
     count = np.zeros(rows, dtype=np.int64)
@@ -125,16 +125,16 @@ def chance(
 
 
 def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval of a chance from several scramblings.
+    """Return the confidence interval of a probability from several scramblings.
 
     Parameters
     ----------
     happened
-        How often it happened, shape (n, SCRAMBLINGS).
+        Number of occurrences, shape (n, SCRAMBLINGS).
     count
-        Of so many points of each scrambling, shape (n,) or one number.
+        Points of each scrambling, shape (n,) or one number.
     confidence
-        Share of intervals that hold the chance.
+        Confidence level of the interval.
 
     Returns
     -------

@@ -1,9 +1,9 @@
-"""Three doubts in one table: the spread of the inputs, how the paper is to be read, and the numerical error.
+"""Three sources of uncertainty in one table: the inputs, the reading of the paper, and the numerical error.
 
-Every design drawn is simulated by all 32 combinations of the five readings, and by two laws of the ultimate resistance
-of the soil: the paper's, K_p^2 times the vertical stress, and that of Broms (1964), 3 K_p times it. The variance of the
-margin is then parted among its causes. The laws differ by the factor 3 / K_p, which acts where the strain rate factor
-does (Eq 27).
+Every sampled design is simulated with all 32 combinations of the five readings and with two laws for the ultimate
+resistance of the soil: the paper's, K_p^2 times the vertical stress, and that of Broms (1964), 3 K_p times it. The
+variance of the margin is then divided among these causes. The laws differ by the factor 3 / K_p, which acts where the
+strain rate factor does (Eq 27).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 DRAWN = 512
-"""Designs drawn, each simulated by every reading and law."""
+"""Sampled designs, each simulated with every reading and law."""
 INPUTS, READINGS, LAW, NUMERICAL = "uncertain inputs", "readings of the paper", "K_p² or 3 K_p", "numerical error"
 
 
@@ -37,11 +37,11 @@ class Doubt:
     Attributes
     ----------
     cause : str
-        What is in doubt.
+        What is uncertain.
     alone : float
-        Share of the variance of the margin that knowing it alone would take away.
+        Share of the variance of the margin that would vanish if this alone were known.
     total : float
-        Share that would be left if all others were known.
+        Share that would remain if everything else were known.
     """
 
     cause: str
@@ -57,7 +57,7 @@ def every_reading(sweep: Sweep) -> list[Sweep]:
 
 
 def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = None) -> list[Doubt]:
-    """Part the variance of the margin of one design among its causes.
+    """Divide the variance of the margin of one design among its causes.
 
     Parameters
     ----------
@@ -66,15 +66,15 @@ def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = N
     design
         Number of the design.
     seed
-        Seed of the designs drawn.
+        Seed of the sample.
     jobs
         Threads; all cores by default.
 
     Returns
     -------
     list of Doubt
-        Uncertain inputs, readings (all combinations alike probable), law of the resistance (both alike), and numerical
-        error, of which the square of the estimated error of the margin counts.
+        Uncertain inputs, readings (all combinations equally likely), law of resistance (both equally likely), and
+        numerical error (the mean square of its estimate).
 
     Raises
     ------
@@ -97,7 +97,7 @@ def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = N
 
 
 def parted(margins: np.ndarray) -> list[Doubt]:
-    """Part the variance of values by reading, law and design drawn, shape (r, l, n), among the three."""
+    """Divide the variance of values, shape (readings, laws, samples), among these three."""
     variance = margins.var()
     found = []
     for cause, axis in ((INPUTS, 2), (READINGS, 0), (LAW, 1)):
@@ -108,14 +108,14 @@ def parted(margins: np.ndarray) -> list[Doubt]:
 
 
 class _Law(Spread):
-    """Uncertain inputs with the resistance of the soil by one of two laws."""
+    """Uncertain inputs, with the soil resistance by one of two laws."""
 
     def __init__(self, spread: Spread, broms: bool) -> None:
         self.distributions, self.correlation = spread.distributions, spread.correlation
         self.broms = broms
 
     def filled(self, given: Rows, z: np.ndarray) -> Rows:
-        """Return designs with their uncertain inputs drawn, and the factor on the resistance of the soil."""
+        """Return designs with sampled inputs, and the factor on the resistance of the soil."""
         found = super().filled(given, z)
         if self.broms:
             K_p = np.tan(math.pi / 4.0 + np.radians(found["friction_angle_deg"]) / 2.0) ** 2

@@ -1,4 +1,4 @@
-"""Designs drawn from their distributions, simulated and judged in pieces on several threads."""
+"""Designs sampled from their distributions, simulated and judged in batches on several threads."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
 AT_ONCE = 16_384
 """Designs simulated at once by a thread."""
 NEAR = 0.01
-"""Designs whose quick solution keeps to the limits by less than this share of them are judged again with the accuracy
-of the sweep. The quick solution is off by far less."""
+"""Designs whose quick solution is closer to a limit than this share of it are judged again with the accuracy of the
+sweep. The error of the quick solution is far smaller."""
 WORST = -10.0
-"""Distance of designs that the truck passes over, or that cannot be computed."""
+"""Distance assigned to designs that the truck goes over, or that cannot be computed."""
 FAST_OVERTURN_S = 0.05
-"""Scale of the distance of designs that overturn: -1 where they reach the limit after this time, nearer to 0 later."""
+"""Time scale of the distance of designs that overturn: -1 if they reach the limit at this time, closer to 0 later."""
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Draws designs of some rows.
+    """Samples designs of some rows.
 
     Parameters
     ----------
     rows
-        Inputs of n rows with the means of the uncertain ones.
+        Inputs of n rows, with means for the uncertain ones.
     spread
         The uncertain inputs.
     judges
@@ -43,7 +43,7 @@ class Draws:
     parallel
         Threads.
     variants
-        Judges of which the last number of each point chooses one, all alike probable; without any, `judges` judges all.
+        Equally likely judges, one of which is chosen by the last coordinate of each point; if empty, `judges` is used.
     """
 
     rows: Rows
@@ -54,11 +54,11 @@ class Draws:
 
     @property
     def dimensions(self) -> int:
-        """Numbers of a point."""
+        """Dimensions of a point."""
         return len(self.spread.names) + bool(self.variants)
 
     def distance(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
-        """Return how far designs are from failing: positive where they pass, shape (m,).
+        """Return the distance of designs from failing, positive where they pass, shape (m,).
 
         Parameters
         ----------
@@ -67,11 +67,12 @@ class Draws:
         z
             Standard normal numbers, shape (m, d).
         **inputs
-            Inputs that are set, shape (m,) each; of uncertain ones these are the means.
+            Inputs to set, shape (m,) each; for uncertain ones, their means.
 
         Notes
         -----
-        Where a design stands, it is the margin beyond the one asked for; where it overturns, the sooner the farther.
+        For a design that stands, the distance is its margin beyond the requested one; for one that overturns, the
+        earlier, the more negative.
         """
         ends = range(0, len(index), AT_ONCE)
         pieces = self.parallel(
@@ -85,11 +86,11 @@ class Draws:
         return np.concatenate(list(pieces)) if len(ends) else np.empty(0)
 
     def passes(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
-        """Return whether designs pass; otherwise as `distance`."""
+        """Return whether designs pass; arguments as of `distance`."""
         return self.distance(index, z, **inputs) > 0.0
 
     def given(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> Rows:
-        """Return the inputs of drawn designs."""
+        """Return the inputs of sampled designs."""
         return self.spread.filled({name: values[index] for name, values in self.rows.items()} | inputs, z)
 
     def _piece(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> np.ndarray:
@@ -119,12 +120,12 @@ class Draws:
 def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:
     margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
     found = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
-    # On a limit, or undecided: neither on the side of passing. An undecided row may have no margin.
+    # On a limit or undecided: neither counts as passing. An undecided row may have no margin.
     found = np.where(np.isnan(margin) & (judged.verdict == UNDECIDED), 0.0, found)
     smallest = np.finfo(float).tiny
     return np.where(judges.holds(judged), np.maximum(found, smallest), np.minimum(found, -smallest))
 
 
 def threads(jobs: int | None) -> joblib.Parallel:
-    """Return threads that give their results in order; one thread is none beside the caller."""
+    """Return a pool that yields results in order; with one job everything runs in the calling thread."""
     return joblib.Parallel(n_jobs=jobs or -1, backend="threading", return_as="generator")

@@ -1,4 +1,4 @@
-"""What a question may ask for: an input by its word, within which bounds, how finely."""
+"""What can be asked for: an input by its name, its bounds and its tolerance."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 BOULDER_MASS = fields.Field("boulder", "mass", "boulder_mass_kg", "kg", "mass of the boulder")
-"""The mass of the boulder, which is no input but follows from four."""
+"""The mass of the boulder, which is not an input but follows from four inputs."""
 Ends = tuple[str | float, str | float] | None
-"""Range to be searched, as given by the user."""
+"""Search range given by the user."""
 TOLERANCES = {
     "m": 1e-3,
     "1": 1e-3,
@@ -34,10 +34,10 @@ TOLERANCES = {
     "N/m": 1000.0,
     "N*s/m": 100.0,
 }
-"""Distance of the values that are tried, by unit."""
+"""Default tolerance, by unit."""
 LEAST_RATIO = 0.35
 """Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
-may slide a metre in place of turning, and pass; buried deeper it is held at its foot and turns over."""
+may slide a metre instead of turning, and pass; buried deeper, it is held at its foot and overturns."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Key:
     field
         The input.
     most
-        Whether its largest value is wanted, not its smallest.
+        Whether its largest value is wanted instead of its smallest.
     tolerance
-        Distance of the values tried, in the unit of the table. Answers are multiples of it.
+        Spacing of the values tried, in the unit of the table. Answers are multiples of it.
     """
 
     field: fields.Field
@@ -69,21 +69,21 @@ class Key:
         return f"{'most' if self.most else 'least'}_{self.name}"
 
     def values(self, places: np.ndarray) -> np.ndarray:
-        """Return the values at some places (whole numbers) of the lattice that is searched."""
+        """Return the values at some places (whole numbers) of the search lattice."""
         per_unit = round(1.0 / self.tolerance)
         if per_unit > 1 and math.isclose(per_unit * self.tolerance, 1.0, rel_tol=1e-12):
             return places / per_unit  # the float nearest to 1.234, as a file would give it
         return places * self.tolerance
 
     def ends(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places of the lattice nearest to both ends of a range, within it."""
+        """Return the outermost lattice places within a range."""
         first = np.ceil(low / self.tolerance - 1e-6).astype(np.int64)
         last = np.floor(high / self.tolerance + 1e-6).astype(np.int64)
         return first, np.maximum(first, last)
 
 
 def key_of(word: str, *, most: bool = False, tolerance: str | float | None = None) -> Key:
-    """Return the input a word means.
+    """Return the input that a word names.
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ def key_of(word: str, *, most: bool = False, tolerance: str | float | None = Non
     most
         Whether its largest value is wanted.
     tolerance
-        Distance of the values tried, ``"1 mm"`` or a number in the unit of the table; `TOLERANCES` by default.
+        Spacing of the values tried, ``"1 mm"`` or a number in the unit of the table; from `TOLERANCES` by default.
 
     Raises
     ------
     QuestionError
-        The word means no input, or several; or the tolerance is no positive value of its kind.
+        The word names no input or several, or the tolerance is not a positive value of the right kind.
     """
     field = _field(word)
     value = TOLERANCES[field.unit] if tolerance is None else quantity(tolerance, field.unit, "--tolerance")
@@ -114,7 +114,7 @@ def _field(word: str) -> fields.Field:
     if len(found) == 1:
         return found[0]
     if found:
-        raise QuestionError(f"'{word}' may be {' or '.join(field.path for field in found)}; say which")
+        raise QuestionError(f"'{word}' is ambiguous; use {' or '.join(field.path for field in found)}")
     near = [known for known in _words() if word.lower() in known] or [
         field.key for field in fields.INPUTS if word.lower() in field.also
     ]
@@ -123,19 +123,19 @@ def _field(word: str) -> fields.Field:
 
 
 def _words() -> list[str]:
-    """Return the shortest word of every input, and of the mass of the boulder."""
+    """Return the shortest unambiguous name of every input and of the boulder's mass."""
     every = (*fields.INPUTS, BOULDER_MASS)
     keys = [field.key for field in every]
     return [BOULDER_MASS.key, *(f.path if keys.count(f.key) > 1 else f.key for f in fields.INPUTS)]
 
 
 def quantity(text: str | float, unit: str, option: str) -> float:
-    """Return a number that may have a unit behind it, in the unit of the table.
+    """Return a number with or without a unit, in the unit of the table.
 
     Raises
     ------
     QuestionError
-        It is no number of that kind.
+        It is not a number of that kind.
     """
     from boulder_sweep.settings.numbers import NumberError, read_quantity
 
@@ -153,12 +153,12 @@ def share(text: str | float, option: str) -> float:
 
 
 def bound(text: str | float, field: fields.Field) -> float:
-    """Return an end of the range to be searched, which must be an admitted value.
+    """Return one end of the search range, which must be an admitted value.
 
     Raises
     ------
     QuestionError
-        It is none.
+        It is not.
     """
     option = "--between"
     if not isinstance(text, str):
@@ -173,13 +173,13 @@ def bound(text: str | float, field: fields.Field) -> float:
 
 
 def sweep_ranges(sweep: Sweep) -> dict[str, tuple[float, float]]:
-    """Return the least and the largest value of every input that has several, by its column."""
+    """Return the smallest and largest value of every input that varies, by column."""
     columns = (item for axis in sweep.axes for item in axis.columns.items())
     return {name: (float(values.min()), float(values.max())) for name, values in columns}
 
 
 def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends) -> tuple[np.ndarray, np.ndarray]:
-    """Return the range of the input that is searched, row by row.
+    """Return the search range of the input, row by row.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
     given
         The other inputs of n rows.
     between
-        Ends given by the user, which go before all others.
+        Ends given by the user, which take precedence.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""The lightest boulder that passes: a search over its sides and its depth.
+"""The lightest boulder that passes, found by a search over its dimensions and depth.
 
-The mass is what counts, so for given other sides the height need only be just enough; whether a height is enough is
-tried at several depths. The other sides are searched by a lattice that is narrowed around the best of each row.
+For given other sides the lightest boulder has the least height that passes; each height is tried at several depths. The
+other sides are searched on a lattice that is refined around the best candidate of each row.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ HEIGHT, DEPTH, RATIO = "boulder_height_m", "embedment_depth_m", "embedment_ratio
 MILLIMETRES = 1000
 """Sides and depths are whole millimetres."""
 SCALES = (0.5, 2.0)
-"""Where the file gives one boulder, its proportions are kept and it is scaled within these bounds."""
+"""If the file gives a single boulder, it is scaled within these bounds at constant proportions."""
 DEPTHS = 7
-"""Depths tried for a boulder whose embedment is open."""
+"""Number of depths tried for each boulder if the depth is free."""
 DEPTHS_AT_LAST = 25
-"""Depths among which that of the answer is chosen; those of the search are among them."""
+"""Number of depths from which that of the answer is chosen; includes those of the search."""
 COARSE, FINE = 9, 5
-"""Values of each further side: at first, and in each narrower lattice."""
+"""Number of values of each other side: on the first lattice, and on each finer one."""
 ROUNDS = 5
-"""Narrower lattices, each half as wide."""
+"""Number of finer lattices, each half as wide as the one before."""
 CELLS = 8
 """Pieces that the range of the height is cut into by the scan."""
 
@@ -44,13 +44,13 @@ Sides = dict[str, np.ndarray]
 
 
 class LightestQuestion:
-    """The least mass of a boulder that passes, by the bounds and proportions of a file.
+    """The least boulder mass that passes, within the bounds and proportions of a file.
 
     Parameters
     ----------
     sweep
-        The sweep. Sides and embedment with several values are free between the least and the largest of them, those
-        with one value stay. If all sides have one value, the boulder is scaled as a whole.
+        The sweep. Sides and embedment with several values may take any value between the smallest and the largest;
+        those with one value are fixed. If all sides have one value, the boulder is scaled as a whole.
     key
         The mass.
     judges
@@ -68,7 +68,7 @@ class LightestQuestion:
         if sweep.table is not None:
             raise QuestionError("the least mass needs bounds for the boulder's sides; a list of designs has none")
         if key.most:
-            raise QuestionError("the largest mass is that of the largest boulder; ask for the least")
+            raise QuestionError("the largest mass is simply that of the largest boulder; use --least mass")
         self.sweep, self.key, self.judges = sweep, key, judges
         self.bounds = sweep_ranges(sweep)
         self.bounds |= {name: (value, value) for name, value in sweep.constants.items()}
@@ -111,7 +111,7 @@ class LightestQuestion:
 
 
 class _Boulders:
-    """Tries boulders in some rows, and counts."""
+    """Tries boulders for some rows and counts the simulations."""
 
     def __init__(self, asked: LightestQuestion, rows: Rows) -> None:
         self.asked, self.judges, self.rows = asked, asked.judges, rows
@@ -120,7 +120,7 @@ class _Boulders:
         self.first, self.last = round(low * MILLIMETRES), round(high * MILLIMETRES)
 
     def least(self, index: np.ndarray, others: Sides, *, quick: bool) -> Search:
-        """Search the least height (or the last free side, or the scale) for some rows and other sides."""
+        """Search for the least height (or the last free side, or the scale), given the other sides."""
 
         def predicate(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
             return self.codes(index[rows], places, {side: values[rows] for side, values in others.items()}, quick=quick)
@@ -129,7 +129,7 @@ class _Boulders:
         return search(predicate, first, last, CELLS)
 
     def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
-        """Return what `search` asks of a predicate: it holds if it does at any of the depths."""
+        """Return the predicate of `search`: a boulder passes if it does so at any of the depths."""
         block, judged, depths = self.judged(index, places, others, DEPTHS, quick=quick)
         shape = (len(index), depths)
         holds = self.judges.holds(judged).reshape(shape).any(axis=1)
@@ -139,7 +139,7 @@ class _Boulders:
     def judged(
         self, index: np.ndarray, places: np.ndarray, others: Sides, depths: int, *, quick: bool
     ) -> tuple[DesignBlock, Judged, int]:
-        """Judge boulders at several depths each; designs, what they come to, and how many depths there were."""
+        """Judge boulders at several depths each; return designs, verdicts and the number of depths."""
         sides = self.sides(places, others)
         depth = self.depths(index, sides[HEIGHT], depths)
         count = depth.shape[1]
@@ -149,7 +149,7 @@ class _Boulders:
         return block, (self.judges.quick if quick else self.judges.own)(block), count
 
     def sides(self, places: np.ndarray, others: Sides) -> Sides:
-        """Return all sides [m] by the place of the one that is searched, or of the scale, and by the others."""
+        """Return all sides [m] from the lattice place of the one searched for (or of the scale) and the others."""
         bounds, free = self.asked.bounds, self.asked.free
         fixed = {side: np.full(len(places), bounds[side][0]) for side in SIDES}
         if not free:
@@ -157,7 +157,7 @@ class _Boulders:
         return fixed | others | {free[-1]: places / MILLIMETRES}
 
     def depths(self, index: np.ndarray, height: np.ndarray, count: int) -> np.ndarray:
-        """Return the depths [m] at which boulders are tried, shape (n, count), or (n, 1) where the depth is given."""
+        """Return the depths [m] to be tried, shape (n, count), or (n, 1) where the depth is given."""
         bounds = self.asked.bounds
         low, high = (end * (height if RATIO in bounds else 1.0) for end in bounds[RATIO if RATIO in bounds else DEPTH])
         low, high = np.broadcast_to(low, height.shape), np.broadcast_to(high, height.shape)
@@ -172,7 +172,7 @@ class _Boulders:
         return np.prod([sides[side] for side in SIDES], axis=0) * self.rows["boulder_density_kg_m3"][index]
 
     def certified(self, others: Sides) -> Answers:
-        """Return the answers for the best other sides of every row, judged with the accuracy of the sweep."""
+        """Return the answers for the best sides of every row, judged with the accuracy of the sweep."""
         n = len(next(iter(self.rows.values())))
         index = np.arange(n)
         found = self.least(index, others, quick=True)
@@ -185,7 +185,7 @@ class _Boulders:
             found = replaced(found, wrong, part)
         block, judged, count = self.judged(index, found.shown, others, DEPTHS_AT_LAST, quick=False)
         rank = np.where(self.judges.holds(judged), judged["margin"], -1.0).reshape(n, count)
-        # Of depths that do not pass the last one is shown, else the one with the largest margin.
+        # Show the depth with the largest margin; if none passes, the last one.
         chosen = np.where(rank.max(axis=1) < 0.0, count - 1, rank.argmax(axis=1)) + index * count
         columns = {side: block.columns[side].to_numpy()[chosen] for side in (*SIDES, DEPTH)}
         shown = taken(self.rows, index, **columns)

@@ -1,8 +1,8 @@
-"""The least that passes: how deep, how high, how strong a soil; or the most: how fast a truck.
+"""The smallest input that passes (depth, height, soil strength), or the largest (speed).
 
-For every combination of the other inputs the values of one are scanned and the change from failing to passing is
-bisected down to two neighbours on a lattice of round numbers, quickly; then both neighbours are judged as
-``sweep run`` would judge them. Where that disagrees, the row is searched again with the accuracy of the sweep.
+For every combination of the other inputs, one input is scanned and the change from failing to passing is bisected down
+to two neighbours on a lattice of round numbers, with the quick solution. Both neighbours are then judged as ``sweep
+run`` would judge them. If that disagrees, the row is searched again with the accuracy of the sweep.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 Told = Callable[[int, int], None]
-"""Told how many rows of how many are done."""
+"""Called with the number of rows done and the total."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Need:
     arrow : pyarrow.Table
         Inputs, answer, bracket, outcome at the answer; units in the field metadata.
     simulated : int
-        Designs simulated on the way.
+        Designs simulated during the search.
     """
 
     sweep: Sweep
@@ -70,19 +70,19 @@ class Need:
 
     @property
     def others(self) -> list[str]:
-        """Names of the other readings by which the question was answered, too."""
+        """Names of the other readings for which the question was answered as well."""
         before = f"{self.key.answer}_"
         return [name.removeprefix(before) for name in self.arrow.column_names if name.startswith(before)]
 
     @property
     def derived(self) -> tuple[str, ...]:
-        """Input columns that follow from others, or from the answer, and are not given."""
+        """Input columns that follow from others or from the answer."""
         given = self.sweep.plan.given
         derived = tuple(name for name in ("embedment_depth_m", "impact_height_m") if name not in given)
         return (*derived, *SIDES, "embedment_depth_m") if self.key.name == BOULDER_MASS.name else derived
 
     def counts(self) -> dict[str, int]:
-        """Return how many rows were answered in which way."""
+        """Return the number of rows of each kind of answer."""
         found = self.arrow["found"].combine_chunks().value_counts().to_pylist()
         counted = {entry["values"]: entry["counts"] for entry in found}
         return {word: counted[word] for word in WORDS if word in counted}
@@ -113,7 +113,7 @@ class Need:
         return write_parquet(self.arrow, path)
 
     def plot(self, path: str | Path) -> None:
-        """Draw a design chart: the answer over the size of the boulder, a curve for each soil.
+        """Draw a design chart: the answer over the size of the boulder, one curve for each soil.
 
         Raises
         ------
@@ -138,51 +138,51 @@ def need(
     jobs: int | None = None,
     told: Told | None = None,
 ) -> Need:
-    """Find the least value of an input that passes, for every combination of the others.
+    """Find the smallest value of an input that passes, for every combination of the others.
 
     Parameters
     ----------
     sweep
-        The sweep. Where the input asked for is an axis of its grid, the axis is the range that is searched.
+        The sweep. If the input asked for is an axis of its grid, the axis gives the search range.
     least, most
-        The input of which the smallest, or the largest, passing value is wanted; one of the two.
+        The input whose smallest or largest passing value is wanted; only one of the two.
         ``embedment_depth`` by default.
     margin
         Least margin to the limits, ``0.25`` or ``"25 %"``.
     probability
-        Chance of passing that is asked for, ``0.95`` or ``"95 %"``, where inputs have distributions.
+        Required probability of passing, ``0.95`` or ``"95 %"``, if inputs have distributions.
     seed
-        Seed of the designs drawn for it.
+        Seed of the samples for it.
     open_readings
-        Whether every design drawn for a probability takes one of the 32 combinations of the readings, all alike
-        probable, in place of those of the sweep.
+        Whether every sampled design uses one of the 32 combinations of readings, all equally likely, instead of the
+        readings of the sweep.
     between
-        Range to be searched, in place of the axis or of what is usual.
+        Search range, instead of the axis or the usual range.
     tolerance
-        Distance of the values that are tried; 1 mm for lengths.
+        Spacing of the values tried; 1 mm for lengths.
     both_readings
-        Whether the question is answered for the other readings of the paper, too.
+        Whether to answer for the other preset of readings as well.
     jobs
         Threads; all cores by default. The answers do not depend on it.
     told
-        Told how far it is.
+        Called as the search progresses.
 
     Returns
     -------
     Need
-        One row a combination.
+        One row for each combination.
 
     Raises
     ------
     QuestionError
-        The question makes no sense.
+        The question is contradictory or out of range.
     SettingsError
         An input has a distribution.
     """
     if probability is None:
         sweep.require_values()
     if least and most:
-        raise QuestionError("ask for the least of one input or for the most of one, not for both")
+        raise QuestionError("use either --least or --most, not both")
     key = key_of(most or least or "embedment_depth", most=bool(most), tolerance=tolerance)
     if key.name == "friction_angle_deg" and sweep.partial_factor != 1.0:
         raise QuestionError(
@@ -193,7 +193,7 @@ def need(
     if not 0.0 <= least_margin < 1.0:
         raise QuestionError(f"--margin {margin}: must be 0 or more and less than 100 %")
     if open_readings and probability is None:
-        raise QuestionError("readings are left open for a probability; give one")
+        raise QuestionError("--open-readings needs --probability")
     variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep)) if open_readings else ()
     sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings else [sweep]
     asked = [_question(one, key, between, judges_of(one, least_margin), probability, seed, variants) for one in sweeps]
@@ -228,7 +228,9 @@ def _question(
             return LightestQuestion(sweep, key, judges)
         return Question(sweep, key, between, judges)
     if key.name == BOULDER_MASS.name:
-        raise QuestionError("the least mass with a probability is not searched for; ask for the height or the depth")
+        raise QuestionError(
+            "--least mass does not support --probability; use --least height or --least embedment_depth"
+        )
     chance = share(probability, "--probability")
     if not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")

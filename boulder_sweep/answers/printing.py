@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 MOST_LINES = 40
-"""Rows that are shown; of more, evenly spaced ones."""
+"""Most rows shown; of longer tables, evenly spaced ones."""
 HEADS = {
     "boulder_length_m": ("L", "m"),
     "boulder_width_m": ("W", "m"),
@@ -44,11 +44,11 @@ HEADS = {
     "hood_height_m": ("hood", "m"),
     "bed_offset_m": ("bed", "m"),
 }
-"""Name and unit over the column of an input."""
+"""Name and unit above the column of an input."""
 NOTES = {
-    "always": "≤, ≥: passes in the whole range that was searched, also at this end of it",
-    "never": "never: passes nowhere in the range that was searched",
-    "not_monotone": "*: fails again further on; passes_within in the table (-o) lists what passes",
+    "always": "≤, ≥: passes throughout the searched range, up to this end of it",
+    "never": "never: passes nowhere in the searched range",
+    "not_monotone": "*: fails again further on; column passes_within (-o) lists all passing ranges",
     "blocked_by_overlap": "blocked: fails up to where the truck would pass over the boulder",
 }
 SHORT = {"as_printed": "printed", "corrected": "corrected"}
@@ -66,14 +66,14 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES) -> list[s
     need
         The answers.
     width
-        Columns of the terminal; what does not fit is left out, the least important first.
+        Width of the terminal; columns that do not fit are left out, the least important first.
     most
-        Rows shown at most.
+        Most rows shown.
 
     Returns
     -------
     list of str
-        Head, one line a row, and what the words in them mean.
+        Header, one line for each row, and a legend.
     """
     count = len(need)
     rows = _shown_rows(need.arrow, most)
@@ -86,9 +86,9 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES) -> list[s
 
 
 def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:
-    """Return chances as lines: what varies, the verdict at the means, the chance with its interval, what decides.
+    """Return probabilities as lines: varying inputs, verdict at the means, probability, most influential input.
 
-    Parameters are those of `need_lines`. Sobol indices follow where there is one design.
+    Parameters as of `need_lines`. For a single design, its Sobol indices follow.
     """
     count = len(found)
     rows = _shown_rows(found.arrow, most)
@@ -118,11 +118,11 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
 
 
 def doubt_lines(found: Sequence[Doubt], width: int = WIDTH) -> list[str]:
-    """Return the shares of doubts as lines."""
+    """Return the shares of uncertainty as lines."""
     columns: list[Column] = [
-        (("doubt about the margin", ""), lambda row: str(row["cause"])),
+        (("uncertainty of the margin", ""), lambda row: str(row["cause"])),
         (("alone", ""), lambda row: _share(row["alone"])),
-        (("with all it", "acts upon"), lambda row: _share(row["total"])),
+        (("with", "interactions"), lambda row: _share(row["total"])),
     ]
     return table_lines(columns, [asdict(own) for own in found], width)
 
@@ -132,7 +132,7 @@ def _share(value: float) -> str:
 
 
 def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:
-    """Return what designs withstand as lines: what varies, the verdict, each value and by how much it differs.
+    """Return what designs withstand as lines: varying inputs, verdict, each value and its distance from the design.
 
     Parameters are those of `need_lines`.
     """
@@ -154,7 +154,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES) -
 
 
 def _withstood(column: str, own: str, decimals: int) -> Cell:
-    """Return what shows a value that is withstood, and by how much it differs from that of the design."""
+    """Return a formatter for a value that is withstood and its distance from that of the design."""
 
     def cell(row: Row) -> str:
         if row[column] is None:
@@ -185,14 +185,14 @@ def _index_lines(found: Uncertainty, width: int) -> list[str]:
 
 
 def _shown_rows(table: pa.Table, most: int) -> list[Row]:
-    """Rows of a table that are shown: all, or evenly spaced ones."""
+    """Return the rows of a table to show: all, or evenly spaced ones."""
     count = len(table)
     places = range(count) if count <= most else [place * (count - 1) // (most - 1) for place in range(most)]
     return [table.slice(place, 1).to_pylist()[0] for place in places]
 
 
 def need_columns(need: Need) -> list[Column]:
-    """Return the columns of a terminal table: what varies, the answer, what follows from it."""
+    """Return the columns of a terminal table: varying inputs, the answer, and what follows from it."""
     key = need.key
     open_ = (key.name, *need.derived)
     columns = _leading(need.sweep, need.arrow, [name for name in HEADS if name not in open_])
@@ -213,7 +213,7 @@ def need_columns(need: Need) -> list[Column]:
 
 
 def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> list[str]:
-    """Return a table as lines not longer than a width; columns that do not fit are left out, the last ones first."""
+    """Return a table as lines of limited width; columns that do not fit are left out, starting with the last."""
     texts = [[*head, *(cell(row) for row in rows)] for head, cell in columns]
     widths = [max(map(len, column)) for column in texts]
     while len(widths) > 1 and sum(widths) + 2 * (len(widths) - 1) > width:
@@ -247,12 +247,12 @@ def _number(name: str) -> Cell:
 
 
 def _size(name: str) -> Cell:
-    """Return what shows a side of the boulder, or its depth, where there is an answer."""
+    """Return a formatter for a side of the boulder or its depth."""
     return lambda row: "" if row["passes_at"] is None else f"{row[name]:.3f}"
 
 
 def _answer(key: Key, suffix: str) -> Cell:
-    """Return what shows the answer by some readings."""
+    """Return a formatter for the answer by some readings."""
     decimals = max(0, -math.floor(math.log10(key.tolerance) + 1e-9))
     name, found = f"{key.answer}{suffix}", f"found{suffix}"
 

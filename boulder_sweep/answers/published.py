@@ -1,4 +1,4 @@
-"""Published spreads of the inputs, each with its source: offered, never assumed."""
+"""Published coefficients of variation of the inputs, with their sources; offered, never assumed."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 
 class Published(NamedTuple):
-    """A spread as a source states it."""
+    """A coefficient of variation as stated by a source."""
 
     input: str
     """Key of the input."""
     cov: str
     """Coefficient of variation, as stated."""
     of: str
-    """What the source states it of."""
+    """What it applies to."""
     source: str
 
 

@@ -1,4 +1,4 @@
-"""One question put to one sweep: values tried, brackets certified."""
+"""A question about one sweep: try values, certify brackets."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
 
 DRAWN = 4096
-"""Designs drawn at each value, where a probability is asked for."""
+"""Samples at each value if a probability is asked for."""
 HALF_WIDTH = 0.005
-"""Half of the widest interval of the chance that is reported at the answer."""
+"""Largest half-width of the interval of the probability reported at the answer."""
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -32,19 +32,19 @@ class Answers:
     Attributes
     ----------
     block : DesignBlock
-        The designs with the answer filled in, or with the value tried last where there is none.
+        The designs at the answer, or at the last value tried where there is none.
     judged : Judged
-        What these designs come to.
+        Their outcomes and verdicts.
     kind : ndarray of int8, shape (n,)
-        How they were found, codes of `boulder_sweep.answers.search.WORDS`.
+        Kind of answer, codes of `boulder_sweep.answers.search.WORDS`.
     fails, passes : ndarray, shape (n,)
         The bracket in the unit of the table; NaN where there is no such value.
     stretches : list of str or None, of length n
-        All that passes, for rows that are not monotone.
+        All passing intervals, for rows that are not monotone.
     simulated : int
         Designs simulated on the way.
     chances : Chance or None
-        Chances of passing at the answers, where one was asked for.
+        Probabilities of passing at the answers, if one was asked for.
     """
 
     block: DesignBlock
@@ -58,7 +58,7 @@ class Answers:
 
 
 class Question:
-    """The least, or the most, of one input that passes.
+    """The smallest, or the largest, value of one input that passes.
 
     Parameters
     ----------
@@ -74,18 +74,18 @@ class Question:
     Raises
     ------
     QuestionError
-        The range makes no sense.
+        The search range is empty or not admitted.
     """
 
     rows_at_once = 2048
-    """Rows of a block: short enough for an interruption to wait for."""
+    """Rows of a block; small enough that an interruption takes effect soon."""
     cells = CELLS
-    """Pieces that a range is cut into by the scan."""
+    """Number of cells into which the scan divides a range."""
 
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges) -> None:
         self.sweep, self.key, self.between, self.judges = sweep, key, between, judges
         self.open = Open(sweep, (key.name,))
-        range_of(sweep, key, self.open.rows(0, 0), between)  # a wrong range is said before anything is computed
+        range_of(sweep, key, self.open.rows(0, 0), between)  # refuses a wrong range before anything is computed
 
     @property
     def count(self) -> int:
@@ -101,7 +101,7 @@ class Question:
             first, last = last, first
         trial = self.trial(rows)
         found = search(trial.quick, first, last, self.cells)
-        # Rows that are not monotone have more changes than one bracket, and each has to be right.
+        # Rows that are not monotone have several brackets, all of which must be certified.
         wrong = np.flatnonzero(~trial.certified(found) | (found.kind == NOT_MONOTONE))
         if len(wrong):
             ends = first[wrong], last[wrong]
@@ -120,28 +120,28 @@ class Question:
         )
 
     def trial(self, rows: Rows) -> Trial:
-        """Return what tries values in some rows."""
+        """Return the object that tries values in some rows."""
         return Trial(self.key, self.judges, rows)
 
 
 class ProbabilityQuestion(Question):
-    """The least, or the most, of one input that passes with a probability, where others are uncertain.
+    """The smallest, or the largest, value of one input that passes with a given probability, when others are uncertain.
 
     Parameters
     ----------
     sweep, key, between, judges
         As of `Question`.
     probability
-        The chance of passing that is asked for.
+        The required probability of passing.
     seed
         Seed of the points.
     variants
-        Readings of which every design drawn takes one.
+        Readings of which every sampled design uses one.
 
     Raises
     ------
     QuestionError
-        The range makes no sense, or no input has a distribution.
+        The search range is empty or not admitted, or no input has a distribution.
     """
 
     rows_at_once = 4
@@ -164,33 +164,33 @@ class ProbabilityQuestion(Question):
         self.points = points.reshape(DRAWN, -1)
 
     def trial(self, rows: Rows) -> Trial:
-        """Return what tries values in some rows."""
+        """Return the object that tries values in some rows."""
         return ProbabilityTrial(self, rows)
 
 
 class Trial:
-    """Tries values of the input in some rows, and counts."""
+    """Tries values of the input in some rows and counts the simulations."""
 
     def __init__(self, key: Key, judges: Judges, rows: Rows) -> None:
         self.key, self.judges, self.rows = key, judges, rows
         self.simulated = 0
 
     def quick(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Predicate of the search, without estimate of the numerical error."""
+        """Predicate of the search, without an error estimate."""
         return self._codes(index, places, quick=True)
 
     def own(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Predicate of the search as the sweep judges."""
+        """Predicate of the search, with the accuracy of the sweep."""
         return self._codes(index, places, quick=False)
 
     def judged(self, index: np.ndarray, places: np.ndarray, *, quick: bool = False) -> tuple[DesignBlock, Judged]:
-        """Return the designs with these values, and how they are judged."""
+        """Return the designs with these values and their verdicts."""
         block = taken(self.rows, index, **{self.key.name: self.key.values(places)})
         self.simulated += len(index)
         return block, (self.judges.quick if quick else self.judges.own)(block)
 
     def certified(self, found: Search) -> np.ndarray:
-        """Whether the sweep's own accuracy says the same at both ends of the brackets, bool, shape (n,)."""
+        """Return whether the accuracy of the sweep confirms both ends of the brackets, bool, shape (n,)."""
         agrees = np.ones(len(found.kind), dtype=bool)
         for has, places, holds in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
             rows = np.flatnonzero(has)
@@ -198,7 +198,7 @@ class Trial:
         return agrees
 
     def chances(self, places: np.ndarray) -> Chance | None:
-        """Return the chances of passing at some values, one a row; None where the question is not about chances."""
+        """Return the probabilities of passing at some values, one for each row; None if none is asked for."""
         return None
 
     def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
@@ -208,9 +208,9 @@ class Trial:
 
 
 class ProbabilityTrial(Trial):
-    """Tries values of the input in some rows: whether the designs drawn with them pass often enough.
+    """Tries values of the input in some rows: whether the designs sampled with them pass often enough.
 
-    All rows and all values see the same points, so the share that passes changes with the value alone.
+    All rows and values use the same points, so that the share that passes depends on the value alone.
     """
 
     def __init__(self, asked: ProbabilityQuestion, rows: Rows) -> None:
@@ -219,7 +219,7 @@ class ProbabilityTrial(Trial):
         self.draws = Draws(rows, asked.spread, asked.judges, threads(1), asked.variants)
 
     def chances(self, places: np.ndarray) -> Chance:
-        """Return the chances of passing at some values, by the points of the search and by more where needed."""
+        """Return the probabilities of passing at some values, from the points of the search and more where needed."""
         values = self.key.values(places)
 
         def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -241,7 +241,7 @@ class ProbabilityTrial(Trial):
 
 
 def replaced(found: Search, rows: np.ndarray, part: Search) -> Search:
-    """Return a search with some of its rows taken from another."""
+    """Return a search with some of its rows replaced by those of another."""
     arrays = {}
     for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
         arrays[name] = getattr(found, name).copy()
@@ -253,10 +253,10 @@ def replaced(found: Search, rows: np.ndarray, part: Search) -> Search:
 
 
 def _stretches(key: Key, changes: list[tuple[int, int, bool]] | None, first: int, last: int) -> str | None:
-    """Stretches that pass of a row that is not monotone: ``1.21 to 1.45, 1.9 to 2.3``; None of all others."""
+    """Return the passing intervals of a row that is not monotone, ``1.21 to 1.45, 1.9 to 2.3``; None for other rows."""
     if changes is None:
         return None
-    # What holds before the first change begins at the beginning; what holds behind the last one ends at the end.
+    # An interval without a lower change begins at the start of the range; one without an upper change ends at its end.
     starts = [] if changes and changes[0][2] else [first]
     stops: list[int] = []
     for before, behind, holds in changes:

@@ -1,6 +1,6 @@
-"""What a design withstands: how fast and how heavy a truck, how weak a soil, everything else unchanged.
+"""What a design withstands: how fast and how heavy a truck and how weak a soil, with everything else unchanged.
 
-From its own value an input is made worse until the design fails, or better until it passes where it fails as it stands.
+An input is made worse until the design fails or, if the design fails as it is, better until it passes.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 ROWS_AT_ONCE = 2048
 MPH = 0.44704
 CLASSES = {"M30": 30 * MPH, "M40": 40 * MPH, "M50": 50 * MPH}
-"""Nominal speeds [m/s] of the classes of ASTM F2656 for a medium-duty truck."""
+"""Nominal speeds [m/s] of the ASTM F2656 classes for a medium-duty truck."""
 CLASS_MASS_KG = 6800.0
 CLASS_TOLERANCE = 0.02
-"""The classes are of a truck of 6800 kg; for a mass farther off than this share none is named."""
+"""The classes apply to a truck of 6800 kg; no class is named if the mass differs by more than this share."""
 
 Told = Callable[[int, int], None]
 """Told how many rows of how many are done."""
@@ -46,14 +46,14 @@ class Reserve(NamedTuple):
     column: str
     """Column of what is withstood."""
     best: float
-    """Value up to which it is made better."""
+    """Best value tried."""
     worst: float
-    """Value up to which it is made worse."""
+    """Worst value tried."""
     meaning: str
 
 
 RESERVES = (
-    Reserve("speed", "withstands_speed_m_s", 1.0, 40.0, "largest speed of impact"),
+    Reserve("speed", "withstands_speed_m_s", 1.0, 40.0, "largest impact speed"),
     Reserve("vehicle.mass", "withstands_mass_kg", 100.0, 60_000.0, "largest mass of the vehicle"),
     Reserve("friction_angle", "withstands_friction_angle_deg", 59.0, 15.0, "smallest friction angle of the soil"),
 )
@@ -68,7 +68,7 @@ class Reserves:
     sweep : Sweep
         The sweep.
     arrow : pyarrow.Table
-        Inputs and outcome of every design, and what it withstands.
+        Inputs, outcome and withstood values of every design.
     """
 
     sweep: Sweep
@@ -111,13 +111,13 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None)
     jobs
         Threads; all cores by default.
     told
-        Told how far it is.
+        Called as the search progresses.
 
     Returns
     -------
     Reserves
-        One row a design. Where it fails at every value tried, the column is null; where it never fails, the last value
-        tried stands there.
+        One row a design. If a design fails at every value tried, the column is null; if it never fails, the column
+        holds the last value tried.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None)
 
 
 def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: float, worst: float) -> np.ndarray:
-    """Return the worst value of an input that n designs withstand; NaN where they fail at every value.
+    """Return the worst value of an input that each of n designs withstands; NaN where it fails at every value.
 
     Parameters
     ----------
@@ -154,19 +154,19 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
     rows
         Inputs of the designs.
     passes
-        Whether they pass as they stand.
+        Whether they pass as they are.
     best, worst
-        Values up to which the input is changed.
+        Range over which the input is changed.
     """
     trial = Trial(key, judges, rows)
     own = rows[key.name] / key.tolerance
-    # The nearest place of the lattice on the better side, at which a design that passes passes.
+    # The nearest lattice place on the better side; a design that passes also passes there.
     first = (np.floor(own + 1e-9) if worst > best else np.ceil(own - 1e-9)).astype(np.int64)
     ends = (round(end / key.tolerance) for end in (worst, best))
     last = np.where(passes, *ends)
 
     def predicate(codes: Callable[[np.ndarray, np.ndarray], np.ndarray], index: np.ndarray) -> Any:
-        """Search for the change: where a design passes as it stands, for the first value at which it does not."""
+        """Search for the change of verdict; for a design that passes, for the first value at which it does not."""
 
         def changed(inner: np.ndarray, places: np.ndarray) -> np.ndarray:
             holds = codes(index[inner], places) == HOLDS
@@ -180,14 +180,14 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
     if len(wrong):
         part = search(predicate(trial.own, wrong), first[wrong], last[wrong])
         found = replaced(found, wrong, part)
-    # `fails` is the last place before the change: of a design that passes it is what is withstood.
+    # `fails` is the last place before the change; for a design that passes, that is the withstood value.
     at = np.where(passes, np.where(found.has_holds, found.fails, last), found.holds)
     at = np.where(passes & found.has_holds & ~found.has_fails, first, at)
     return np.where(passes | found.has_holds, key.values(at), np.nan)
 
 
 def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
-    """Whether the sweep's own accuracy says the same at both ends of the brackets."""
+    """Return whether the accuracy of the sweep confirms both ends of the brackets."""
     agrees = np.ones(len(passes), dtype=bool)
     for has, places, changed in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
         rows = np.flatnonzero(has)
@@ -196,10 +196,10 @@ def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
 
 
 def classes(speed: np.ndarray, mass: np.ndarray) -> list[str | None]:
-    """Return the highest class whose nominal speed is withstood; none for trucks of another mass."""
+    """Return the highest class whose nominal speed is withstood; none for other truck masses."""
     named = np.abs(mass / CLASS_MASS_KG - 1.0) <= CLASS_TOLERANCE
     bounds = np.array(list(CLASSES.values()))
-    # A speed of 30 mph is 13.41 m/s on the lattice of what is withstood.
+    # 30 mph is 13.41 m/s on the lattice of withstood speeds.
     place = np.searchsorted(bounds - 0.005, np.nan_to_num(speed), side="right")
     words = ("", *CLASSES)
     return [words[at] or None if known else None for at, known in zip(place, named, strict=True)]

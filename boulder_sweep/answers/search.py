@@ -1,8 +1,8 @@
-"""The least place of a lattice from which on something holds, for many rows at once: scan, then bisection.
+"""Find the first lattice place from which a predicate holds, for many rows at once: scan, then bisection.
 
-A row is scanned at some places spread over its range; between neighbours that differ, the change is bisected down to
-two adjacent places of the lattice. All rows and all changes go through a bisection together, so that every call of the
-predicate has many designs to simulate.
+Each row is scanned at a few places spread over its range; where neighbours differ, the change is bisected down to two
+adjacent lattice places. All rows and changes are bisected together, so that every call of the predicate has many
+designs to simulate.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from dataclasses import dataclass
 import numpy as np
 
 FAILS, HOLDS, BEYOND = range(3)
-"""What the predicate may say: it does not hold, it holds, or there is nothing to try at that place."""
+"""Values of the predicate: it fails, it holds, or there is nothing to try at this place."""
 FOUND, ALWAYS, NEVER, NOT_MONOTONE, BLOCKED = range(5)
-"""What was found in a row, codes of `WORDS`."""
+"""Kinds of result, codes of `WORDS`."""
 WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap")
 CELLS = 16
-"""Pieces that a range is cut into by the scan."""
+"""Number of cells into which the scan divides a range."""
 
 Predicate = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Rows and places, each of shape (m,), to `FAILS`, `HOLDS` or `BEYOND`, shape (m,)."""
+"""Maps rows and places, shape (m,), to `FAILS`, `HOLDS` or `BEYOND`, shape (m,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What was found in n rows. Places are whole numbers, -1 stands in for a place that there is not.
+    """Results of n rows. Places are whole numbers; -1 means no such place.
 
     Attributes
     ----------
@@ -37,10 +37,10 @@ class Search:
     has_fails, has_holds : ndarray of bool, shape (n,)
         Whether there is such a place.
     shown : ndarray of int64, shape (n,)
-        The place that stands for the row: `holds`, or the last place that could be tried.
+        The place shown for the row: `holds`, or the last place that could be tried.
     changes : dict of int to list of (int, int, bool)
-        By row, for rows that are not monotone: adjacent places at which it changes, in the order of the search, and
-        whether it holds from there on.
+        For each row that is not monotone: adjacent places where it changes, in search order, and whether it holds
+        beyond.
     """
 
     kind: np.ndarray
@@ -58,16 +58,16 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     Parameters
     ----------
     predicate
-        Says what holds where.
+        Evaluated at rows and places.
     first, last : ndarray of int64, shape (n,)
-        Ends of the range of every row, in the order of the search: `last` may be less than `first`.
+        Ends of the range of every row, in search order; `last` may be less than `first`.
     cells
-        Pieces that a range is cut into. A stretch shorter than a piece, between two that are alike, is not seen.
+        Pieces that a range is cut into. An interval shorter than a cell may be missed.
 
     Returns
     -------
     Search
-        One answer a row, the first place in the order of the search from which on it holds.
+        One result for each row: the first place, in search order, from which the predicate holds.
     """
     n = len(first)
     share = np.arange(cells + 1) / cells
@@ -79,7 +79,7 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     holds, beyond = codes == HOLDS, codes == BEYOND
     none, at = ~holds.any(axis=1), holds.argmax(axis=1)
     column = np.arange(cells + 1)
-    # From the first place where it holds it must hold at every further one that can be tried.
+    # From the first place where it holds, it must hold at all further places that can be tried.
     broken = ((column > at[:, None]) & ~holds & ~beyond).any(axis=1) & ~none
     kind = np.where(none, NEVER, np.where(at == 0, ALWAYS, FOUND)).astype(np.int8)
     ends_beyond = beyond[:, -1] if n else np.zeros(0, dtype=bool)
@@ -109,10 +109,10 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
 
 
 def _try_last_before_beyond(predicate: Predicate, places: np.ndarray, codes: np.ndarray) -> None:
-    """Try the very last place of rows in which it holds nowhere and that end where nothing can be tried.
+    """Locate the last place that can be tried in rows that end where nothing can, and in which nothing holds so far.
 
-    What holds may hold between the last place scanned and that end only: then it is put in place of the first one
-    beyond, in `places` and `codes`.
+    The predicate may hold only between the last place scanned and that end; such a place replaces the first one beyond
+    the end in `places` and `codes`.
     """
     ends = (codes[:, :-1] == FAILS) & (codes[:, 1:] == BEYOND)
     rows = np.flatnonzero(ends.any(axis=1) & ~(codes == HOLDS).any(axis=1))
@@ -135,7 +135,7 @@ def _try_last_before_beyond(predicate: Predicate, places: np.ndarray, codes: np.
 
 
 def _edges(codes: np.ndarray, kind: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the changes to be located: the first, and all of rows that are not monotone."""
+    """Return rows and columns of the changes to locate: the first, and all in rows that are not monotone."""
     holds = codes == HOLDS
     change = holds[:, :-1] != holds[:, 1:]
     column = np.arange(change.shape[1])
@@ -147,7 +147,7 @@ def _edges(codes: np.ndarray, kind: np.ndarray, at: np.ndarray) -> tuple[np.ndar
 def _bisected(
     predicate: Predicate, rows: np.ndarray, low: np.ndarray, high: np.ndarray, rises: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Narrow changes down to adjacent places; it holds behind a change that rises, before one that does not."""
+    """Bisect changes down to adjacent places; the predicate holds above a rising change and below a falling one."""
     low, high = low.copy(), high.copy()
     while (open_ := np.abs(high - low) > 1).any():
         middle = low + (high - low) // 2

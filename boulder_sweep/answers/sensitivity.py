@@ -1,4 +1,4 @@
-"""Which inputs decide: Sobol indices of first order and total, and a quick measure from points already tried."""
+"""Which inputs matter: first-order and total Sobol indices, and a quick measure from existing points."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from scipy.special import ndtri
 from scipy.stats import qmc
 
 BASE = 2048
-"""Points of each of the two samples; the number of designs is this times the number of inputs and two more."""
+"""Points of each of the two samples; the number of designs is this times (number of inputs + 2)."""
 RESAMPLES = 400
 STRATA = 8
-"""Parts of the range of an input whose means are compared by `drivers`."""
+"""Strata of each input whose means are compared by `drivers`."""
 
 Outputs = Callable[[np.ndarray], np.ndarray]
-"""Standard normal numbers, shape (m, d), to outputs, shape (s, m)."""
+"""Maps standard normal numbers, shape (m, d), to outputs, shape (s, m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +26,9 @@ class Indices:
     Attributes
     ----------
     first, first_low, first_high : ndarray
-        Share of the variance that knowing the input alone would take away, and its interval.
+        Share of the variance that would vanish if this input alone were known, and its interval.
     total, total_low, total_high : ndarray
-        Share that would be left if all others were known, and its interval.
+        Share that would remain if all other inputs were known, and its interval.
     """
 
     first: np.ndarray
@@ -49,25 +49,25 @@ def indices(
     outputs
         The outputs.
     dimensions
-        Numbers of a point.
+        Dimensions of a point.
     seed
         The same seed gives the same points.
     base
         Points of each of the two samples, a power of two.
     confidence
-        Share of intervals that hold the index.
+        Confidence level of the intervals.
     uniform
-        Whether the outputs are of uniform numbers between 0 and 1 instead.
+        Whether `outputs` takes uniform numbers between 0 and 1 instead.
 
     Returns
     -------
     Indices
-        By `estimators`, those of `scipy.stats.sobol_indices`; intervals from resampled points, by the same seed.
+        From `estimators`, which are those of `scipy.stats.sobol_indices`; intervals by bootstrap with the same seed.
 
     Notes
     -----
-    The indices are those of independent numbers. Where two inputs are correlated, the one that is made of both
-    numbers has the index of what it does not share with the other.
+    The indices refer to independent normals. If two inputs are correlated, the index of the second refers to the part
+    that it does not share with the first.
     """
     rng = np.random.default_rng(seed)
     both = qmc.Sobol(2 * dimensions, scramble=True, seed=rng).random(base)
@@ -101,18 +101,18 @@ def estimators(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> tuple[np.n
     f_A, f_B
         An output at two samples, shape (n,).
     f_AB
-        The output at the first sample with one input after the other taken from the second, shape (d, n).
+        The output at the first sample with one input at a time taken from the second, shape (d, n).
     """
     both = np.concatenate([f_A, f_B])
     variance = both.var()
-    if variance == 0.0:  # a resample may hold one value only
+    if variance == 0.0:  # a resample may hold a single value
         return np.zeros(len(f_AB)), np.zeros(len(f_AB))
     first = ((f_B - both.mean()) * (f_AB - f_A)).mean(axis=1) / variance
     return first, 0.5 * ((f_A - f_AB) ** 2).mean(axis=1) / variance
 
 
 def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
-    """Return for every row the input that decides most, by the means of an output over strata of each input.
+    """Return the most influential input of each row, from the means of an output over strata of each input.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray of int64, shape (n,)
-        Place of the input; -1 where the output does not vary.
+        Index of the input; -1 where the output does not vary.
     """
     shares = np.empty((len(output), z.shape[1]))
     for place in range(z.shape[1]):

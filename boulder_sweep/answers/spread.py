@@ -35,8 +35,8 @@ class Spread:
 
     Notes
     -----
-    Friction angle and subgrade reaction are correlated by their standard normals (Gaussian copula): the second is
-    ``rho z_1 + sqrt(1 - rho^2) z_2``, with the numbers of the first and its own.
+    Friction angle and subgrade reaction are correlated by a Gaussian copula: the normal of the second is ``rho z_1 +
+    sqrt(1 - rho^2) z_2``.
     """
 
     def __init__(self, sweep: Sweep) -> None:
@@ -50,7 +50,7 @@ class Spread:
 
     @property
     def names(self) -> list[str]:
-        """Columns (or ``embedment_ratio``) of the uncertain inputs, in the order of their numbers."""
+        """Columns (or ``embedment_ratio``) of the uncertain inputs, in the order of their normals."""
         return list(self.distributions)
 
     @property
@@ -59,12 +59,12 @@ class Spread:
         return [BY_NAME[name].path for name in self.names]
 
     def filled(self, given: Rows, z: np.ndarray) -> Rows:
-        """Return designs with their uncertain inputs drawn.
+        """Return designs with sampled inputs.
 
         Parameters
         ----------
         given
-            Inputs of n designs with the means of the uncertain ones.
+            Inputs of n designs, with means for the uncertain ones.
         z
             Independent standard normal numbers, shape (n, number of uncertain inputs).
         """
@@ -79,7 +79,7 @@ class Spread:
 
 
 def values_of(spread: Distribution, mean: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the values of a distribution at the fractiles of standard normal numbers.
+    """Return the quantiles of a distribution at standard normal numbers.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def values_of(spread: Distribution, mean: np.ndarray, z: np.ndarray) -> np.ndarr
 
 
 def _truncated(mean: np.ndarray, deviation: np.ndarray, low: float, high: float, z: np.ndarray) -> np.ndarray:
-    """Normal distribution, truncated; each half is counted from its own tail, so that no digits are lost."""
+    """Truncated normal distribution; each half is computed from its own tail, so that no digits are lost."""
     below, above = (low - mean) / deviation, (high - mean) / deviation
     lower = ndtri(ndtr(below) + ndtr(z) * (ndtr(above) - ndtr(below)))
     upper = -ndtri(ndtr(-above) + ndtr(-z) * (ndtr(-below) - ndtr(-above)))

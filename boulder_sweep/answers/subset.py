@@ -1,8 +1,8 @@
 """Small probabilities by subset simulation (Au and Beck 2001), many populations side by side.
 
-The rare event is reached by levels, each a tenth as probable as the one before. Within a level the points move by a
-step that keeps the standard normal distribution, x' = a x + sqrt(1 - a^2) w, and stay where they are if that would
-leave the level. Several populations give the interval.
+The rare event is reached in levels, each a tenth as probable as the one before. Within a level the points move by x' =
+a x + sqrt(1 - a^2) w, which preserves the standard normal distribution; a move that would leave the level is rejected.
+Several populations give the interval.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ POINTS = 1000
 SHARE = 0.1
 """Probability of a level within the one before."""
 KEPT = 0.8
-"""Part a of a point that a move keeps."""
+"""Correlation a between a point and its move."""
 MOST_LEVELS = 12
-"""Levels after which an event is held for impossible: less probable than 1e-12."""
+"""Levels after which an event counts as impossible: less probable than 1e-12."""
 
 Distance = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Rows, shape (m,), and standard normal numbers, shape (m, d), to the distance to the event, shape (m,); it happens
-where that is 0 or less."""
+"""Maps rows, shape (m,), and standard normals, shape (m, d), to the distance from the event, shape (m,), which occurs
+where the distance is 0 or less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Rare:
     Attributes
     ----------
     estimate, low, high : ndarray, shape (n,)
-        The probability and its interval, which is even on a logarithmic scale.
+        The probability and its interval, symmetric on a logarithmic scale.
     """
 
     estimate: np.ndarray
@@ -58,22 +58,22 @@ def subset_simulation(
     Parameters
     ----------
     distance
-        How far a point is from the event.
+        Distance of a point from the event.
     rows
-        How many rows.
+        Number of rows.
     dimensions
-        Numbers of a point.
+        Dimensions of a point.
     seed
         The same seed gives the same result.
     points
         Points of a population at each level.
     confidence
-        Share of intervals that hold the probability.
+        Confidence level of the interval.
 
     Returns
     -------
     Rare
-        Zero with an upper end of 1e-12 where the event was never reached.
+        Zero, with an upper end of 1e-12, where the event was never reached.
     """
     rng = np.random.default_rng(seed)
     x = rng.standard_normal((rows, POPULATIONS, points, dimensions))
@@ -81,8 +81,8 @@ def subset_simulation(
     probability = np.ones((rows, POPULATIONS))
     open_ = np.arange(rows)
     for level in range(MOST_LEVELS):
-        # One edge for all populations of a row: chosen from all of them it hardly depends on any, and the estimates of
-        # the populations stay free of the bias of an edge of their own.
+        # One threshold for all populations of a row: it hardly depends on any single one, so the estimates of the
+        # populations are free of the bias that thresholds of their own would cause.
         edge = np.quantile(g[open_].reshape(len(open_), -1), SHARE, axis=1)
         edge = np.where(edge <= 0.0, 0.0, edge)
         inside = g[open_] <= edge[:, None, None]
@@ -112,10 +112,10 @@ def _moved(
     inside: np.ndarray,
     edge: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fill the populations anew by chains that begin at points within the level and stay there."""
+    """Refill the populations with chains that start at points within the level and stay there."""
     points = x.shape[2]
     chains = round(SHARE * points)
-    # Points within the level in random order; where there are fewer than chains, they begin several.
+    # Points within the level in random order; if there are fewer points than chains, some start several.
     order = np.argsort(np.where(inside, rng.random(inside.shape), 2.0), axis=2)
     begin = np.arange(chains) % np.maximum(inside.sum(axis=2), 1)[:, :, None]
     seeds = np.take_along_axis(order, begin, axis=2)
@@ -133,7 +133,7 @@ def _moved(
 
 
 def _combined(probability: np.ndarray, confidence: float) -> Rare:
-    """Mean over populations, and an interval from their spread by the delta method on the logarithm."""
+    """Return the mean over populations, and an interval from their spread by the delta method on the logarithm."""
     mean = probability.mean(axis=1)
     error = probability.std(axis=1, ddof=1) / math.sqrt(POPULATIONS)
     ratio = np.divide(error, mean, out=np.zeros_like(mean), where=mean > 0.0)

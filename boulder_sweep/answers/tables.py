@@ -1,4 +1,4 @@
-"""Answers as Arrow tables and Parquet files, a unit and a meaning with every column."""
+"""Answers as Arrow tables and Parquet files; every column has a unit and a meaning."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
     start
         Number of the first row.
     answers
-        Answers by the readings of the sweep, then by others.
+        Answers with the readings of the sweep, then with others.
     readings
-        Names of the readings, in that order.
+        Names of the readings, in the same order.
     """
     own = answers[0]
     block = replace(own.block, start=start, stop=start + len(own.block))
@@ -106,22 +106,22 @@ def chance_table(
     words: Sequence[str],
     failing: Chance | None,
 ) -> pa.Table:
-    """Return chances as a table: inputs, outcome at the means, chance of passing, most influential input.
+    """Return probabilities as a table: inputs, outcome at the means, probability of passing, most influential input.
 
     Parameters
     ----------
     start
         Number of the first row.
     block, judged
-        The designs with the means of their uncertain inputs, and what these come to.
+        The designs with the means of their uncertain inputs, and their outcomes.
     found
-        Chances of passing.
+        Probabilities of passing.
     driver
-        Place of the most influential input in `words`, -1 for none.
+        Index of the most influential input in `words`; -1 for none.
     words
         The uncertain inputs.
     failing
-        Chances of failing by subset simulation.
+        Probabilities of failing by subset simulation.
     """
     table = part_table(replace(block, start=start, stop=start + len(block)), judged, {})
     places = pa.array(driver.astype(np.int32), mask=driver < 0)
@@ -169,7 +169,7 @@ def index_table(names: Sequence[str], found: Sequence[Indices], outputs: Sequenc
 
 
 def sample_table(names: Sequence[str], drawn: Sequence[tuple[Mapping[str, np.ndarray], np.ndarray]]) -> pa.Table:
-    """Return drawn designs as a table: number of the design, uncertain inputs, distance to failing."""
+    """Return sampled designs as a table: number of the design, uncertain inputs, distance from failing."""
     counts = [len(distance) for _, distance in drawn]
     columns = {"design_id": pa.array(np.repeat(np.arange(len(drawn)), counts))}
     for name in names:
@@ -189,7 +189,7 @@ def frame_of(table: pa.Table) -> pd.DataFrame:
 
 
 def with_columns(table: pa.Table, columns: Sequence[tuple[str, str, str, Any]]) -> pa.Table:
-    """Return a table with further columns behind its own.
+    """Return a table with further columns appended.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def boulder_mass(table: pa.Table) -> np.ndarray:
 
 
 def joined_tables(tables: Sequence[pa.Table], metadata: Mapping[bytes, bytes]) -> pa.Table:
-    """Put tables of consecutive rows together, with the metadata of a file beside that for pandas."""
+    """Concatenate tables of consecutive rows, adding the metadata of a file to that for pandas."""
     import json
 
     from boulder_sweep.store.schema import PANDAS_ATTRIBUTES
@@ -254,7 +254,7 @@ def write_parquet(table: pa.Table, path: str | Path) -> Path:
 
 
 def checked_parquet(path: str | Path) -> Path:
-    """Return the path of a Parquet file to be written.
+    """Check and return the path of a Parquet file to be written.
 
     Raises
     ------

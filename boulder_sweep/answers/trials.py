@@ -1,4 +1,4 @@
-"""Designs of a sweep with some of their inputs left open, filled in as an answer is searched for."""
+"""Designs of a sweep with some inputs left open, to be filled in during a search."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 OUT_OF_REACH = ("no_contact", "override")
-"""Reasons of designs that the truck passes over: at such a value there is nothing to search for."""
+"""Reasons for which there is nothing to search at a value: the truck goes over the boulder."""
 PLACEHOLDER = 0.5
 
 Rows = dict[str, np.ndarray]
-"""Inputs of n designs by column name (or ``embedment_ratio``), each of shape (n,), as a file gives them."""
+"""Inputs of n designs by column name (or ``embedment_ratio``), each of shape (n,), as given by a file."""
 
 
 class Open:
@@ -36,7 +36,7 @@ class Open:
     sweep
         The sweep.
     names
-        Inputs to leave open. The two ways of giving the embedment stand for each other.
+        Inputs to leave open. Opening the embedment depth opens the embedment ratio too, and the reverse.
     """
 
     def __init__(self, sweep: Sweep, names: tuple[str, ...]) -> None:
@@ -57,7 +57,7 @@ class Open:
         return self.sweep.n_designs
 
     def labels(self, start: int, stop: int) -> dict[str, Label]:
-        """Return the names that the combinations ``[start, stop)`` carry."""
+        """Return the labels of the combinations ``[start, stop)``."""
         return self.sweep.block(start, stop).labels
 
     def rows(self, start: int, stop: int) -> Rows:
@@ -67,22 +67,22 @@ class Open:
 
 
 def taken(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> DesignBlock:
-    """Return some of the designs as a block, with open inputs filled in."""
+    """Return some of the designs as a block, with the open inputs filled in."""
     return block_of({name: values[index] for name, values in rows.items()} | inputs)
 
 
 @dataclasses.dataclass(frozen=True)
 class Judges:
-    """The two ways of judging designs: quickly, to search, and as the sweep itself does, to certify.
+    """Two evaluations of designs: a quick one to search, and that of the sweep to certify.
 
     Parameters
     ----------
     quick, own
-        A solution without estimate of its error; the sweep's own accuracy.
+        A single solution without an error estimate; the accuracy of the sweep.
     accuracy
         The sweep's own accuracy.
     least_margin
-        Margin that a design must have to be said to hold.
+        Margin that a design must have to count as passing.
     """
 
     quick: Evaluation
@@ -91,13 +91,13 @@ class Judges:
     least_margin: float = 0.0
 
     def holds(self, judged: Judged) -> np.ndarray:
-        """Whether rows pass with the margin that is asked for, bool, shape (n,)."""
+        """Return whether rows pass with the requested margin, bool, shape (n,)."""
         passes = judged.verdict == PASS
         return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
 
 
 def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
-    """Return how the designs of a sweep are judged."""
+    """Return the evaluations of a sweep."""
     accuracy = accuracy_of(sweep)
     own = evaluation_of(sweep, accuracy)
     quick = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False))
@@ -107,13 +107,13 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
 
 
 def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:
-    """Whether the truck passes over the boulder, or the row is no design at all, bool, shape (n,)."""
+    """Return whether the truck goes over the boulder or the row is not a valid design, bool, shape (n,)."""
     words = [code for code, word in enumerate(judged.reasons) if word in OUT_OF_REACH]
     return np.isin(judged.reason, words) | (np.asarray(block.reasons.codes) != 0)
 
 
 def ranges(count: int, most: int) -> Iterator[tuple[int, int]]:
-    """Yield pieces ``[start, stop)`` of about equal size, none larger than `most`."""
+    """Yield ranges ``[start, stop)`` of about equal size, none larger than `most`."""
     pieces = max(math.ceil(count / most), 1)
     for piece in range(pieces):
         start, stop = count * piece // pieces, count * (piece + 1) // pieces

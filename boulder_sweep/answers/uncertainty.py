@@ -1,4 +1,4 @@
-"""How sure: the chance that a design passes where inputs are uncertain, and which of them decides."""
+"""The probability that a design passes when inputs are uncertain, and which input matters most."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
 
 ROWS_AT_ONCE = 256
 MOST_INDEXED = 100
-"""Rows up to which Sobol indices, and rare chances, are worked out for every row."""
+"""Most rows for which Sobol indices and rare probabilities are computed."""
 SAMPLES = 4096
-"""Designs that are kept of each row, to be looked at and drawn."""
+"""Samples kept of each row for plots and inspection."""
 OUTPUTS = ("passes", "margin")
-"""What the indices are of: whether a design passes, and its distance to failing."""
+"""Outputs of the indices: whether a design passes, and its distance from failing."""
 
 Told = Callable[[int, int], None]
-"""Told how many rows of how many are done."""
+"""Called with the number of rows done and the total."""
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Chances of the designs of a sweep. Made by `uncertainty`.
+    """Probabilities of the designs of a sweep. Made by `uncertainty`.
 
     Attributes
     ----------
@@ -69,13 +69,13 @@ class Uncertainty:
 
     @property
     def frame(self) -> pd.DataFrame:
-        """The chances as a data frame; units and meanings in ``.attrs``."""
+        """The probabilities as a data frame; units and meanings in ``.attrs``."""
         from boulder_sweep.answers.tables import frame_of
 
         return frame_of(self.arrow)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything but the samples as plain data."""
+        """Return everything except the samples as plain data."""
         return {
             "name": self.sweep.name,
             "seed": self.seed,
@@ -84,7 +84,7 @@ class Uncertainty:
         }
 
     def write(self, path: str | Path) -> list[Path]:
-        """Write the table to a Parquet file, indices and samples beside it; return the files.
+        """Write the table to a Parquet file, with indices and samples next to it; return the paths.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Uncertainty:
         return files
 
     def plot(self, path: str | Path, design_id: int = 0) -> None:
-        """Draw which drawn designs pass, and what each input does to the chance.
+        """Draw which samples pass, and how each input affects the probability.
 
         Raises
         ------
@@ -123,34 +123,34 @@ def uncertainty(
     jobs: int | None = None,
     told: Told | None = None,
 ) -> Uncertainty:
-    """Estimate the chance of passing for every design of a sweep with uncertain inputs.
+    """Estimate the probability of passing for every design of a sweep with uncertain inputs.
 
     Parameters
     ----------
     sweep
         The sweep; some of its inputs have distributions.
     half_width
-        Half of the widest interval that is accepted; designs are drawn until it is reached.
+        Largest half-width of the interval; sampling continues until it is reached.
     confidence
-        Share of intervals that hold the chance.
+        Confidence level of the interval.
     margin
         Least margin to the limits, ``0.25`` or ``"25 %"``.
     seed
         Seed of all random numbers; the same seed gives the same result, whatever the number of threads.
     most
-        Designs drawn for a row at most.
+        Most samples of a row.
     rare
-        Whether the smaller of the chances of failing and of passing is worked out by subset simulation, too, which
+        Whether to compute the smaller of the probabilities of failing and passing by subset simulation as well, which
         reaches 1e-6 and below.
     jobs
         Threads; all cores by default.
     told
-        Told how far it is.
+        Called as the sampling progresses.
 
     Raises
     ------
     QuestionError
-        No input has a distribution, or a number makes no sense.
+        No input has a distribution, or an argument is out of range.
     """
     width, sure, least_margin = (
         share(half_width, "--half-width"),
@@ -188,7 +188,7 @@ def uncertainty(
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What is asked of a sweep."""
+    """The arguments of `uncertainty`."""
 
     sweep: Sweep
     spread: Spread
@@ -244,7 +244,7 @@ def _rows(asked: _Asked, points: Points, parallel: joblib.Parallel, start: int, 
 
 
 def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Chance:
-    """Return the chances of failing by subset simulation of the smaller of failing and passing."""
+    """Return the probabilities of failing, from subset simulation of the rarer of failing and passing."""
     n = len(found.estimate)
     sign = np.where(found.estimate >= 0.5, 1.0, -1.0)
 
@@ -262,7 +262,7 @@ def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Chance:
 
 
 def _sensitivity(asked: _Asked, points: Points, parallel: joblib.Parallel, row: int) -> tuple[Any, Any]:
-    """Return the indices of one design, and designs drawn of it."""
+    """Return the indices of one design, and samples of it."""
     draws = asked.draws(row, row + 1, parallel)
 
     def outputs(z: np.ndarray) -> np.ndarray:

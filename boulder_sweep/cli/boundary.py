@@ -36,8 +36,8 @@ def boundary(
 ) -> int:
     """Map which designs of GRID pass, simulated only near where the verdict changes.
 
-    For designs that are dear, as with sums over soil elements. It takes for granted that along the longest axis the
-    verdict changes once; `sweep run` takes nothing for granted.
+    Useful where a design is expensive, as with sums over soil elements. Assumes that the verdict changes only once
+    along the longest axis; `sweep run` assumes nothing.
     """
     from boulder_sweep.answers.boundary import boundary as find
     from boulder_sweep.answers.tables import checked_parquet

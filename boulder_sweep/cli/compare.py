@@ -1,4 +1,4 @@
-"""``sweep compare``: which verdicts turned between two results, and why."""
+"""``sweep compare``: which verdicts changed between two results, and why."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ Examples:
 LEAST = {"mass_kg": ("lightest boulder", "kg"), "depth_m": ("shallowest depth", "m")}
 
 
-@click.command("compare", short_help="Which verdicts turned between two results, and why.", epilog=EXAMPLES)
+@click.command("compare", short_help="Which verdicts changed between two results, and why.", epilog=EXAMPLES)
 @click.argument("before", type=click.Path())
 @click.argument("after", type=click.Path())
 @click.option(
-    "--show", "listed", type=click.IntRange(min=0), default=5, metavar="N", help="Designs that turned to list [5]."
+    "--show", "listed", type=click.IntRange(min=0), default=5, metavar="N", help="Changed designs to list [5]."
 )
 @units_option
 @json_option
 def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> int:
     """Compare the results in BEFORE and AFTER design by design, matched by their inputs.
 
-    Tells what differs in settings and versions, how many verdicts turned and which way, and the least mass and depth
-    that pass. Listed are the designs whose rotation changed most.
+    Shows what differs in settings and versions, how many verdicts changed and how, and the least mass and depth that
+    pass. Lists the designs whose rotation changed most.
     """
     from boulder_sweep.cli.console import counted
     from boulder_sweep.report.comparison import compare as match
@@ -43,15 +43,15 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
         show(f"changed  {line}")
     alone = f"{found.only_before:,} only before, {found.only_after:,} only after"
     show(f"{counted(len(found.matched), 'design')} in both; {alone}")
-    show(f"{counted(len(found.turned), 'verdict')} turned")
-    for turn, count in found.turns().items():
-        show(f"  {count:>9,}  {turn}")
+    show(f"{counted(len(found.flipped), 'verdict')} changed")
+    for change, count in found.flips().items():
+        show(f"  {count:>9,}  {change}")
     for name, pair in found.least.items():
         words, unit = LEAST[name]
         shown, size = shown_unit(unit, units)
         values = ["none passes" if value is None else f"{value / size:,.5g} {shown}" for value in pair]
         show(f"{words} that passes: {values[0]} before, {values[1]} after")
-    for row in found.turned.head(listed).itertuples():
+    for row in found.flipped.head(listed).itertuples():
         show(
             f"  design {row.design_id_before:,} -> {row.design_id_after:,}: "
             f"{row.max_rotation_deg_before:.4g} -> {row.max_rotation_deg_after:.4g} deg"

@@ -1,4 +1,4 @@
-"""What the command line shows: progress on stderr, short readable tables on stdout."""
+"""What the command line shows: progress on stderr, short tables on stdout."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def is_cold() -> bool:
 
 @contextmanager
 def progress(quiet: bool, notes: Notes, cold: bool = False) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows progress and notes: a bar on a terminal, a line now and then elsewhere."""
+    """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere."""
     if quiet:
         yield None
     elif sys.stderr.isatty():

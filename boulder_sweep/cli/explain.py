@@ -21,7 +21,7 @@ Examples:
 """
 
 
-@click.command("explain", short_help="Compute one row of a result again, over time.", epilog=EXAMPLES)
+@click.command("explain", short_help="Recompute one row of a result over time.", epilog=EXAMPLES)
 @click.argument("out", type=click.Path())
 @click.argument("design_id", type=click.IntRange(min=0))
 @click.option("--plot", type=click.Path(), metavar="F.png", help="Draw rotation, displacements and forces over time.")
@@ -31,8 +31,8 @@ Examples:
 def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, units: str, as_json: bool) -> int:
     """Compute row DESIGN_ID of the result in OUT again, from the result alone, and say what decided it.
 
-    Says whether every outcome comes out the same to the last bit and, where not, what has changed since:
-    versions, kernels, rules. The time history goes on beyond the rotation limit, as that of `sweep simulate`.
+    Says whether every outcome is the same to the last bit and, if not, what has changed since: versions, kernels,
+    rules. As in `sweep simulate`, the time history continues beyond the rotation limit.
     """
     from boulder_sweep.cli.console import COLD_START, is_cold, value_lines
     from boulder_sweep.impact.explanation import explain as compute_again

@@ -32,7 +32,7 @@ def explore(
 ) -> int:
     """Write a page with one design of CASE and open it in the browser.
 
-    Every change in the page simulates the impact anew, in the page: no server, no network. Without CASE it begins with
+    Every change in the page simulates the impact anew, in the page: no server, no network. Without CASE it starts with
     the boulder of the paper's second crash test, which stopped its truck.
     """
     import webbrowser
@@ -48,5 +48,5 @@ def explore(
     written = write_explorer(sweep, design, target, units=units, command=shlex.join(["sweep", *sys.argv[1:]]))
     show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")
     if not no_open and not webbrowser.open(written.resolve().as_uri()):
-        say("note: there is no browser here to open it")
+        say("note: found no browser to open it")
     return 0

@@ -62,7 +62,7 @@ def lines(fit: VehicleFit) -> list[str]:
     rows = [
         ("spring", f"{wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"),
         ("damper", f"{wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN*s/m"),
-        ("speed of impact", speed),
+        ("impact speed", speed),
         ("damping", damping),
         ("largest crush", f"{wall.max_displacement_m:.3f} m"),
         ("peak force", f"{wall.peak_force / 1e3:.0f} kN at {wall.peak_force_time_s:.4f} s"),

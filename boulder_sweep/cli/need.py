@@ -22,18 +22,18 @@ Examples:
 
 @click.command("need", short_help="The least depth (or any input) that passes.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
-@click.option("--least", metavar="KEY", help="Input of which the smallest passing value is wanted [embedment_depth].")
-@click.option("--most", metavar="KEY", help="Input of which the largest passing value is wanted, e.g. speed.")
+@click.option("--least", metavar="KEY", help="Input whose smallest passing value is wanted [embedment_depth].")
+@click.option("--most", metavar="KEY", help="Input whose largest passing value is wanted, e.g. speed.")
 @click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
-@click.option("--probability", metavar="P", help="Chance of passing, 0.95, where inputs have distributions.")
+@click.option("--probability", metavar="P", help="Probability of passing, e.g. 0.95, if inputs have distributions.")
 @click.option(
-    "--open-readings", is_flag=True, help="With a probability: any reading of the paper may be the right one."
+    "--open-readings", is_flag=True, help="With --probability: treat all readings of the paper as equally likely."
 )
 @click.option(
     "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
 )
-@click.option("--tolerance", metavar="T", help="Distance of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
-@click.option("--own-readings", is_flag=True, help="Leave out the answers by the other readings of the paper.")
+@click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
+@click.option("--own-readings", is_flag=True, help="Omit the answers for the other readings of the paper.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Design chart (.png, .svg or .pdf).")
@@ -59,9 +59,9 @@ def need(
 ) -> int:
     """Find the least KEY that passes, for every combination of the other inputs of GRID.
 
-    Where KEY is an axis of the grid, the axis is the range that is searched; else the usual range is, for depths from
-    0.35 of the height to where the truck would pass over the boulder. Every answer has its bracket: the value that
-    passes and the one next to it that does not, both judged as `sweep run` judges them.
+    If KEY is an axis of the grid, the axis is the search range; otherwise the usual range, for depths from 0.35 of the
+    height to where the truck would go over the boulder. Every answer has a bracket: the value that passes and the next
+    one, which does not, both judged as in `sweep run`.
     """
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.printing import need_lines

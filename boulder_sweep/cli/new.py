@@ -1,4 +1,4 @@
-"""``sweep new``: a commented settings file to begin with."""
+"""``sweep new``: a commented settings file to start from."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Examples:
 """
 
 
-@click.command("new", short_help="Write a commented settings file to begin with.", epilog=EXAMPLES)
+@click.command("new", short_help="Write a commented settings file to start from.", epilog=EXAMPLES)
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path), default="my-site.yaml")
 @click.option("-y", "--yes", is_flag=True, help="Ask nothing; take the answers in brackets.")
 def new(file: Path, yes: bool) -> int:

@@ -101,7 +101,7 @@ def json_option(function: Command) -> Command:
 def units_option(function: Command) -> Command:
     """Add ``--units``."""
     return click.option(
-        "--units", type=click.Choice(["si", "us"]), default="si", show_default=True, help="Units to begin with."
+        "--units", type=click.Choice(["si", "us"]), default="si", show_default=True, help="Units shown first."
     )(function)
 
 
@@ -124,7 +124,7 @@ def run_options(function: Command) -> Command:
     path = click.Path()
     for option in reversed(
         (
-            click.option("-o", "--output", "out", type=path, help="Folder of the table [default: NAME.sweep]."),
+            click.option("-o", "--output", "out", type=path, help="Folder for the table [default: NAME.sweep]."),
             click.option("--jobs", type=click.IntRange(min=1), help="Workers [default: all cores]."),
             click.option(
                 "--backend",

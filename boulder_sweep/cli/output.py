@@ -1,4 +1,4 @@
-"""All that the commands write to a terminal goes through here: text of users' files is text, and nothing else."""
+"""Everything that commands write to a terminal goes through here, so that text from users' files stays text."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ COLUMN = "COLUMN"
 def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None) -> int:
     """Draw a map of the verdicts in OUT: embedment across, height up, one map for each soil.
 
-    OUT may still be being written; finished designs are drawn. COLUMN is the name of an input column of the
+    OUT may belong to a run in progress; finished designs are drawn. COLUMN is the name of an input column of the
     table, or embedment_ratio.
     """
     held = dict(_held(text) for text in at)

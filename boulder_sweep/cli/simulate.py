@@ -24,7 +24,7 @@ from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
     metavar="F.png",
     help="Draw where the energy goes, and add its columns to the time history.",
 )
-@click.option("--animate", type=click.Path(), metavar="F.gif|.mp4|.html", help="Make a film of the side view.")
+@click.option("--animate", type=click.Path(), metavar="F.gif|.mp4|.html", help="Animate the side view.")
 @units_option
 @set_option
 @json_option
@@ -64,7 +64,7 @@ def simulate(
     if not quiet and console.is_cold():
         say(console.COLD_START)
     result = simulate_design(sweep, number)
-    # First of all: a picture may be impossible where nothing moved, a film takes its time.
+    # Before anything else: there may be nothing to draw, and a film takes a while.
     values = shown_values(result.summary(), units)
     show(*([json.dumps(values)] if as_json else [*console.value_lines(values), *_cautions(values)]))
     if plot is not None:
@@ -84,7 +84,7 @@ def simulate(
 
 
 def _cautions(values: dict[str, Any]) -> list[str]:
-    """Return what to say beside the result."""
+    """Return the remarks that go with the result."""
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
 
     lines = [f"caution: {words} (docs/validity.md)" for words in meanings(values["validity"] or "")]

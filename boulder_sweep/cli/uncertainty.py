@@ -1,4 +1,4 @@
-"""``sweep uncertainty``: the chance of passing where inputs are uncertain, and which of them decides."""
+"""``sweep uncertainty``: the probability of passing when inputs are uncertain, and which input matters most."""
 
 from __future__ import annotations
 
@@ -30,17 +30,19 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
         ctx.exit()
 
 
-@click.command("uncertainty", short_help="The chance of passing with uncertain inputs.", epilog=EXAMPLES)
+@click.command("uncertainty", short_help="The probability of passing with uncertain inputs.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
-@click.option("--half-width", default="0.01", metavar="P", help="Half of the widest interval accepted [0.01].")
-@click.option("--confidence", default="95 %", metavar="SHARE", help="Share of intervals that hold the chance [95 %].")
+@click.option("--half-width", default="0.01", metavar="P", help="Largest half-width of the interval [0.01].")
+@click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
-@click.option("--rare", is_flag=True, help="Small chances, too, by subset simulation.")
-@click.option("--doubts", is_flag=True, help="Part the doubt of one design among inputs, readings and numerical error.")
+@click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
+@click.option(
+    "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
 @click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
 @click.option(
-    "-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table; indices, samples beside it."
+    "-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table; indices and samples next to it."
 )
 @click.option(
     "--plot", "picture", type=click.Path(), metavar="F.png", help="Picture (.png, .svg or .pdf) of one design."
@@ -73,10 +75,10 @@ def uncertainty(
     overrides: tuple[str, ...],
     as_json: bool,
 ) -> int:
-    """Estimate the chance of passing for every design of GRID, in which some inputs have distributions.
+    """Estimate the probability of passing for every design of GRID, in which some inputs have distributions.
 
-    An input takes a distribution in place of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Designs are drawn
-    until the interval of the chance is narrow enough.
+    An input takes a distribution instead of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Sampling continues
+    until the interval is narrow enough.
     """
     from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
     from boulder_sweep.answers.tables import checked_parquet

@@ -1,4 +1,4 @@
-"""``sweep which``: which truck and which soil every design withstands."""
+"""``sweep which``: which truck and soil every design withstands."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ Examples:
 @set_option
 @json_option
 def which(grid: str, jobs: int | None, out: str | None, quiet: bool, overrides: tuple[str, ...], as_json: bool) -> int:
-    """Find how far speed, mass of the truck and friction angle may change before the verdict of each design does.
+    """Find how far speed, mass of the truck and friction angle may change before each verdict does.
 
-    The highest class of ASTM F2656 whose nominal speed (30, 40, 50 mph) is withstood is named beside; it is simulated,
-    and the standard rates by test.
+    Also names the highest ASTM F2656 class whose nominal speed (30, 40, 50 mph) is withstood. The class is
+    simulated; the standard rates by test.
     """
     from boulder_sweep.answers.printing import reserve_lines
     from boulder_sweep.answers.reserves import reserves

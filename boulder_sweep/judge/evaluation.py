@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 LONGEST_HORIZON = 10.0
-"""A design without proof of its verdict at the horizon is simulated up to so many times the horizon."""
+"""A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 
 Simulate = Callable[[DesignTable, Readings, Control], OutcomeTable]
 """Function that simulates a table of designs; always `by_kernels` outside tests."""

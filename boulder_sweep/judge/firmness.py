@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 DESIGNS = 2048
 """Designs of the sample, with the soil in closed form; the steps of `balanced` and their error take 0.1 s."""
 FEWEST_DESIGNS = 1024
-"""And at least, where the sweep has so many."""
+"""Smallest sample, if the sweep has this many designs."""
 SHARE = 50
-"""The sample is no more than one in so many designs of the sweep, so that it stays a small part of the run."""
+"""The sample is at most one in this many designs, so that it stays a small part of the run."""
 SHORTEST_STEP_S = 1e-3
 """Where steps are shorter, the sample for the numerical error is smaller in proportion."""
 ANGLE_DEG = 1.0
@@ -60,7 +60,7 @@ class Firmness:
     changed : dict of str to float
         Fraction of them whose verdict each of `CHANGES` turns from pass to fail or back.
     numerical_error_deg, numerical_error_m : float or None
-        Estimated error that 99.9 % of those that did not overturn keep to; None where none is estimated.
+        Estimated error not exceeded by 99.9 % of those that did not overturn; None if none is estimated.
     passes : int
         Passes of the sample.
     flags : dict of str to int
@@ -129,7 +129,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
 
 
 def _numerical_errors(designs: Designs, readings: Readings, control: Control) -> dict[str, float | None]:
-    """Estimated errors that most of the designs keep to that did not overturn."""
+    """Estimated errors not exceeded by most of the designs that did not overturn."""
     error_deg = error_m = None
     if control.error_estimate:
         share = min(1.0, reported_step_s(control) / SHORTEST_STEP_S)

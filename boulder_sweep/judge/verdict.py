@@ -64,7 +64,7 @@ STATUS_REASONS = {
 }
 """Reason of a row that the kernels could not compute."""
 STEP_REASONS = frozenset(text for status, text in STATUS_REASONS.items() if status != Status.INVALID)
-"""Those that a finer time step may mend."""
+"""Those that a finer time step may resolve."""
 NOT_FINITE = "the computed result is not a finite number"
 
 
@@ -231,7 +231,7 @@ def limits_of(sweep: Sweep) -> Limits:
 
 
 def _ratings(penetration: np.ndarray) -> np.ndarray:
-    """Code of the best rating each penetration [m] keeps to; -1 beyond the last."""
+    """Code of the best rating that each penetration [m] achieves; -1 beyond the last."""
     bounds = np.array([PENETRATION_LIMITS_M[rating] for rating in RATINGS])
     codes = np.searchsorted(bounds, penetration, side="left")
     return np.where(codes < len(RATINGS), codes, -1).astype(np.int32)

@@ -48,7 +48,7 @@ class Answer:
 
 
 def answer_of(rows: Rows) -> Answer:
-    """Put the result of a sweep into words."""
+    """Describe the result of a sweep in sentences."""
     counts, total = rows.counts(), len(rows.codes)
     passing = rows.having("pass")
     n = int(passing.sum())
@@ -62,7 +62,7 @@ def answer_of(rows: Rows) -> Answer:
     if flagged:
         commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
         most = "; ".join(f"{count:,} with {BY_FLAG[name].meaning}" for count, name in commonest[:3])
-        sentences.append((f"{flagged:,} of those that pass lie outside of what the model was tested on: {most}.",))
+        sentences.append((f"{flagged:,} of those that pass lie outside what the model was tested on: {most}.",))
     if n == 0:
         return Answer((*sentences, ("No design passes.",)), ())
     soils = tuple(place for place, name in enumerate(rows.axes) if name in SOIL and rows.shape[place] > 1)
@@ -88,18 +88,18 @@ def _in_words(name: str) -> str:
 
 
 def _share(n: int, total: int) -> str:
-    """Share of a total in per cent; some are never rounded to none, nor most to all."""
+    """Share of a total in per cent; never rounded to 0 % or 100 % unless exact."""
     return f"{n / total if n in (0, total) else min(max(n / total, 0.001), 0.999):.1%}"
 
 
 def _least(rows: Rows, passing: np.ndarray, soils: tuple[int, ...], what: str) -> tuple[Sentence, Named]:
-    """Find the design of least mass or depth; in every soil where some boulder passes in every one."""
+    """Find the design of least mass or depth, passing in every soil if any boulder does."""
     values, other = (rows.mass(), rows.depth()) if what == "mass" else (rows.depth(), rows.mass())
     everywhere = passing.all(axis=soils, keepdims=True) if soils else passing
     robust = bool(everywhere.any())
     eligible = np.broadcast_to(everywhere, rows.shape) if robust else passing
     least = np.where(eligible, values, np.inf)
-    # Of several as small, the one that needs less of the other.
+    # Ties are broken by the other quantity.
     ties = least <= least.min() * (1.0 + 1e-9)
     first = int(np.argmin(np.where(ties, other, np.inf)))
     number, where = first, "in every soil of the sweep" if soils and robust else "among them"

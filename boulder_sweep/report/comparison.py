@@ -1,4 +1,4 @@
-"""Two results of the same designs: which verdicts turned and why, the least depth and mass before and after."""
+"""Two results of the same designs: which verdicts changed and why, the least depth and mass before and after."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 OUTCOMES = ("verdict", "reason", "margin", "max_rotation_deg")
 DIGITS = 12
-"""Inputs are the same where they agree to so many digits: units converted on another way differ in the last."""
+"""Inputs that agree to this many digits are the same; unit conversions may change the last one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Comparison:
     only_before, only_after : int
         Designs without a counterpart in the other result.
     changed : tuple of str
-        Settings, versions and hashes that differ, a line each.
+        Settings, versions and hashes that differ, one line each.
     least : dict
         ``mass_kg`` and ``depth_m``: the least of a design that passes, before and after; None where none does.
     """
@@ -43,21 +43,21 @@ class Comparison:
     least: dict[str, tuple[float | None, float | None]]
 
     @property
-    def turned(self) -> pd.DataFrame:
-        """Designs whose verdict turned, those with the largest change of rotation first."""
+    def flipped(self) -> pd.DataFrame:
+        """Designs whose verdict changed, sorted by change of rotation, largest first."""
         table = self.matched[self.matched.verdict_before != self.matched.verdict_after]
         change = (table.max_rotation_deg_after - table.max_rotation_deg_before).abs()
         return table.loc[change.sort_values(ascending=False, kind="stable").index]
 
-    def turns(self) -> dict[str, int]:
-        """Return how many designs made each turn, verdicts with their reasons."""
-        table = self.turned
+    def flips(self) -> dict[str, int]:
+        """Return the number of designs for each change of verdict and reason."""
+        table = self.flipped
         words = [
             table[f"verdict_{when}"] + table[f"reason_{when}"].map(lambda why: f" ({why})" if why else "")
             for when in ("before", "after")
         ]
         counts = (words[0] + " -> " + words[1]).value_counts()
-        return {str(turn): int(count) for turn, count in counts.items()}
+        return {str(change): int(count) for change, count in counts.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the designs as plain data."""
@@ -65,8 +65,8 @@ class Comparison:
             "matched": len(self.matched),
             "only_before": self.only_before,
             "only_after": self.only_after,
-            "turned": len(self.turned),
-            "turns": self.turns(),
+            "flipped": len(self.flipped),
+            "flips": self.flips(),
             "least": {name: list(pair) for name, pair in self.least.items()},
             "changed": list(self.changed),
         }
@@ -78,7 +78,7 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     Parameters
     ----------
     before, after
-        Folders that a sweep wrote. Designs are matched by their inputs, wherever they stand.
+        Folders that a sweep wrote. Designs are matched by their inputs, whatever their order.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
 
 
 def _table(folder: Place) -> pd.DataFrame:
-    """Read a result with what its designs are matched by; designs that are there twice are numbered."""
+    """Read a result with the keys for matching; repeated designs are numbered."""
     table = read(folder, ["design_id", *INPUT_COLUMNS, *OUTCOMES])
     for name in ("verdict", "reason"):
         table[name] = table[name].astype(str)

@@ -1,4 +1,4 @@
-"""What the script of the page is given: plain data, every word and number of it from the registers of the package."""
+"""Data for the script of the page: plain data whose words and numbers all come from the registers of the package."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ OUTCOME_WORDS = {
     "time_to_limit_s": "limit reached after",
     "rotation_error_deg": "numerical error of the rotation",
 }
-"""Outcomes that the page shows of a design."""
+"""Outcomes of a design that the page shows."""
 
 
 ANGLES = np.arange(20.0, 61.0)
-"""Friction angles [deg] over which the page is told which soils belong together; whole degrees, as the curves bend."""
+"""Friction angles [deg] at which the page knows which soil constants belong together."""
 
 
 def page_data(
@@ -61,7 +61,7 @@ def page_data(
     chosen: Sequence[Mapping[str, Any]],
     units: str,
 ) -> dict[str, Any]:
-    """Return what every page is given; see `boulder_sweep.report.page.assembled`."""
+    """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
     return {
         "title": title,
         "units": units,
@@ -93,7 +93,7 @@ def page_data(
 
 
 def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
-    """Return what the map of a table is made of: codes of the designs kept, values along the axes or of the list."""
+    """Return the data of the map: codes of the designs kept, values along the axes or of the list."""
     codes = rows.codes.reshape(rows.shape)[np.ix_(*kept.places)].ravel()
     if rows.axes:
         lines = zip(rows.axes.items(), kept.places, strict=True)
@@ -125,7 +125,7 @@ def reading_words(settings: Mapping[str, Any]) -> str:
 
 
 def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
-    """Return the settings as lines of text, lists in one line each."""
+    """Return the settings as lines of text, one line for each list."""
     lines = []
     for name, value in settings.items():
         if isinstance(value, Mapping):
@@ -141,7 +141,7 @@ def _as_list(value: Any) -> list[Any]:
 
 
 def _layout() -> dict[str, Any]:
-    """Order of the kernel's numbers, and the column of the table that each input comes from."""
+    """Order of the kernel's numbers, and the table column of each input."""
     return {
         "design": entry_points.DESIGN,
         "settings": entry_points.SETTINGS,
@@ -152,7 +152,7 @@ def _layout() -> dict[str, Any]:
 
 
 def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What a design must keep to, and the words of every verdict."""
+    """Limits of the criterion, and the words of every verdict."""
     criterion, rating = settings["criterion"], settings["criterion"]["rating"]
     return {
         "rotation": rotation,
@@ -169,7 +169,7 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
-    """What the model was tested on, and what the flags say."""
+    """What the model was tested on, and the meaning of the flags."""
     rotation = TESTED_ROTATION_DEG.get(model["preset"], min(TESTED_ROTATION_DEG.values()))
     return {
         "rotation": math.radians(rotation),
@@ -196,7 +196,7 @@ def _label(name: str) -> str:
 
 
 def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What the page needs to know of an input: words, unit, the range of its slider, what is admitted and usual."""
+    """Description of an input: words, unit, range of its slider, admitted and usual values."""
     field, here, axis = BY_NAME[name], start[name], settings["inputs"].get(name)
     assert field.admitted is not None  # as of every input
     ends = [here, *(axis if isinstance(axis, list) else [])]
@@ -221,7 +221,7 @@ def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -
 
 
 def _yaml(settings: Mapping[str, Any]) -> list[str]:
-    """The lines of a file of settings behind the design: criterion, model, solver."""
+    """The lines of a settings file after the design: criterion, model, solver."""
     criterion, model, solver = (settings[name] for name in ("criterion", "model", "solver"))
     soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
     readings = model["preset"]

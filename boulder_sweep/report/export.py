@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
-"""Rows of a sheet of a spreadsheet, its head apart."""
+"""Most rows of a spreadsheet, without the header."""
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
-"""How a text begins that spreadsheets take for a formula."""
+"""First characters of text that a spreadsheet takes for a formula."""
 
 
 def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si") -> int:
@@ -35,7 +35,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
     file
         The table: ``.xlsx``, with a second sheet of units, settings and versions, ``.csv`` or ``.parquet``.
     units
-        ``si``, the table as it is, or ``us``: columns in US customary units, which their names end in.
+        ``si`` for the table as it is, ``us`` for US customary units; column names end in the unit.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
 
 
 def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[str, str, str]]:
-    """Yield what a reader must know of a table: three texts a line."""
+    """Yield what a reader must know about a table, three texts for each line."""
     identity: Mapping[str, Any] = finished.identity
     yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
     yield "rows", f"{finished.rows_done:,} of {finished.rows:,}", ""
@@ -87,7 +87,7 @@ def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[st
 
 
 def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
-    """Yield the rows piece by piece in the units asked for."""
+    """Yield the rows piece by piece in the requested units."""
     import pyarrow.compute as pc
 
     for table in finished.tables():
@@ -113,7 +113,7 @@ def _csv(target: Path, finished: FinishedRows, units: str) -> int:
 
 
 def _harmless(column: pa.ChunkedArray) -> list[Any]:
-    """Values of a column, no text of which a spreadsheet takes for a formula."""
+    """Return the values of a column, with text quoted that a spreadsheet would take for a formula."""
     values = column.to_pylist()
     return [f"'{value}" if isinstance(value, str) and value.startswith(FORMULA_SIGNS) else value for value in values]
 
@@ -141,7 +141,7 @@ def _parquet(target: Path, finished: FinishedRows, units: str) -> int:
 
 
 def _sheet(target: Path, finished: FinishedRows, units: str) -> int:
-    """Write a spreadsheet: the designs, and what a reader must know of them."""
+    """Write a spreadsheet: the designs, and what a reader must know about them."""
     rows, columns = 0, list[Shown]()
     with _workbook(target) as book:
         designs = book.create_sheet("designs")
@@ -160,7 +160,7 @@ def _sheet(target: Path, finished: FinishedRows, units: str) -> int:
 
 @contextmanager
 def _workbook(target: Path) -> Iterator[Any]:
-    """Give a workbook that is written as it grows."""
+    """Return a workbook that is written as it grows."""
     try:
         from openpyxl import Workbook
     except ImportError as lacking:

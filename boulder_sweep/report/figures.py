@@ -1,7 +1,7 @@
-"""The plots of the page, made by Bokeh: empty figures with names, which the page fills by what it simulates.
+"""The plots of the page, made by Bokeh: named empty figures that the page fills with what it simulates.
 
-Nothing here runs code of its own in the browser (Bokeh's CustomJS would need a page that admits text as code): the
-page's script finds figures and sources by their names and sets their data.
+Nothing here runs its own code in the browser (Bokeh's CustomJS would need a policy that allows text as code); the
+page's script finds figures and sources by name and sets their data.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ COLOURS = {
     "error": "#666666",
     "none": "#BBBBBB",
 }
-"""Of verdicts, and of those reasons that have one of their own; told apart without red or green, and in grey."""
+"""Colours of verdicts, and of reasons that have their own; distinct without red and green, and in grey."""
 LINES = ("#1E88C9", "#D55E00", "#009E73")
 PARTS = {
     "vehicle_kinetic": ("vehicle, moving", "#0072B2"),
@@ -30,7 +30,7 @@ PARTS = {
     "soil_elastic": ("soil, pressed", "#009E73"),
     "soil_drag": ("soil, dragged", "#7FCFB5"),
 }
-"""Parts of the energy, as they are stacked: word and colour."""
+"""Energies in stacking order: word and colour."""
 
 
 def curves(panel: str) -> list[figure]:

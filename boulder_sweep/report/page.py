@@ -1,4 +1,4 @@
-"""The page: one file with the plots' library, the kernel, the script and the data, which needs nothing else."""
+"""The page: one self-contained file with the plotting library, the kernel, the script and the data."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MAIN = (
     "boulder_width_m",
     "boulder_height_m",
 )
-"""Inputs that are in sight; the others are a click away."""
+"""Inputs shown at first; the others are one click away."""
 
 
 def assembled(
@@ -58,25 +58,25 @@ def assembled(
     Parameters
     ----------
     title
-        What the page is about.
+        Title of the page.
     settings
         Resolved settings of the sweep.
     control, readings
         How its designs are simulated.
     start
-        The design that the simulator begins with, by the input columns of the table.
+        The design with which the simulator starts, by the input columns of the table.
     sentences
         The answer in words.
     rows, kept
-        Rows of a result and what of them goes into the page; None for a single design.
+        Rows of a result, and those kept in the page; None for a single design.
     chosen
         Designs that are shown in full: ``title``, ``number`` and ``inputs`` of each.
     facts
-        Names and values that say where the results come from.
+        Names and values that describe the origin of the results.
     notes
-        What the reader must know of these very results.
+        Notes on these particular results.
     units
-        ``si`` or ``us``: what the page begins with.
+        Units shown first, ``si`` or ``us``.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def assembled(
 
 
 def _policy(*scripts: str) -> str:
-    """Content-Security-Policy of the page: its own scripts, and no connection whatever."""
+    """Content-Security-Policy of the page: its own scripts, no connections."""
     hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
     return (
         f"default-src 'none'; script-src {hashes} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; "
@@ -146,6 +146,6 @@ def _sha256(text: str) -> str:
 
 
 def _for_script(data: Any) -> str:
-    """JSON that stays data wherever in a page it stands."""
+    """Return JSON that is safe anywhere in a page."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -1,7 +1,7 @@
-"""What the page shows of a table of any size: one small number for each design, and the designs worth naming.
+"""Contents of the page for a table of any size: one small number for each design, and the designs worth naming.
 
-The table is read part by part, and only the verdicts of all of it are kept: a byte a row. Where the designs come from
-axes, their inputs follow from the settings and are not read at all.
+The table is read part by part, and only the verdicts of all rows are kept, one byte each. If the designs come from
+axes, their inputs follow from the settings and are not read.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_den
 SOIL = ("soil", "soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3", "strain_rate_factor")
 NOT_YET = "not computed yet"
 MOST_CELLS = 1_500_000
-"""Designs of a grid whose verdicts go into the page; of more, some values of the longest axes are left out."""
+"""Most designs of a grid whose verdicts go into the page; of larger grids, some values of the longest axes are left
+out."""
 MOST_POINTS = 20_000
-"""The same of a list of designs, each of which brings its inputs along."""
+"""The same for a list of designs, each of which carries its inputs."""
 
 
 class NamedSets(NamedTuple):
@@ -50,17 +51,17 @@ class Rows:
     names : tuple of str
         What a code stands for: verdict and reason, ``fail: overturns``; the last is for rows not computed yet.
     codes : ndarray of uint8, shape (rows,)
-        Place of every row among the names.
+        Index of the name of every row.
     flags : dict of str to int
-        Designs that pass, by what lies outside of what the model was tested on; under ``""`` those inside.
+        Designs that pass, by validity flags; under ``""`` those without.
     axes : dict of str to ndarray
         Values along each axis of the grid, the last fastest; for named sets of soils or vehicles their numbers. Empty
         for a list of designs.
     sets : dict of str to NamedSets
         The axes that are named sets.
     inputs : dict of str to ndarray
-        What is given for every design: single values, axes in their places, or one value a row. They broadcast
-        against each other, and for a grid against its shape.
+        Given inputs: single values, axes in their dimension, or one value for each row. They broadcast against each
+        other, and for a grid against its shape.
     """
 
     folder: Place
@@ -83,12 +84,12 @@ class Rows:
         return self.finished.identity["settings"]
 
     def having(self, verdict: str) -> np.ndarray:
-        """Which rows have a verdict, in the shape of the grid."""
+        """Whether rows have a verdict, in the shape of the grid."""
         places = [place for place, name in enumerate(self.names) if name.partition(":")[0] == verdict]
         return np.isin(self.codes, places).reshape(self.shape)
 
     def counts(self) -> dict[str, int]:
-        """Return how many rows there are of each name."""
+        """Return the number of rows of each name."""
         found = np.bincount(self.codes, minlength=len(self.names))
         return {name: int(n) for name, n in zip(self.names, found, strict=True) if n}
 
@@ -99,7 +100,7 @@ class Rows:
         return self.inputs[RATIO] * self.inputs["boulder_height_m"]
 
     def mass(self) -> np.ndarray:
-        """Mass of the boulder [kg] of every design, in such a shape."""
+        """Mass of the boulder [kg] of every design, in the same shape."""
         length, width, height, density = (self.inputs[name] for name in SIZES)
         return length * width * height * density
 
@@ -118,7 +119,7 @@ class Rows:
         Raises
         ------
         IndexError
-            The table has no such row, or not yet.
+            The table does not have this row (yet).
         """
         return read_row(self.folder, number).to_pylist()[0]
 
@@ -135,7 +136,7 @@ def read_rows(folder: Place) -> Rows:
     settings = finished.identity["settings"]
     order, given = settings["order"], settings["inputs"]
     sets = {} if order == "table" else dict(_sets(settings))
-    # Very long axes and the columns of a list are in the table only.
+    # Very long axes and the columns of a list are only in the table.
     if order == "table":
         wanted = [name for name, value in given.items() if isinstance(value, list | dict)]
     else:
@@ -165,7 +166,7 @@ def read_rows(folder: Place) -> Rows:
 
 
 def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:
-    """Yield the axes that are named sets: each gives the inputs of its block of the file that are no axes."""
+    """Yield the axes that are named sets, each with the inputs that it gives."""
     given, order = settings["inputs"], settings["order"]
     for axis, names in settings.get("labels", {}).items():
         own = {name: value for name, value in given.items() if isinstance(value, list) and name not in order}
@@ -202,7 +203,7 @@ def _length(values: Any) -> int:
 
 
 def _flags_of_passes(table: Any) -> dict[str, int]:
-    """Return how many designs of a part pass with each word of the column ``validity``."""
+    """Return the number of passing designs of a part for each value of the column ``validity``."""
     import pyarrow.compute as pc
 
     words = table.column("validity").filter(pc.equal(table.column("verdict").cast("string"), "pass"))
@@ -226,14 +227,14 @@ def _codes(table: Any, names: list[str]) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Thinned:
-    """The part of a grid, or of a list, that goes into the page.
+    """The part of a grid or list that goes into the page.
 
     Attributes
     ----------
     places : tuple of ndarray
-        Places kept along each axis; of a list, the rows.
+        Indices kept along each axis; for a list, the rows.
     words : str
-        What is left out; empty where nothing is.
+        What is left out; empty if nothing is.
     """
 
     places: tuple[np.ndarray, ...]
@@ -241,7 +242,7 @@ class Thinned:
 
 
 def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
-    """Choose what of the rows goes into the page: all of them, or values spread evenly along the longest axes."""
+    """Choose the rows that go into the page: all, or values spread evenly along the longest axes."""
     if not rows.axes:
         n, kept = len(rows.codes), min(len(rows.codes), most_points)
         words = f"{kept:,} of the {n:,} designs of the list, spread evenly" if kept < n else ""

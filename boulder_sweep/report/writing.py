@@ -1,4 +1,4 @@
-"""From a result, or a file of settings, to the page on the disk."""
+"""From a result, or a settings file, to the page on disk."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def write_report(
     out
         Folder that a sweep wrote; a run may still be writing into it.
     page
-        The file; replaced where it exists.
+        The file; replaced if it exists.
     designs
-        Rows to be shown in full; by default those that the answer speaks of.
+        Rows to be shown in full; by default those named in the answer.
     units
-        ``si`` or ``us``: what the page begins with; the reader can switch.
+        Units shown first, ``si`` or ``us``; the reader can switch.
     command
-        What the reader types to have the page again.
+        Command that makes the page again.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def write_report(
     assembled = _page_maker()
     rows = read_rows(place_of(out))
     if rows.finished.rows_done == 0:
-        raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` says how far it is")
+        raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` shows its progress")
     answer = answer_of(rows)
     named = [Named(f"Design {number}", number) for number in designs] or list(answer.named) or [Named("Design 0", 0)]
     try:
@@ -70,7 +70,7 @@ def write_report(
     if identity["kernels_sha256"] != kernels_sha256():
         notes.append(
             "The table was computed by another version of the kernels than the one in this page, "
-            "so what is simulated here may differ from it."
+            "so simulations here may differ from it."
         )
     text = assembled(
         title=str(identity["settings"]["name"]),
@@ -90,14 +90,14 @@ def write_report(
 
 
 def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = "si", command: str = "") -> Path:
-    """Write the page for one design of a file of settings.
+    """Write the page for one design of a settings file.
 
     Parameters
     ----------
     sweep
         The checked file.
     number
-        Which of its designs.
+        Number of the design.
     page, units, command
         As of `write_report`.
 
@@ -128,13 +128,13 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
 
 
 def example() -> Sweep:
-    """Return a sweep of one design to begin with: the paper's second crash test, a boulder that stopped its truck."""
+    """Return a sweep of one design to start from: the paper's second crash test, whose boulder stopped its truck."""
     test = crash_test("rwg")
     return dataclasses.replace(test, solver=SolverSettings())
 
 
 def _page_maker() -> Callable[..., str]:
-    """Return what makes the page; the libraries that it needs are an extra.
+    """Return the function that makes the page; its libraries are an extra.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
-    """What the reader must know of how these designs are simulated."""
+    """Return notes on how these designs are simulated."""
     notes = []
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
@@ -171,7 +171,7 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
 def _facts(
     versions_: Mapping[str, str], settings_sha256: str, kernels_sha256_: str, command: str, out: str | None
 ) -> list[tuple[str, str]]:
-    """Return where the results come from, and how to have them again."""
+    """Return the origin of the results, and how to reproduce them."""
     found = [(f"version of {name}", versions_[name]) for name in PACKAGES if name in versions_]
     found += [("hash of the settings", settings_sha256), ("hash of the kernels", kernels_sha256_)]
     if out is not None:

@@ -89,7 +89,7 @@ def test_a_result_is_exported_and_compared(sweep, possible_grid):
     )
     code, out, err = sweep("compare", "small-grid.sweep", "small-grid.sweep")
     assert (code, err) == (0, "")
-    assert out.startswith("18 designs in both; 0 only before, 0 only after\n0 verdicts turned\n")
+    assert out.startswith("18 designs in both; 0 only before, 0 only after\n0 verdicts changed\n")
     code, out, _ = sweep("compare", "small-grid.sweep", "fast.sweep", "--json")
     found = json.loads(out)
     assert (code, found["matched"], found["only_before"], found["only_after"]) == (0, 0, 18, 18)

@@ -1,4 +1,4 @@
-"""Two results laid side by side: designs matched by inputs, verdicts that turned, what differs."""
+"""Two results laid side by side: designs matched by inputs, verdicts that changed, what differs."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def slower(tmp_path_factory):
 
 def test_a_result_does_not_differ_from_itself(result):
     found = compare(result, result)
-    assert (len(found.matched), found.only_before, found.only_after, len(found.turned)) == (252, 0, 0, 0)
+    assert (len(found.matched), found.only_before, found.only_after, len(found.flipped)) == (252, 0, 0, 0)
     assert found.changed == ()
     assert found.least["mass_kg"][0] == found.least["mass_kg"][1]
 
@@ -36,14 +36,14 @@ def test_designs_are_matched_wherever_they_stand(result, slower):
         assert one.embedment_depth_m == pytest.approx(other.embedment_depth_m, rel=1e-11)
 
 
-def test_every_turn_is_counted_with_its_reason(result, slower):
+def test_every_change_is_counted_with_its_reason(result, slower):
     found = compare(result, slower)
-    turned = found.matched[found.matched.verdict_before != found.matched.verdict_after]
-    assert len(turned) > 10
-    assert sum(found.turns().values()) == len(turned) == len(found.turned)
-    saved = (turned.verdict_before == "fail") & (turned.verdict_after == "pass")
-    assert found.turns()["fail (overturns) -> pass"] == saved.sum()
-    changes = (found.turned.max_rotation_deg_after - found.turned.max_rotation_deg_before).abs().tolist()
+    differ = found.matched[found.matched.verdict_before != found.matched.verdict_after]
+    assert len(differ) > 10
+    assert sum(found.flips().values()) == len(differ) == len(found.flipped)
+    saved = (differ.verdict_before == "fail") & (differ.verdict_after == "pass")
+    assert found.flips()["fail (overturns) -> pass"] == saved.sum()
+    changes = (found.flipped.max_rotation_deg_after - found.flipped.max_rotation_deg_before).abs().tolist()
     assert changes == sorted(changes, reverse=True)
 
 
