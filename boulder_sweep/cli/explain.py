@@ -94,5 +94,5 @@ def why_lines(found: Explanation) -> list[str]:
     if row["rotation_error_deg"] is not None:
         lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
     if row.get("validity"):
-        lines.append(f"  outside of what the model was tested on: {row['validity'].replace(';', ', ')}")
+        lines.append(f"  outside what the model was tested on: {row['validity'].replace(';', ', ')}")
     return lines

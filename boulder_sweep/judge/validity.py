@@ -1,4 +1,4 @@
-"""Flags on rows outside of what the model was tested on. They do not change a verdict.
+"""Flags on rows outside what the model was tested on. They do not change a verdict.
 
 This is the one register: the column ``validity``, its words in summaries and pictures, and the page of the
 documentation follow from it. What the two crash tests of the paper cover is taken from their data

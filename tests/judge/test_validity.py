@@ -1,4 +1,4 @@
-"""Flags on rows outside of what the model was tested on."""
+"""Flags on rows outside what the model was tested on."""
 
 from __future__ import annotations
 
