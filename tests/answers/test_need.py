@@ -195,10 +195,10 @@ def test_one_boulder_is_scaled_with_its_proportions() -> None:
 @pytest.mark.parametrize(
     ("question", "message"),
     [
-        ({"least": "density"}, r"may be boulder\.density or soil\.density"),
+        ({"least": "density"}, r"ambiguous; use boulder\.density or soil\.density"),
         ({"least": "phi"}, "did you mean friction_angle"),
         ({"least": "depht"}, "is not an input"),
-        ({"least": "speed", "most": "speed"}, "not for both"),
+        ({"least": "speed", "most": "speed"}, "not both"),
         ({"between": ("2 m", "1 m")}, "less than the second"),
         ({"between": ("2 kg", "3 kg")}, "a length is needed"),
         ({"between": ("1 m", "50 m")}, "admitted range"),
@@ -206,7 +206,7 @@ def test_one_boulder_is_scaled_with_its_proportions() -> None:
         ({"margin": "-1"}, "less than 100 %"),
         ({"tolerance": "0 mm"}, "must be positive"),
         ({"tolerance": "1 deg"}, "a length is needed"),
-        ({"most": "mass"}, "ask for the least"),
+        ({"most": "mass"}, "use --least mass"),
     ],
 )
 def test_questions_that_make_no_sense_are_refused(question: dict, message: str) -> None:
