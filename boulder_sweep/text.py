@@ -1,6 +1,9 @@
-"""Numbers and problems as short text for messages."""
+"""Numbers and problems as short text, and text of users' files made harmless where it is shown."""
 
 from __future__ import annotations
+
+import json
+from typing import Any
 
 _LONGEST_LINE = 200
 
@@ -32,6 +35,12 @@ def printable(text: str) -> str:
 def _escaped(character: str) -> str:
     """Return a character as an escape sequence in ASCII."""
     return character.encode("unicode_escape").decode("ascii")
+
+
+def script_data(data: Any) -> str:
+    """Write plain data as JSON that stays data inside a script element of an HTML page, whatever its texts hold."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def one_line(problem: BaseException) -> str:

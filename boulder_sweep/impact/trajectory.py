@@ -14,6 +14,7 @@ from boulder_sweep.drawing import draw
 from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
 from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY
 from boulder_sweep.judge.judged import Judged
+from boulder_sweep.text import printable
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -146,7 +147,7 @@ class Trajectory:
     def __repr__(self) -> str:
         """Say what it is in a line."""
         words = " / ".join(word for word in (self.verdict, self.reason) if word)
-        return f"<Trajectory {self.name} design {self.design_id}: {len(self)} samples, {words}>"
+        return f"<Trajectory {printable(self.name)} design {self.design_id}: {len(self)} samples, {words}>"
 
     @property
     def verdict(self) -> str:

@@ -13,6 +13,7 @@ from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, shown_column
 from boulder_sweep.store.finished import FinishedRows
+from boulder_sweep.text import printable
 from boulder_sweep.views.wording import NOT_A_TEST
 
 if TYPE_CHECKING:
@@ -106,16 +107,20 @@ def _csv(target: Path, finished: FinishedRows, units: str) -> int:
         writer = csv.writer(file)
         for columns, table in _tables(finished, units):
             if rows == 0:
-                writer.writerow(column.name for column in columns)
-            writer.writerows(zip(*map(_harmless, table.columns), strict=True))
+                writer.writerow(_cells(column.name for column in columns))
+            writer.writerows(zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True))
             rows += len(table)
     return rows
 
 
-def _harmless(column: pa.ChunkedArray) -> list[Any]:
-    """Return the values of a column, with text quoted that a spreadsheet would take for a formula."""
-    values = column.to_pylist()
-    return [f"'{value}" if isinstance(value, str) and value.startswith(FORMULA_SIGNS) else value for value in values]
+def _cells(values: Iterable[Any]) -> list[Any]:
+    """Return values fit for a spreadsheet: text that it would take for a formula is quoted, control characters escaped."""
+    return [_cell(value) if isinstance(value, str) else value for value in values]
+
+
+def _cell(text: str) -> str:
+    shown = printable(text)
+    return f"'{shown}" if text.startswith(FORMULA_SIGNS) else shown
 
 
 def _parquet(target: Path, finished: FinishedRows, units: str) -> int:
@@ -148,13 +153,13 @@ def _sheet(target: Path, finished: FinishedRows, units: str) -> int:
         designs.freeze_panes = "B2"
         for columns, table in _tables(finished, units):
             if rows == 0:
-                designs.append([column.name for column in columns])
-            for values in zip(*map(_harmless, table.columns), strict=True):
+                designs.append(_cells(column.name for column in columns))
+            for values in zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True):
                 designs.append(values)
             rows += len(table)
         sheet = book.create_sheet("about")
         for line in about(finished, columns):
-            sheet.append(line)
+            sheet.append(_cells(line))
     return rows
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from bokeh.resources import INLINE
 from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, verdict_map
+from boulder_sweep.text import script_data
 
 if TYPE_CHECKING:
     from boulder_sweep.report.answers import Sentence
@@ -124,7 +124,7 @@ def assembled(
         settings=settings,
         lines=setting_lines(settings),
         readings=reading_words(settings),
-        data=_for_script(data),
+        data=script_data(data),
         style=(ASSETS / "page.css").read_text(),
         script=script,
         library=library,
@@ -143,9 +143,3 @@ def _policy(*scripts: str) -> str:
 
 def _sha256(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def _for_script(data: Any) -> str:
-    """Return JSON that is safe anywhere in a page."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

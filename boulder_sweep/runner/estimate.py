@@ -20,6 +20,7 @@ from boulder_sweep.text import size_text
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.settings import Sweep
 
 LARGEST_BLOCK = 32_768
 """Rows; larger blocks gain nothing and use more memory."""
@@ -38,7 +39,11 @@ _SHARE = 0.05
 """Share of a table that is sampled, up to the pieces above: the run computes these rows again."""
 _BYTES_IN_PROGRESS = 400
 """Memory per row between being handed out and being written: inputs, outcomes and encoding."""
-_LEAST_BYTES_PER_ROW = 1
+_LEAST_BYTES, _LEAST_BYTES_OF_CONTACT = 1, 24
+"""What a row takes at least, and what it takes besides where the truck meets the boulder: then it holds outcomes, which
+hardly compress. Tables of such rows take 37 bytes a row and more."""
+_MOST_LOOKED_AT = 1000
+"""Rows all over the table whose contact is looked at before anything is compiled."""
 _GOLDEN = 0.618033988749895
 
 
@@ -236,20 +241,39 @@ def rows_per_task(estimate: Estimate, rows_per_part: int) -> int:
     return max(1, min(rows_per_part, by_time, by_share))
 
 
-def refuse_hopeless(rows: int, rows_to_compute: int, out: Place) -> None:
-    """Refuse, without computing anything, a table that cannot fit on the disk at a byte per row.
+def refuse_hopeless(sweep: Sweep, rows_to_compute: int, out: Place) -> None:
+    """Refuse, without compiling or computing anything, a table that cannot fit on the disk.
 
     Raises
     ------
     DoesNotFitError
         Says how much is needed at least, and how much is free.
     """
-    least, free = rows_to_compute * _LEAST_BYTES_PER_ROW, _disk_free(out)
-    if free is not None and least > free:
+    rows, free = sweep.n_designs, _disk_free(out)
+    if free is None:
+        return
+    least = rows_to_compute * _LEAST_BYTES
+    if least <= free < rows_to_compute * (_LEAST_BYTES + _LEAST_BYTES_OF_CONTACT):
+        least += int(rows_to_compute * _share_in_contact(sweep) * _LEAST_BYTES_OF_CONTACT)
+    if least > free:
         raise DoesNotFitError(
             f"the table of {rows:,} rows needs at least {size_text(least)} of disk, and {size_text(free)} are free. "
             f"Use --force to run anyway"
         )
+
+
+def _share_in_contact(sweep: Sweep) -> float:
+    """Share of some rows all over a table in which the truck meets the boulder."""
+    count = min(sweep.n_designs, _MOST_LOOKED_AT)
+    met = 0
+    for place in range(count):
+        row = place * sweep.n_designs // count
+        columns = sweep.block(row, row + 1).columns
+        height, depth, bumper = (
+            columns[name].to_numpy()[0] for name in ("boulder_height_m", "embedment_depth_m", "bumper_height_m")
+        )
+        met += bool(height - depth > bumper)
+    return met / count
 
 
 def rows_in_progress(block: int, jobs: int, rows_per_part: int) -> int:

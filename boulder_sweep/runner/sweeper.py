@@ -122,7 +122,7 @@ def run(
 
         try:
             if not force:
-                refuse_hopeless(sweep.n_designs, sweep.n_designs - claimed.rows_done, out)
+                refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
             accuracy = signals.call(lambda: accuracy_of(sweep))
             evaluation = evaluation_of(sweep, accuracy, simulate)
             manifest = Manifest(

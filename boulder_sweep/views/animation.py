@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.errors import PictureError
+from boulder_sweep.text import script_data
 from boulder_sweep.views import figures
 from boulder_sweep.views.scene import SideView, samples_shown
 from boulder_sweep.views.shapes import STYLES, Shape
@@ -168,9 +168,7 @@ def page(trajectory: Trajectory) -> str:
         "frames_per_s": FRAMES_PER_S,
     }
     template = (files("boulder_sweep.views") / "player.html").read_text(encoding="utf-8")
-    # "</" may not occur inside a script element, whatever the name of the sweep.
-    data = json.dumps(content, separators=(",", ":"), ensure_ascii=False).replace("</", "<\\/")
-    return template.replace("/*DATA*/null", data)
+    return template.replace("/*DATA*/null", script_data(content))
 
 
 def _plain(shape: Shape) -> dict[str, Any]:

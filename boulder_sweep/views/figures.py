@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import PictureError
+from boulder_sweep.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,11 +117,24 @@ def figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
 
 def save(fig: Figure, target: Path) -> None:
     """Write a figure; the same figure gives the same file."""
+    _keep_text_plain(fig)
     undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     try:
         fig.savefig(target, metadata=undated[target.suffix.lower()])
     except OSError as problem:
         raise PictureError(f"{target} cannot be written: {problem.strerror or problem}") from problem
+
+
+def _keep_text_plain(fig: Figure) -> None:
+    """Draw texts as they are: no formulas but at ticks, and nothing that a picture file cannot hold."""
+    from matplotlib.text import Text
+
+    both = (axis for axes in fig.axes for axis in (axes.xaxis, axes.yaxis))
+    ticks = {label for axis in both for label in axis.get_ticklabels(which="both")}
+    for text in fig.findobj(Text):
+        if text not in ticks:
+            text.set_parse_math(False)
+            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
 
 
 def limit_y(axes: Axes, low: float, high: float) -> None:

@@ -98,6 +98,17 @@ def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
     assert {cell.data_type for row in sheet.iter_rows() for cell in row} <= {"s", "inlineStr", "n"}
 
 
+@pytest.mark.parametrize("sign", [*module.FORMULA_SIGNS, "\x00", "\x1b[31m"])
+def test_a_text_about_the_table_is_no_formula_either(result, tmp_path, monkeypatch, sign):
+    """Settings, versions and names come from a file that anybody may have made."""
+    monkeypatch.setattr(module, "about", lambda finished, columns: iter([(f"{sign}cmd", "x", f"{sign}cmd")]))
+    export(result, tmp_path / "out.xlsx")
+    (cells,) = openpyxl.load_workbook(tmp_path / "out.xlsx")["about"].iter_rows()
+    assert [cell.data_type for cell in cells] == ["s", "s", "s"]
+    assert cells[0].value.isprintable()
+    assert not cells[0].value.startswith(module.FORMULA_SIGNS)
+
+
 def test_what_cannot_be_written_is_refused(result, tmp_path, monkeypatch):
     with pytest.raises(ReportError, match=r"must end in \.xlsx, \.csv or \.parquet"):
         export(result, tmp_path / "designs.ods")

@@ -6,6 +6,7 @@ import importlib.util
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib
 import numpy as np
@@ -19,6 +20,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import PictureError
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
+from boulder_sweep.views import figures
 from boulder_sweep.views.energy import LAYERS
 from boulder_sweep.views.figures import checked_kind
 from boulder_sweep.views.trajectory import AFTER_PEAK, unreliable_from
@@ -183,3 +185,30 @@ def test_colours_differ_in_brightness_too() -> None:
     assert min(abs(one - other) for one, other in itertools.pairwise(layers)) > 30
     verdicts = [brightness(colour) for _, colour, _ in CLASSES]
     assert min(abs(one - other) for one, other in itertools.combinations(verdicts, 2)) > 10
+
+
+HOSTILE = "</text><script>alert(1)</script> $\\frac$ --> \x1b[31m \u202e & 'x'"
+
+
+@pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
+def test_a_name_in_a_picture_is_only_text(tmp_path: Path, kind: str) -> None:
+    sweep = crash_test("rwg")
+    object.__setattr__(sweep, "name", HOSTILE)
+    trajectory = simulate(sweep, horizon_s=0.02)
+    trajectory.plot(tmp_path / f"picture.{kind}")
+    if kind == "svg":
+        drawn = ElementTree.parse(tmp_path / "picture.svg")
+        assert {element.tag.rpartition("}")[2] for element in drawn.iter()}.isdisjoint({"script", "a", "foreignObject"})
+        drawn_text = (tmp_path / "picture.svg").read_text()
+        assert "$\\frac$" in drawn_text
+        assert "\\x1b[31m \\u202e" in drawn_text
+    assert "\\x1b[31m" in repr(trajectory)
+
+
+def test_logarithmic_ticks_keep_their_powers(tmp_path: Path) -> None:
+    with figures.figure(tmp_path / "powers.svg", 3.0, 2.0) as fig:
+        axes = fig.subplots()
+        axes.loglog([1.0, 1e6], [1.0, 1e6])
+        axes.set_title("$a$")
+    assert all(label.get_parse_math() for label in [*axes.get_xticklabels(), *axes.get_yticklabels(minor=True)])
+    assert not axes.title.get_parse_math()
