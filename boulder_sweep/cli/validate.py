@@ -12,6 +12,8 @@ from boulder_sweep.cli.options import json_option
 from boulder_sweep.cli.output import show
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from boulder_sweep.impact.trajectory import Trajectory
 
 EXAMPLES = """\b
@@ -42,11 +44,13 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     from boulder_sweep.crash_tests.validation import NOT_COMPARED
     from boulder_sweep.crash_tests.validation import validate as run_validation
 
+    overlaid = None if measured is None or case is None else _overlay(measured, case)
     found = run_validation(out)
     content: dict[str, Any] = found.to_dict()
     text = [found.text(), "", f"note: {NOT_COMPARED}"]
-    if measured is not None and case is not None:
-        overlay, written = _overlay(measured, case, out)
+    if overlaid is not None:
+        overlay, draw = overlaid
+        written = [] if out is None else [draw(Path(out))]
         content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
         content["files"] += written
         from boulder_sweep.crash_tests.comparison import deviation_table
@@ -58,8 +62,8 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     return 0 if found.holds else 1
 
 
-def _overlay(measured: str, case: str, out: str | None) -> tuple[dict[str, Any], list[str]]:
-    """Compare a user's data with both presets, and draw them where there is a folder."""
+def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path], str]]:
+    """Compare a user's data with both presets; return a function that draws them into a folder, too."""
     from boulder_sweep.crash_tests.cases import NAMES, crash_test
     from boulder_sweep.crash_tests.comparison import compare
     from boulder_sweep.crash_tests.measured import TEST_SIGNALS, read_history
@@ -75,11 +79,12 @@ def _overlay(measured: str, case: str, out: str | None) -> tuple[dict[str, Any],
     horizon = max(end, 0.0) or None
     trajectories: dict[str, Trajectory] = {p: simulate(sweep, readings=p, horizon_s=horizon) for p in PRESETS}
     found = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
-    written = []
-    if out is not None:
+
+    def draw(folder: Path) -> str:
         from boulder_sweep.views.validation import draw_overlay
 
-        target = Path(out) / f"measured_{Path(measured).stem}.png"
+        target = folder / f"measured_{Path(measured).stem}.png"
         draw_overlay(sweep.name, trajectories, history, target)
-        written.append(str(target))
-    return found, written
+        return str(target)
+
+    return found, draw

@@ -46,7 +46,8 @@ def test_published_spreads_have_sources(sweep):
     assert out.count("as quoted by others") == 4
 
 
-def test_doubts(sweep):
+def test_doubts(sweep, monkeypatch):
+    monkeypatch.setattr("boulder_sweep.answers.doubts.DRAWN", 32)
     code, out, _ = sweep("uncertainty", CONFIG, "--doubts", "-q")
     assert code == 0
     assert "readings of the paper" in out
