@@ -35,7 +35,9 @@ def test_every_reading_once() -> None:
     assert len(readings) == 32
 
 
-def test_readings_outweigh_the_numerical_error() -> None:
+@pytest.mark.parametrize("drawn", [128, pytest.param(512, marks=pytest.mark.slow)])
+def test_readings_outweigh_the_numerical_error(drawn: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("boulder_sweep.answers.doubts.DRAWN", drawn)
     parts = {own.cause: own for own in doubts(site(**UNCERTAIN))}
     assert list(parts) == [INPUTS, READINGS, LAW, NUMERICAL]
     assert parts[READINGS].alone > 0.3

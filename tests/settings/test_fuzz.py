@@ -95,7 +95,7 @@ def mutated(draw: st.DrawFn) -> str:
     return text
 
 
-QUICK = settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+QUICK = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 LONG = settings(QUICK, max_examples=40_000)
 
 

@@ -22,7 +22,7 @@ GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
 
 @pytest.fixture(scope="module")
 def found() -> Tradeoff:
-    return measure(grid(), designs=60)
+    return measure(grid(), designs=30)
 
 
 def test_every_representation_step_and_reading_is_there(found: Tradeoff) -> None:
