@@ -114,7 +114,7 @@ def _csv(target: Path, finished: FinishedRows, units: str) -> int:
 
 
 def _cells(values: Iterable[Any]) -> list[Any]:
-    """Return values fit for a spreadsheet: text that it would take for a formula is quoted, control characters escaped."""
+    """Return values fit for a spreadsheet: text like a formula is quoted, control characters are escaped."""
     return [_cell(value) if isinstance(value, str) else value for value in values]
 
 
