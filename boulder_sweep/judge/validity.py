@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Status
+from boulder_sweep.judge.uplift import blow_lift
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.notes import FAMILY_FACTOR, off_families
 
@@ -23,6 +24,9 @@ TESTED_OVERLAP_M = 0.49
 """Overlap of bumper and boulder in the tests: 0.492 m and 0.91 m."""
 TESTED_ROTATION_DEG = {"corrected": 13.8, "as_printed": 7.7}
 """Rotation of the boulder that passed its test, by the model itself [deg]; the measured one is not in the text."""
+TESTED_LIFT = 2.07
+"""Lift of the blow (`boulder_sweep.judge.uplift.blow_lift`) on the boulder that held: 1.96 with corrected readings,
+2.06 as printed. On the one that was thrown out of the ground: 6.4 and 5.8."""
 SEPARATOR = ";"
 NOT_A_RATING = "a simulation, not a rating by test"
 """Stands beside every pass and every rating."""
@@ -135,6 +139,14 @@ FLAGS = (
         f"top of the boulder less than {TESTED_OVERLAP_M:g} m over the underside of the bumper",
         "The tests had 0.49 m and 0.91 m. With less the truck may ride over, which the planar model cannot show.",
         lambda facts: facts.overlap < TESTED_OVERLAP_M,
+    ),
+    Flag(
+        "uplift",
+        "a blow that lifts the boulder more than in the test that passed",
+        f"force that lifts the centre over weight and side friction above {TESTED_LIFT:g}",
+        "The planar model keeps the boulder on the ground. The boulder that passed its test has 1.96; the other one, "
+        "with 6.4, was thrown out of the ground. See [uplift](uplift.md).",
+        lambda facts: blow_lift(facts.outcomes.F_v_max, facts.designs.table) > TESTED_LIFT,
     ),
     Flag(
         "unproved",

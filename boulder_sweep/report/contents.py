@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import SIMULATED, Control, Readings, Status
+from boulder_kernels.design import G
 from boulder_sweep.columns import INPUTS, OUTCOMES
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls
+from boulder_sweep.judge.uplift import WALL_FRICTION
 from boulder_sweep.judge.validity import (
     FLAGS,
+    TESTED_LIFT,
     TESTED_OVERLAP_M,
     TESTED_ROTATION_DEG,
     TESTED_WIDTH_OVER_DEPTH,
@@ -176,6 +179,9 @@ def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
         "crush": model["calibrated_crush_m"],
         "width": TESTED_WIDTH_OVER_DEPTH,
         "overlap": TESTED_OVERLAP_M,
+        "lift": TESTED_LIFT,
+        "wall_friction": WALL_FRICTION,
+        "gravity": G,
         "usual": {name: usual_range(name) for name in (*SIZES, "embedment_ratio")},
         "soil": {
             "angle": ANGLES.tolist(),

@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import answers, energy
+from docs.studies import answers, energy, uplift
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -147,6 +147,14 @@ def _validity_shares(root: Path) -> str:
     return flags_of_grids(root / GRID).markdown()
 
 
+def _uplift_tests(_: Path) -> str:
+    return uplift.tests_table().markdown()
+
+
+def _uplift_grid(root: Path) -> str:
+    return uplift.grid_words(root / GRID).replace(f"{root}/", "")
+
+
 CONTENTS: dict[str, Callable[[Path], str]] = {
     "validation-table": _validation_table,
     "statements": _statements,
@@ -167,6 +175,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "box-shares": _box_shares,
     "validity-flags": _validity_flags,
     "validity-shares": _validity_shares,
+    "uplift-tests": _uplift_tests,
+    "uplift-grid": _uplift_grid,
     "settings-entries": _settings_entries,
     "settings-choices": _settings_choices,
     "result-columns": _result_columns,

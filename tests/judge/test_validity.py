@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boulder_kernels import Status
+from boulder_kernels import DesignTable, Status
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge import validity
 from boulder_sweep.judge.judged import Judged, joined
+from boulder_sweep.judge.uplift import blow_lift
 from boulder_sweep.judge.validity import FLAGS, TESTED_ROTATION_DEG, flag_counts, meanings
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.settings.model import PRESETS
@@ -31,7 +32,9 @@ def flags_of(row: Judged) -> str:
 
 def judged(status: Status = Status.SETTLED, changes: dict[str, float] | None = None, **outcomes: float) -> Judged:
     """One row inside what the model was tested on unless told otherwise."""
-    return judge(outcome(status, **outcomes), plain_designs(**INSIDE | (changes or {})), LIMITS, 0.004)
+    return judge(
+        outcome(status, **{"F_v_max": 1e3} | outcomes), plain_designs(**INSIDE | (changes or {})), LIMITS, 0.004
+    )
 
 
 def test_inside_there_are_none() -> None:
@@ -53,6 +56,7 @@ def test_inside_there_are_none() -> None:
         ("soil_pair", {"phi": math.radians(28.0), "beta": 110.0}, {}),
         ("soil_pair", {"beta": 5.0}, {}),
         ("overlap", {"H": 2.4}, {}),
+        ("uplift", {}, {"F_v_max": 5.2e5}),
     ],
 )
 def test_each_flag_is_raised_alone(flag: str, changes: dict[str, float], outcomes: dict[str, float]) -> None:
@@ -99,6 +103,20 @@ def test_the_crash_tests_are_inside() -> None:
     assert validity.TESTED_WIDTH_OVER_DEPTH - 0.01 < wide <= validity.TESTED_WIDTH_OVER_DEPTH
     overlap = min(c["boulder_height_m"] - c["embedment_depth_m"] - c["bumper_height_m"] for c in (rwg, abg))
     assert validity.TESTED_OVERLAP_M <= overlap < validity.TESTED_OVERLAP_M + 0.01
+
+
+def test_the_blow_lifts_the_boulder_that_was_thrown_out_and_not_the_one_that_held() -> None:
+    """Peak forces of the tests as simulated; the larger of the boulder that held is just inside."""
+    lifts = {}
+    for name in ("rwg", "abg"):
+        for preset in PRESETS:
+            motion = simulate(crash_test(name), readings=preset).motion
+            table = DesignTable(*(np.array([value]) for value in motion.design))
+            lifts[name, preset] = float(blow_lift(np.array([motion.outcome.maxima.F_v]), table)[0])
+    assert lifts["rwg", "corrected"] == pytest.approx(1.963, abs=2e-3)
+    assert validity.TESTED_LIFT - 0.01 < lifts["rwg", "as_printed"] <= validity.TESTED_LIFT
+    assert lifts["abg", "corrected"] == pytest.approx(6.43, abs=0.01)
+    assert lifts["abg", "as_printed"] == pytest.approx(5.84, abs=0.01)
 
 
 def test_the_page_names_every_flag() -> None:
