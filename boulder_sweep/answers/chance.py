@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import joblib
 import numpy as np
 from scipy.special import betaincinv, ndtri, stdtrit
 from scipy.stats import qmc
@@ -22,6 +23,8 @@ FEWEST = 2 * SCRAMBLINGS
 """With fewer points than this on either side, the binomial interval is used."""
 SMALLEST = 1e-12
 """Distance kept from the faces of the unit cube."""
+MANY = 4096
+"""New points of each scrambling from which on several threads generate them."""
 
 Event = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Maps row numbers, shape (m,), and standard normals, shape (m, d), to whether the event occurs, bool, shape (m,)."""
@@ -47,10 +50,15 @@ class Points:
         """Return the first points of every scrambling, shape (SCRAMBLINGS, count, dimensions)."""
         more = count - self._points.shape[1]
         if more > 0:
-            new = np.stack([engine.random(more) for engine in self._engines])
-            normal = ndtri(np.clip(new, SMALLEST, 1.0 - SMALLEST))
-            self._points = np.concatenate([self._points, normal], axis=1)
+            parallel = joblib.Parallel(n_jobs=-1 if more >= MANY else 1, backend="threading")
+            new = parallel(joblib.delayed(_normal)(engine, more) for engine in self._engines)
+            self._points = np.concatenate([self._points, np.stack(new)], axis=1)
         return self._points[:, :count]
+
+
+def _normal(engine: qmc.Sobol, count: int) -> np.ndarray:
+    """Return the next points of one scrambling, shape (count, dimensions)."""
+    return ndtri(np.clip(engine.random(count), SMALLEST, 1.0 - SMALLEST))
 
 
 @dataclass(frozen=True, eq=False)

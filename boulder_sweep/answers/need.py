@@ -213,6 +213,10 @@ def need(
     return Need(sweep, key, least_margin, table, simulated)
 
 
+frontier = need
+"""The same by its other name."""
+
+
 def _question(
     sweep: Sweep,
     key: Key,

@@ -146,7 +146,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES) -
         (("φ′", "deg"), "withstands_friction_angle_deg", "friction_angle_deg", 2),
     ):
         columns.append((head, _withstood(column, own, decimals)))
-    columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or "-"))
+    columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
     lines = table_lines(columns, rows, width)
     if count > most:
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")

@@ -10,14 +10,18 @@ import numpy as np
 from boulder_sweep.answers.chance import SCRAMBLINGS, Chance, Points, chance
 from boulder_sweep.answers.draws import Draws, threads
 from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.search import BEYOND, CELLS, FAILS, HOLDS, NOT_MONOTONE, Search, search
+from boulder_sweep.answers.search import BEYOND, CELLS, FAILS, FAR, HOLDS, NOT_MONOTONE, Search, search
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
+from boulder_sweep.judge.judged import with_rows
 
 DRAWN = 4096
 """Samples at each value if a probability is asked for."""
 HALF_WIDTH = 0.005
 """Largest half-width of the interval of the probability reported at the answer."""
+FAST_OVERTURN_S = 0.3
+"""No passing value is searched between two at which the design reaches the limit before this time. Where one exists, one of
+its neighbours reaches the limit after 0.5 s or later (tests/answers/test_scan.py)."""
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -95,19 +99,18 @@ class Question:
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
         rows = self.open.rows(start, stop)
-        low, high = range_of(self.sweep, self.key, rows, self.between)
-        first, last = self.key.ends(low, high)
-        if self.key.most:
-            first, last = last, first
+        first, last = self.lattice(rows)
         trial = self.trial(rows)
         found = search(trial.quick, first, last, self.cells)
-        # Rows that are not monotone have several brackets, all of which must be certified.
-        wrong = np.flatnonzero(~trial.certified(found) | (found.kind == NOT_MONOTONE))
+        every = np.arange(stop - start)
+        block, judged = trial.judged(every, found.shown)
+        wrong = trial.contradicted(found, block, judged)
         if len(wrong):
             ends = first[wrong], last[wrong]
             part = search(lambda index, places: trial.own(wrong[index], places), *ends, self.cells)
             found = replaced(found, wrong, part)
-        block, judged = trial.judged(np.arange(stop - start), found.shown)
+            judged = with_rows(judged, wrong, trial.judged(wrong, part.shown)[1])
+            block = trial.block(every, found.shown)
         return Answers(
             replace(block, labels=self.open.labels(start, stop)),
             judged,
@@ -118,6 +121,12 @@ class Question:
             trial.simulated,
             trial.chances(found.shown),
         )
+
+    def lattice(self, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first and the last place that are searched in some rows."""
+        low, high = range_of(self.sweep, self.key, rows, self.between)
+        first, last = self.key.ends(low, high)
+        return (last, first) if self.key.most else (first, last)
 
     def trial(self, rows: Rows) -> Trial:
         """Return the object that tries values in some rows."""
@@ -184,26 +193,42 @@ class Trial:
         return self._codes(index, places, quick=False)
 
     def judged(self, index: np.ndarray, places: np.ndarray, *, quick: bool = False) -> tuple[DesignBlock, Judged]:
-        """Return the designs with these values and their verdicts."""
-        block = taken(self.rows, index, **{self.key.name: self.key.values(places)})
+        """Return the designs with these values, and their verdicts."""
+        block = self.block(index, places)
         self.simulated += len(index)
         return block, (self.judges.quick if quick else self.judges.own)(block)
 
-    def certified(self, found: Search) -> np.ndarray:
-        """Return whether the accuracy of the sweep confirms both ends of the brackets, bool, shape (n,)."""
-        agrees = np.ones(len(found.kind), dtype=bool)
-        for has, places, holds in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
-            rows = np.flatnonzero(has)
-            agrees[rows] &= (self.own(rows, places[rows]) == HOLDS) == holds
-        return agrees
+    def block(self, index: np.ndarray, places: np.ndarray) -> DesignBlock:
+        """Return the designs with these values."""
+        return taken(self.rows, index, **{self.key.name: self.key.values(places)})
+
+    def contradicted(self, found: Search, block: DesignBlock, judged: Judged) -> np.ndarray:
+        """Return the rows that the accuracy of the sweep does not confirm, shape (m,).
+
+        Parameters
+        ----------
+        found
+            What the quick search found.
+        block, judged
+            The designs at the places shown and their verdicts with the accuracy of the sweep.
+        """
+        wrong = (self.codes(block, judged) == HOLDS) != found.has_holds
+        bracketed = np.flatnonzero(found.has_holds & found.has_fails)
+        wrong[bracketed] |= self.own(bracketed, found.fails[bracketed]) == HOLDS
+        # Rows that are not monotone have several brackets, all of which must be certified.
+        return np.flatnonzero(wrong | (found.kind == NOT_MONOTONE))
 
     def chances(self, places: np.ndarray) -> Chance | None:
         """Return the probabilities of passing at some values, one for each row; None if none is asked for."""
         return None
 
     def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
-        block, judged = self.judged(index, places, quick=quick)
+        return self.codes(*self.judged(index, places, quick=quick))
+
+    def codes(self, block: DesignBlock, judged: Judged) -> np.ndarray:
+        """Return what a search asks of judged designs."""
         codes = np.where(self.judges.holds(judged), HOLDS, FAILS)
+        codes[judged["time_to_limit_s"] < FAST_OVERTURN_S] = FAR
         return np.where(beyond_reach(block, judged), BEYOND, codes)
 
 
@@ -217,6 +242,10 @@ class ProbabilityTrial(Trial):
         super().__init__(asked.key, asked.judges, rows)
         self.asked = asked
         self.draws = Draws(rows, asked.spread, asked.judges, threads(1), asked.variants)
+
+    def contradicted(self, found: Search, block: DesignBlock, judged: Judged) -> np.ndarray:
+        """Return no rows: the designs drawn near a limit are judged with the accuracy of the sweep anyway."""
+        return np.empty(0, dtype=np.int64)
 
     def chances(self, places: np.ndarray) -> Chance:
         """Return the probabilities of passing at some values, from the points of the search and more where needed."""

@@ -5,7 +5,7 @@ An input is made worse until the design fails or, if the design fails as it is, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,8 +31,12 @@ MPH = 0.44704
 CLASSES = {"M30": 30 * MPH, "M40": 40 * MPH, "M50": 50 * MPH}
 """Nominal speeds [m/s] of the ASTM F2656 classes for a medium-duty truck."""
 CLASS_MASS_KG = 6800.0
+KM_H = 1.0 / 3.6
+ISO_SPEEDS = {"48 km/h": 48 * KM_H, "64 km/h": 64 * KM_H, "80 km/h": 80 * KM_H}
+"""Speeds [m/s] of tests to IWA 14-1, which ISO 22343-1 supersedes, with a truck of 7200 kg (docs/bibliography.md)."""
+ISO_MASS_KG = 7200.0
 CLASS_TOLERANCE = 0.02
-"""The classes apply to a truck of 6800 kg; no class is named if the mass differs by more than this share."""
+"""A class applies to a truck of one mass; none is named if the mass differs by more than this share."""
 
 Told = Callable[[int, int], None]
 """Told how many rows of how many are done."""
@@ -195,13 +199,23 @@ def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
     return agrees
 
 
-def classes(speed: np.ndarray, mass: np.ndarray) -> list[str | None]:
-    """Return the highest class whose nominal speed is withstood; none for other truck masses."""
-    named = np.abs(mass / CLASS_MASS_KG - 1.0) <= CLASS_TOLERANCE
-    bounds = np.array(list(CLASSES.values()))
+def classes(
+    speed: np.ndarray, mass: np.ndarray, speeds: Mapping[str, float] = CLASSES, of_kg: float = CLASS_MASS_KG
+) -> list[str | None]:
+    """Return the highest class whose nominal speed is withstood; none for other truck masses.
+
+    Parameters
+    ----------
+    speed, mass
+        Withstood speed [m/s] and truck mass [kg] of n designs, shape (n,).
+    speeds, of_kg
+        Nominal speeds by class in ascending order, and the truck mass they apply to.
+    """
+    named = np.abs(mass / of_kg - 1.0) <= CLASS_TOLERANCE
+    bounds = np.array(list(speeds.values()))
     # 30 mph is 13.41 m/s on the lattice of withstood speeds.
     place = np.searchsorted(bounds - 0.005, np.nan_to_num(speed), side="right")
-    words = ("", *CLASSES)
+    words = ("", *speeds)
     return [words[at] or None if known else None for at, known in zip(place, named, strict=True)]
 
 
@@ -221,9 +235,11 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
         values[own.column] = withstood(key, judges, rows, passes, own.best, own.worst)
         meaning = f"{own.meaning} at which the design passes, all else unchanged; simulated"
         columns.append((own.column, key.field.unit, meaning, values[own.column]))
-    speed_class = classes(values["withstands_speed_m_s"], rows["vehicle_mass_kg"])
+    speed, mass = values["withstands_speed_m_s"], rows["vehicle_mass_kg"]
     meaning = "class of ASTM F2656 whose nominal speed is withstood; simulated, which rates no barrier"
-    columns.append(("simulated_class", "", meaning, speed_class))
+    columns.append(("simulated_class", "", meaning, classes(speed, mass)))
+    meaning = "speed of tests to ISO 22343-1 (IWA 14-1) of 7200 kg that is withstood; simulated, which rates no barrier"
+    columns.append(("simulated_iso_speed", "", meaning, classes(speed, mass, ISO_SPEEDS, ISO_MASS_KG)))
     return with_columns(
         part_table(replace(block, start=start, stop=stop, labels=sweep.block(start, stop).labels), judged, {}), columns
     )

@@ -7,21 +7,24 @@ designs to simulate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-FAILS, HOLDS, BEYOND = range(3)
-"""Values of the predicate: it fails, it holds, or there is nothing to try at this place."""
+FAILS, HOLDS, BEYOND, FAR = range(4)
+"""Values of the predicate: it fails, it holds, there is nothing to try at this place, or it is far from holding."""
 FOUND, ALWAYS, NEVER, NOT_MONOTONE, BLOCKED = range(5)
 """Kinds of result, codes of `WORDS`."""
 WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap")
 CELLS = 16
 """Number of cells into which the scan divides a range."""
+STRIDE = 4
+"""Number of cells that the scan takes as one at first. Nothing is tried between two places that are far from holding."""
 
 Predicate = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Maps rows and places, shape (m,), to `FAILS`, `HOLDS` or `BEYOND`, shape (m,)."""
+"""Maps rows and places, shape (m,), to `FAILS`, `HOLDS`, `BEYOND` or `FAR`, shape (m,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +65,8 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     first, last : ndarray of int64, shape (n,)
         Ends of the range of every row, in search order; `last` may be less than `first`.
     cells
-        Pieces that a range is cut into. An interval shorter than a cell may be missed.
+        Pieces that a range is cut into. An interval shorter than a cell may be missed, and so may one between two
+        places that are far from holding and at most `STRIDE` cells apart.
 
     Returns
     -------
@@ -73,7 +77,7 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     share = np.arange(cells + 1) / cells
     places = first[:, None] + np.rint((last - first)[:, None] * share).astype(np.int64)
     rows = np.arange(n)
-    codes = predicate(np.repeat(rows, cells + 1), places.ravel()).reshape(n, cells + 1)
+    codes = _scanned(predicate, places)
     _try_last_before_beyond(predicate, places, codes)
 
     holds, beyond = codes == HOLDS, codes == BEYOND
@@ -108,6 +112,26 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     return Search(kind, fails, held, has_fails, ~none, shown, changes)
 
 
+def _scanned(predicate: Predicate, places: np.ndarray) -> np.ndarray:
+    """Return `FAILS`, `HOLDS` or `BEYOND` for some places of n rows, shape (n, cells + 1)."""
+    n, cells = places.shape[0], places.shape[1] - 1
+    stride = math.gcd(cells, STRIDE)
+    codes = np.full(places.shape, FAR, dtype=np.int64)
+    first = np.arange(0, cells + 1, stride)
+    codes[:, first] = predicate(np.repeat(np.arange(n), len(first)), places[:, first].ravel()).reshape(n, len(first))
+    while stride > 1:
+        rows, pieces = np.nonzero((codes[:, :-1:stride] != FAR) | (codes[:, stride::stride] != FAR))
+        between = pieces * stride + stride // 2
+        codes[rows, between] = predicate(rows, places[rows, between])
+        stride //= 2
+    return _plain(codes)
+
+
+def _plain(codes: np.ndarray) -> np.ndarray:
+    """Return codes with `FAR` as `FAILS`."""
+    return np.where(codes == FAR, FAILS, codes)
+
+
 def _try_last_before_beyond(predicate: Predicate, places: np.ndarray, codes: np.ndarray) -> None:
     """Locate the last place that can be tried in rows that end where nothing can, and in which nothing holds so far.
 
@@ -123,7 +147,7 @@ def _try_last_before_beyond(predicate: Predicate, places: np.ndarray, codes: np.
     low_code = codes[rows, at].copy()
     while (open_ := np.abs(high - low) > 1).any():
         middle = low + (high - low) // 2
-        found = predicate(rows[open_], middle[open_])
+        found = _plain(predicate(rows[open_], middle[open_]))
         reached = np.zeros(len(rows), dtype=bool)
         reached[open_] = found != BEYOND
         low_code[reached] = found[found != BEYOND]

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 OUT_OF_REACH = ("no_contact", "override")
 """Reasons for which there is nothing to search at a value: the truck goes over the boulder."""
 PLACEHOLDER = 0.5
+SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s")
+"""Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
 
 Rows = dict[str, np.ndarray]
 """Inputs of n designs by column name (or ``embedment_ratio``), each of shape (n,), as given by a file."""
@@ -101,6 +103,7 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
     accuracy = accuracy_of(sweep)
     own = evaluation_of(sweep, accuracy)
     quick = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False))
+    quick = dataclasses.replace(quick, only=SEARCHED)
     if not accuracy.error_estimate and accuracy.steps.step_s >= quick.control.h:
         quick = own
     return Judges(quick, own, accuracy, least_margin)

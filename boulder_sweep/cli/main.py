@@ -74,6 +74,7 @@ def cli() -> None:
 
 for command in COMMANDS:
     cli.add_command(command)
+cli.add_command(need, "frontier")  # the same by its other name, which `sweep --help` does not list
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -57,8 +57,8 @@ class OrderedGroup(click.Group):
     """Group that lists its commands in the order of a session, not of the alphabet."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the commands in the order they were added."""
-        return list(self.commands)
+        """Return the commands in the order they were added, each by its own name only."""
+        return [name for name, command in self.commands.items() if name == command.name]
 
 
 def version_option(function: Command) -> Command:

@@ -54,12 +54,15 @@ class Evaluation:
         Limits of the criterion.
     simulate
         Function that simulates a table of designs.
+    only
+        Outcome columns wanted, verdict and reason among them; all of the table where empty.
     """
 
     readings: Readings
     control: Control
     limits: Limits
     simulate: Simulate = by_kernels
+    only: tuple[str, ...] = ()
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -117,7 +120,7 @@ class Evaluation:
     def _once(self, designs: Designs, control: Control) -> Judged:
         """Simulate and judge designs once."""
         outcomes = self.simulate(designs.table, self.readings, control)
-        return judge(outcomes, designs, self.limits, reported_step_s(control))
+        return judge(outcomes, designs, self.limits, reported_step_s(control), self.only)
 
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return readings and control as plain data, for the record."""

@@ -99,7 +99,7 @@ def joined(pieces: list[Judged]) -> Judged:
     Parameters
     ----------
     pieces
-        At least one.
+        At least one. The first one tells the columns; the others have these and may have more.
 
     Returns
     -------
@@ -109,6 +109,8 @@ def joined(pieces: list[Judged]) -> Judged:
     columns: dict[str, np.ndarray] = {}
     words: dict[str, tuple[str, ...]] = {}
     for spec in OUTCOMES:
+        if spec.name not in pieces[0].columns:
+            continue
         parts = [piece[spec.name] for piece in pieces]
         if spec.type == "dictionary":
             words[spec.name] = _words_in_use(spec, pieces)

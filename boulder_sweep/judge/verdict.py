@@ -118,7 +118,9 @@ class Facts(NamedTuple):
     """What the codes of a column stand for, where that depends on the rows."""
 
 
-def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float) -> Judged:
+def judge(
+    outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float, only: tuple[str, ...] = ()
+) -> Judged:
     """Apply the rules of this module to n rows.
 
     Parameters
@@ -131,6 +133,8 @@ def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: floa
         Limits of the criterion, and what the model was tested on.
     step_s
         Step of the solution [s].
+    only
+        Columns wanted; all of the table where empty.
 
     Returns
     -------
@@ -140,6 +144,10 @@ def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: floa
     facts = facts_of(outcomes, designs, limits, step_s)
     columns, words = {}, {}
     for spec in OUTCOMES:
+        if only and spec.name not in only:
+            continue
+        if spec.name == "validity":
+            facts = _with_flags(facts)
         values = spec.value(facts)
         if spec.type == "dictionary":
             words[spec.name] = facts.words.get(spec.name, spec.words)
@@ -194,7 +202,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
         verdict[rows] = kind
         reason[rows] = why
     rated = standing & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
-    facts = Facts(
+    return Facts(
         outcomes=outcomes,
         designs=designs,
         limits=limits,
@@ -212,8 +220,12 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
         validity=reason,
         words={"reason": reasons},
     )
+
+
+def _with_flags(facts: Facts) -> Facts:
+    """Return what is known with the flags found out."""
     flags, named = flagged(facts)
-    return facts._replace(validity=flags, words={"reason": reasons, "validity": named})
+    return facts._replace(validity=flags, words=facts.words | {"validity": named})
 
 
 def limits_of(sweep: Sweep) -> Limits:

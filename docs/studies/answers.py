@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from scipy.special import ndtri
+
 from boulder_sweep import load, need, uncertainty
 from boulder_sweep.answers.boundary import boundary
 from boulder_sweep.answers.doubts import doubts
@@ -19,6 +22,8 @@ SITE = Path("configs/site.yaml")
 GRID = Path("configs/m30_sizing.yaml")
 UNCERTAIN = Path("configs/uncertain_site.yaml")
 FACTORS = (1.0, 1.05, 1.1, 1.15, 1.2, 1.25)
+TARGETS = (0.9, 0.95)
+"""Chances for which a factor is told."""
 SPREADS = (
     "soil.friction_angle={{mean: {friction_angle_deg} deg, cov: 5 %}}",
     "soil.density={{mean: {soil_density_kg_m3} kg/m^3, cov: 5 %}}",
@@ -91,22 +96,29 @@ def open_readings_words(root: Path) -> str:
 def partial_factors(root: Path) -> str:
     """Return what chance of passing designs have whose depth is just enough with a partial factor on their soil."""
     table = Table(("partial factor on tan φ′", "designs", "mean P(pass)", "least", "largest"))
-    grid = (
-        *("boulder.height=[2.8, 3.2, 3.6] m", "boulder.width=[1.6, 2.0, 2.4] m", "site.embedment_depth=2 m"),
-        "soil.subgrade_reaction=63 MN/m^3",
-    )
-    unfactored = load(root / GRID, grid)
+    means = []
     for factor in FACTORS:
-        frame = need(load(root / GRID, [*grid, f"partial_factor.friction_angle={factor}"]), both_readings=False).frame
-        found = (frame.found == "found").to_numpy()
-        rows = {name: values[found] for name, values in unfactored.plan.given_rows(0, unfactored.n_designs).items()}
-        rows["embedment_depth_m"] = frame.passes_at.to_numpy()[found]
-        spread = {"friction_angle_deg": Distribution("normal", 1.0, 60.0, cov=0.05)}
-        sweep = Sweep("factor", None, (), {}, DesignList("designs", rows), distributions=spread)
-        chances = uncertainty(sweep).frame.p_pass
-        shown = (f"{own:.3f}" for own in (chances.mean(), chances.min(), chances.max()))
-        table.add(f"{factor:g}", f"{found.sum()}", *shown)
-    return table.markdown()
+        chances = chances_with_factor(root, factor)
+        means.append(chances.mean())
+        shown = (f"{own:.3f}" for own in (means[-1], chances.min(), chances.max()))
+        table.add(f"{factor:g}", f"{len(chances):,}", *shown)
+    wanted = np.interp(ndtri(TARGETS), ndtri(means), FACTORS)
+    words = " and ".join(f"{factor:.2f} for {target:.0%}" for factor, target in zip(wanted, TARGETS, strict=True))
+    return f"{table.markdown()}\n\nBetween these rows, the mean chance asks for a factor of {words}."
+
+
+def chances_with_factor(root: Path, factor: float) -> np.ndarray:
+    """Return the chances of all boulders and soils of the M30 grid whose depth is just enough with a partial factor."""
+    one_depth = "site.embedment_depth=2 m"
+    unfactored = load(root / GRID, [one_depth])
+    factored = load(root / GRID, [one_depth, f"partial_factor.friction_angle={factor}"])
+    frame = need(factored, both_readings=False).frame
+    found = (frame.found == "found").to_numpy()
+    rows = {name: values[found] for name, values in unfactored.plan.given_rows(0, unfactored.n_designs).items()}
+    rows["embedment_depth_m"] = frame.passes_at.to_numpy()[found]
+    spread = {"friction_angle_deg": Distribution("normal", 1.0, 60.0, cov=0.05)}
+    sweep = Sweep("factor", None, (), {}, DesignList("designs", rows), distributions=spread)
+    return uncertainty(sweep, half_width=0.03).frame.p_pass.to_numpy()
 
 
 def uncertainty_of_cases(root: Path) -> str:

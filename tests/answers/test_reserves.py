@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pandas as pd
 import pytest
 
 from boulder_sweep.answers.printing import reserve_lines
-from boulder_sweep.answers.reserves import CLASSES, RESERVES, classes, reserves
+from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, classes, reserves
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
@@ -25,6 +26,10 @@ def passes(frame: pd.DataFrame, **inputs: np.ndarray) -> np.ndarray:
     listed = {name: frame[name].to_numpy(dtype=float) for name in INPUT_COLUMNS if name != "impact_height_m"}
     sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed | inputs))
     return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS
+
+
+def replace_mass(sweep: Sweep, mass: float) -> Sweep:
+    return dataclasses.replace(sweep, constants=sweep.constants | {"vehicle_mass_kg": mass})
 
 
 @pytest.mark.parametrize(
@@ -63,6 +68,17 @@ def test_classes_are_named_for_medium_trucks_only() -> None:
     mass = np.array([6800.0] * 7 + [7500.0])
     assert classes(speed, mass) == [None, "M30", "M30", "M40", "M50", "M50", None, None]
     assert list(CLASSES) == ["M30", "M40", "M50"]
+
+
+def test_speeds_of_iso_22343_are_named_for_trucks_of_7200_kg_only() -> None:
+    speed = np.array([13.32, 13.33, 17.78, 22.21, 22.22, 22.22])
+    mass = np.array([7200.0] * 5 + [6800.0])
+    named = ["48 km/h", "64 km/h", "64 km/h", "80 km/h", None]
+    assert classes(speed, mass, ISO_SPEEDS, ISO_MASS_KG) == [None, *named]
+    frame = reserves(replace_mass(site(), 7200.0)).frame
+    assert set(frame.simulated_iso_speed.dropna()) == {"48 km/h"}
+    assert frame.simulated_class.isna().all()
+    assert reserves(site()).frame.simulated_iso_speed.isna().all()
 
 
 def test_crash_tests() -> None:
