@@ -20,8 +20,8 @@ DRAWN = 4096
 HALF_WIDTH = 0.005
 """Largest half-width of the interval of the probability reported at the answer."""
 FAST_OVERTURN_S = 0.3
-"""No passing value is searched between two at which the design reaches the limit before this time. Where one exists, one of
-its neighbours reaches the limit after 0.5 s or later (tests/answers/test_scan.py)."""
+"""No passing value is searched between two at which the design reaches the limit before this time. Where one exists,
+one of its neighbours reaches the limit after 0.5 s or later (see tests/answers/test_scan.py)."""
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock

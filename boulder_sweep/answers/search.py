@@ -21,7 +21,7 @@ WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap")
 CELLS = 16
 """Number of cells into which the scan divides a range."""
 STRIDE = 4
-"""Number of cells that the scan takes as one at first. Nothing is tried between two places that are far from holding."""
+"""Cells that the scan takes as one at first. Nothing is tried between two places that are far from holding."""
 
 Predicate = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Maps rows and places, shape (m,), to `FAILS`, `HOLDS`, `BEYOND` or `FAR`, shape (m,)."""

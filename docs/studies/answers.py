@@ -103,8 +103,9 @@ def partial_factors(root: Path) -> str:
         shown = (f"{own:.3f}" for own in (means[-1], chances.min(), chances.max()))
         table.add(f"{factor:g}", f"{len(chances):,}", *shown)
     wanted = np.interp(ndtri(TARGETS), ndtri(means), FACTORS)
-    words = " and ".join(f"{factor:.2f} for {target:.0%}" for factor, target in zip(wanted, TARGETS, strict=True))
-    return f"{table.markdown()}\n\nBetween these rows, the mean chance asks for a factor of {words}."
+    (low, high), (first, second) = wanted, TARGETS
+    words = f"a mean probability of {first:.0%} needs a factor of {low:.2f}, one of {second:.0%} needs {high:.2f}"
+    return f"{table.markdown()}\n\nBy interpolation, {words}."
 
 
 def chances_with_factor(root: Path, factor: float) -> np.ndarray:
