@@ -109,7 +109,7 @@ class Evaluation:
         """
         found = self._once(designs, self.control)
         for control in finer_controls(self.control):
-            again = np.flatnonzero(is_open(found))
+            again = np.flatnonzero(is_open(found, control))
             if not len(again):
                 break
             finer = self._once(designs.rows(again), control)

@@ -1,4 +1,6 @@
-"""Finer steps for the rows that need them: those refused for their time steps, or undecided for their error."""
+"""Finer steps for the rows that need them: those refused for their time steps, or undecided for their error.
+
+What is still refused by the finest of them is simulated at last as `boulder_kernels.patience` does it."""
 
 from __future__ import annotations
 
@@ -14,6 +16,8 @@ from boulder_sweep.judge.verdict import STEP_REASONS
 
 FACTOR = 0.25
 """Each time the step is shortened by this factor."""
+PATIENT_STEPS = 2_000
+"""Steps to the horizon of the last attempt, where nothing asks for shorter ones."""
 MOST_STEPS = 20_000
 """Steps to the horizon at which it ends, with the soil in closed form; fewer with many soil elements."""
 
@@ -28,14 +32,17 @@ def finer_controls(control: Control) -> Iterator[Control]:
 
     Notes
     -----
-    The budget of a row is the last of these controls. It depends on the settings alone, so a row is the same whatever
-    rows are simulated beside it.
+    The budget of a row is the last of these controls; sums over soil elements are too slow for the patient one. It
+    depends on the settings alone, so a row is the same whatever rows are simulated beside it.
     """
     finest = control.horizon / MOST_STEPS * max(1.0, control.elements / ELEMENTS_AS_FAST)
     h = control.h
     while h > finest:
         h = max(FACTOR * h, finest)
         yield control._replace(h=h, locate_yield=True)
+    if control.elements == 0:
+        h = min(control.h, control.horizon / PATIENT_STEPS)
+        yield control._replace(h=h, locate_yield=True, patient=True)
 
 
 def reported_step_s(control: Control) -> float:
@@ -43,7 +50,7 @@ def reported_step_s(control: Control) -> float:
     return 0.5 * control.h if control.error_estimate else control.h
 
 
-def is_open(judged: Judged) -> np.ndarray:
-    """Return which rows finer steps may decide (bool, shape (n,))."""
+def is_open(judged: Judged, control: Control) -> np.ndarray:
+    """Return which rows finer steps, those of a control, may decide (bool, shape (n,))."""
     refused = [code for code, reason in enumerate(judged.reasons) if code >= len(REASONS) and reason in STEP_REASONS]
-    return np.isin(judged.reason, [NUMERICAL_ERROR, *refused])
+    return np.isin(judged.reason, refused if control.patient else [NUMERICAL_ERROR, *refused])

@@ -85,6 +85,7 @@ def page_data(
         "finer": [
             {"h": finer.h, "locate_yield": float(finer.locate_yield)}
             for finer in finer_controls(control._replace(elements=0))
+            if not finer.patient
         ],
         "parts": list(PARTS),
         "colours": COLOURS,

@@ -65,7 +65,7 @@ def readings_from(s: np.ndarray) -> Readings:
 @inlined
 def control_from(s: np.ndarray, halved: bool) -> Control:
     """Return the control, which stands behind them, its step halved or not."""
-    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved, s[13])
+    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved, s[13], False)
 
 
 @inlined

@@ -13,7 +13,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.judge.accuracy import STEPS
 from boulder_sweep.judge.evaluation import LONGEST_HORIZON, Evaluation
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import Judged
+from boulder_sweep.judge.judged import ERROR, UNDECIDED, Judged
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import STATUS_REASONS, Limits, judge
 from boulder_sweep.settings.fields import FIELDS, INPUTS, MAX_ELEMENTS
@@ -77,7 +77,14 @@ def box_shares_table(count: int = 4000, seed: int = 1) -> Table:
     counts = [Counter(_endings(rows)) for rows in (once, evaluation.judged(designs))]
     for ending in sorted({**counts[0], **counts[1]}, key=lambda word: -counts[1][word]):
         table.add(ending, str(counts[0][ending]), str(counts[1][ending]), f"{counts[1][ending] / count:.1%}")
+    first, last = (sum(number for word, number in found.items() if is_left_open(word)) for found in counts)
+    table.add("undecided or refused, together", str(first), str(last), f"{last / count:.1%}")
     return table
+
+
+def is_left_open(ending: str) -> bool:
+    """Whether an ending, as of `box_shares_table`, decides nothing."""
+    return ending.startswith((VERDICTS[ERROR], VERDICTS[UNDECIDED]))
 
 
 def _endings(judged: Judged) -> list[str]:

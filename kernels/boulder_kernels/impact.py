@@ -66,6 +66,9 @@ class Control(NamedTuple):
     longest_horizon: float = 0.0
     """Simulated time [s] up to which a design goes on that reaches the horizon without proof that it stays below its
     limits; not beyond the horizon where it is shorter, or where nothing stops at the limit."""
+    patient: bool = False
+    """Whether a design that needs more steps than are allowed is simulated all the same, see
+    `boulder_kernels.patience`."""
 
 
 class Record(NamedTuple):
@@ -197,25 +200,27 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     h, status = first_step(control, theta_stop, c)
     if status != ACCEPTED:
         return failed(status)
-    outcome = simulate_by_steps(h, c, readings, control, theta_stop, record)
+    outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
     while outcome.status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
         h *= RETRY
-        outcome = simulate_by_steps(h, c, readings, control, theta_stop, record)
+        outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
     return outcome
 
 
 @kernel
 def simulate_by_steps(
-    h_full: float,
+    h_touching: float,
+    h_apart: float,
     c: Constants,
     readings: Readings,
     control: Control,
     theta_stop: float,
     record: Record,
 ) -> Outcome:
-    """Simulate one impact with a given time step [s]; see `simulate_design`."""
-    ending = ending_of(control, readings, h_full)
-    budget = attempt_budget(h_full, ending.longest)
+    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate_design`."""
+    ending = ending_of(control, readings, h_apart)
+    budget = float(MOST_STEPS) if control.patient else attempt_budget(h_apart, ending.longest)
+    h_full = h_touching
     y, modes = initial_state(c), initial_modes(readings, c)
     switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
     k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
@@ -268,4 +273,5 @@ def simulate_by_steps(
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
             switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
             k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
+            h_next = h_full = h_touching if modes.touching else h_apart
     return failed(Status.STEP_BUDGET.value)

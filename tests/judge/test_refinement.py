@@ -12,7 +12,7 @@ from boulder_sweep.columns import OUTCOME_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.evaluation import Evaluation, by_kernels
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.refinement import MOST_STEPS, finer_controls, reported_step_s
+from boulder_sweep.judge.refinement import MOST_STEPS, PATIENT_STEPS, finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import Limits
 from tests.judge.plain import plain_designs
 
@@ -25,12 +25,15 @@ def evaluation(control: Control = CONTROL, limits: Limits = LIMITS, simulate=by_
 
 
 def test_steps_get_shorter_down_to_the_budget() -> None:
-    steps = [control.h for control in finer_controls(CONTROL)]
+    *finer, last = finer_controls(CONTROL)
+    steps = [control.h for control in finer]
     assert steps == sorted(steps, reverse=True)
     assert steps[-1] == pytest.approx(CONTROL.horizon / MOST_STEPS)
-    assert all(control.locate_yield for control in finer_controls(CONTROL))
-    assert list(finer_controls(CONTROL._replace(h=1e-6))) == []
-    assert len(list(finer_controls(CONTROL._replace(elements=5000)))) < len(steps)
+    assert all(control.locate_yield and not control.patient for control in finer)
+    assert last.patient and last.h == CONTROL.horizon / PATIENT_STEPS
+    assert list(finer_controls(CONTROL._replace(h=1e-6))) == [last._replace(h=1e-6)]
+    sums = list(finer_controls(CONTROL._replace(elements=5000)))
+    assert len(sums) < len(steps) and not any(control.patient for control in sums)
 
 
 def test_a_design_that_is_too_stiff_for_its_steps_is_decided_by_finer_ones() -> None:
@@ -61,9 +64,13 @@ def test_a_limit_within_the_error_of_the_peak_is_decided_by_finer_steps() -> Non
     assert row["step_s"] < reported_step_s(CONTROL)
 
 
+HARD = {"beta": 1e9, "rho_b": 1e-3, "rho_s": 1e-3, "L": 0.1}
+"""What no step decides."""
+
+
 def mixed() -> Designs:
     """Usual designs, stiff ones, and one that no step decides."""
-    pieces = [plain_designs(3), plain_designs(2, beta=1e6), plain_designs(1, c_v=0.1), plain_designs(2, H=1.5)]
+    pieces = [plain_designs(3), plain_designs(2, beta=1e6), plain_designs(1, **HARD), plain_designs(2, H=1.5)]
     table = type(pieces[0].table)(*(np.concatenate(column) for column in zip(*(p.table for p in pieces), strict=True)))
     return Designs(table, np.concatenate([piece.bed_offset for piece in pieces]))
 
@@ -77,10 +84,19 @@ def test_a_row_is_the_same_whatever_stands_beside_it() -> None:
         assert shuffled.row(place) == whole.row(row) == evaluation().judged(designs.rows(slice(row, row + 1))).row(0)
 
 
+def test_a_damper_that_is_too_weak_for_its_spring_is_decided_all_the_same() -> None:
+    """Nothing holds the truck up: it drives on over the boulder, far beyond its rating."""
+    weak = plain_designs(c_v=0.1)
+    assert by_kernels(weak.table, corrected(), CONTROL).status[0] == Status.WEAK_DAMPER
+    row = evaluation().judged(weak).row(0)
+    assert (row["verdict"], row["reason"]) == ("fail", "penetration")
+    assert row["max_vehicle_displacement_m"] == pytest.approx(weak.table.v_0[0] * row["end_time_s"], rel=1e-3)
+
+
 def test_what_no_step_decides_keeps_its_reason() -> None:
-    row = evaluation().judged(plain_designs(c_v=0.1)).row(0)
+    row = evaluation().judged(plain_designs(**HARD)).row(0)
     assert row["verdict"] == "error"
-    assert "damper is too weak" in row["reason"]
+    assert "soil is too stiff" in row["reason"]
     values = [row[name] for name in OUTCOME_COLUMNS if name not in ("verdict", "reason")]
     assert values == [None] * len(values)
 

@@ -1,4 +1,4 @@
-"""A whole impact: Eq 52 integrated by DOP853, each discontinuity located and stepped on.
+"""A whole impact: Eq 52 integrated by DOP853, or where it is stiff by Radau, each discontinuity located and stepped on.
 
 The modes (`tests.oracle.dynamics.Modes`) are held while the integrator runs. After each step, everything that
 can end a mode is looked at along the dense output; where something did, the step is cut at that instant, the
@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853, OdeSolution
+from scipy.integrate import DOP853, OdeSolution, Radau
 from scipy.optimize import brentq
 
 from .dynamics import Problem, contact_displacement, loads, problem, rate_under
@@ -41,6 +41,7 @@ def simulate(
     rotation_limit: float | None = None,
     rtol: float = 1e-10,
     land_on_kinks: bool = True,
+    stiff: bool = False,
 ) -> Impact:
     """Simulate one impact; the same one again is not simulated again.
 
@@ -60,6 +61,8 @@ def simulate(
         Relative tolerance of DOP853; the absolute tolerances scale with it.
     land_on_kinks : bool
         Also land a step where the rates are not smooth (see `tests.oracle.events.kinks`).
+    stiff : bool
+        Integrate by Radau's implicit method.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def simulate(
         If the integrator fails or the modes change without end.
     """
     impact = problem(inputs, readings, elements)
-    runner = _Runner(impact, horizon, rotation_limit, rtol, land_on_kinks)
+    runner = _Runner(impact, horizon, rotation_limit, rtol, land_on_kinks, Radau if stiff else DOP853)
     return runner.run()
 
 
@@ -79,8 +82,15 @@ class _Runner:
     """State of one integration between its segments."""
 
     def __init__(
-        self, impact: Problem, horizon: float, rotation_limit: float | None, rtol: float, land_on_kinks: bool
+        self,
+        impact: Problem,
+        horizon: float,
+        rotation_limit: float | None,
+        rtol: float,
+        land_on_kinks: bool,
+        method: type[DOP853] | type[Radau],
     ) -> None:
+        self.method = method
         self.impact = impact
         self.horizon = horizon
         self.rotation_limit = rotation_limit
@@ -118,7 +128,7 @@ class _Runner:
             watched.append(self._limit_watch(self.rotation_limit))
         kink_values = kinks(self.impact, self.modes)
         kink_signs = np.sign(kink_values(self.y)) if self.land_on_kinks else None
-        solver = DOP853(
+        solver = self.method(
             self._rate,
             self.t,
             self.y,
@@ -130,7 +140,7 @@ class _Runner:
         while solver.status == "running":
             message = solver.step()
             if solver.status == "failed":
-                raise RuntimeError(f"DOP853 failed at {solver.t} s: {message}")
+                raise RuntimeError(f"the integrator failed at {solver.t} s: {message}")
             dense = solver.dense_output()
             times = np.linspace(solver.t_old, solver.t, SAMPLES_PER_STEP + 1)
             for before, after in pairwise(times):

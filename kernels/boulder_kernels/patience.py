@@ -1,0 +1,81 @@
+"""Designs that need more steps than are allowed, simulated all the same: as long as a stated number of steps lasts.
+
+Three things make such designs affordable.
+
+1. They are given a number of steps (`MOST_STEPS`), not a number up to the horizon: many are decided long before it.
+2. The stiff truck asks for short steps only while it touches; released, it coasts.
+3. A spring that relaxes against its damper faster than the steps can follow passes on the force of the damper, however
+   stiff it is: F = c_v times the speed of crush, with an error of the order of the relaxation time c_v/k_v over that of
+   the impact. So a softer spring stands for it, which relaxes within a step, and at least `DAMPED` times as fast as the
+   damper slows the masses. Half the step comes with a spring twice as stiff, so the estimated error covers the spring.
+"""
+
+from __future__ import annotations
+
+from ._jit import kernel
+from .design import Constants, Design, constants_of, is_computable
+from .impact import Control, Outcome, failed, first_step, no_record, simulate_by_steps, simulate_design
+from .outcomes import Status
+from .readings import Readings
+from .stability import ACCEPTED, Rates, rates_of, stable_step
+
+DAMPED = 16.0
+"""Least rate of relaxation over that at which the damper slows the masses, of the spring that stands for a stiffer
+one."""
+RESOLVED = 0.5
+"""Step while the truck touches, over the longest that is stable: a short blow is to be followed, not only survived."""
+NO_SPRING = 1e-12
+"""Factor on a spring that leaves nothing of its rates."""
+
+
+@kernel
+def with_spring(design: Design, factor: float) -> Design:
+    """Return a design whose vehicle has its spring times a factor."""
+    p = design
+    k_v = factor * p.k_v
+    return Design(
+        p.L, p.W, p.H, p.rho_b, p.d, p.e, p.rho_s, p.phi, p.beta, p.K_epsilon, p.m_v, p.v_0, k_v, p.c_v, p.e_bumper
+    )  # fmt: skip
+
+
+@kernel
+def spring_to_follow(r: Rates, control: Control) -> float:
+    """Factor on a spring that leaves it no faster than the steps can follow."""
+    slowing = r.truck / r.relaxation  # c_v over the masses
+    fastest = (2.0 if control.halved else 1.0) * max(1.0 / control.h, DAMPED * slowing)
+    return min(1.0, fastest / r.relaxation)
+
+
+@kernel
+def longest_step(theta_limit: float, c: Constants) -> float:
+    """Longest step that is stable up to a rotation [s]."""
+    return stable_step(rates_of(theta_limit, c))
+
+
+@kernel
+def simulate_patiently(design: Design, readings: Readings, control: Control) -> Outcome:
+    """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
+
+    Parameters
+    ----------
+    design
+        The design, SI.
+    readings
+        Which formulas are read as printed.
+    control
+        As of `boulder_kernels.impact.simulate_design`.
+    """
+    c = constants_of(design, readings, control.elements)
+    if design.H - design.d <= design.e_bumper or not is_computable(c):
+        return simulate_design(design, readings, control, no_record())
+    _, status = first_step(control, control.theta_limit, c)
+    if status == ACCEPTED:
+        return simulate_design(design, readings, control, no_record())
+    factor = spring_to_follow(rates_of(control.theta_limit, c), control)
+    c = constants_of(with_spring(design, factor), readings, control.elements)
+    apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)
+    part = 0.5 if control.halved else 1.0
+    h = part * min(control.h, RESOLVED * longest_step(control.theta_limit, c))
+    h_apart = part * min(control.h, longest_step(control.theta_limit, apart)) if readings.separation_released else h
+    found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, no_record())
+    return failed(status) if found.status == Status.STEP_BUDGET.value else found
