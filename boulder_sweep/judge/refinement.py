@@ -1,6 +1,7 @@
 """Finer steps for the rows that need them: those refused for their time steps, or undecided for their error.
 
-What is still refused by the finest of them is simulated at last as `boulder_kernels.patience` does it."""
+What is still refused by the finest of them is simulated at last as `boulder_kernels.patience` does it.
+"""
 
 from __future__ import annotations
 

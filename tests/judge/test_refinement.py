@@ -30,10 +30,12 @@ def test_steps_get_shorter_down_to_the_budget() -> None:
     assert steps == sorted(steps, reverse=True)
     assert steps[-1] == pytest.approx(CONTROL.horizon / MOST_STEPS)
     assert all(control.locate_yield and not control.patient for control in finer)
-    assert last.patient and last.h == CONTROL.horizon / PATIENT_STEPS
+    assert last.patient
+    assert last.h == CONTROL.horizon / PATIENT_STEPS
     assert list(finer_controls(CONTROL._replace(h=1e-6))) == [last._replace(h=1e-6)]
     sums = list(finer_controls(CONTROL._replace(elements=5000)))
-    assert len(sums) < len(steps) and not any(control.patient for control in sums)
+    assert len(sums) < len(steps)
+    assert not any(control.patient for control in sums)
 
 
 def test_a_design_that_is_too_stiff_for_its_steps_is_decided_by_finer_ones() -> None:
