@@ -24,7 +24,7 @@ from boulder_kernels import (
     constants_of,
     simulate_design,
 )
-from boulder_kernels._jit import inlined, kernel
+from boulder_kernels._jit import array_kernel, inlined
 from boulder_kernels.design import design_in
 from boulder_kernels.dynamics import State, acceleration
 from boulder_kernels.energy import stored_energies
@@ -80,7 +80,7 @@ def outcomes_from(t: np.ndarray) -> OutcomeTable:
     return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9])
 
 
-@kernel
+@array_kernel
 def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at: Any) -> None:
     """Simulate n designs, and estimate their errors where the settings say so.
 
@@ -126,7 +126,7 @@ def modes_of(y: State, turning: float, touching: float, c: Constants) -> Modes:
     return Modes(int(turning), touching > 0.0, corner, arm, 0, 0)
 
 
-@kernel
+@array_kernel
 def history(
     design_from: Any,
     settings_at: Any,

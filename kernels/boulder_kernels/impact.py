@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import array_kernel, kernel
 from .after_step import (
     RUNNING,
     Decided,
@@ -86,7 +86,7 @@ class Record(NamedTuple):
     """Energy exchanged up to each [J], shape (n, 4), order of `Exchanged`."""
 
 
-@kernel
+@array_kernel
 def no_record() -> Record:
     """Return a record that keeps nothing."""
     return Record(

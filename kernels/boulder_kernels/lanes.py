@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import array_kernel, inlined, kernel
 from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
 from .design import constants_of, design_in, is_computable
 from .dormand_prince import step
@@ -303,28 +303,26 @@ def carry_on(
 
 
 @kernel
-def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
-    """Simulate every design of a table in lanes, by the closed form of the soil and stopping at the limit.
+def run_lanes(
+    ws: np.ndarray,
+    rows: np.ndarray,
+    waiting: np.ndarray,
+    designs: np.ndarray,
+    readings: Readings,
+    control: Control,
+    out: np.ndarray,
+) -> None:
+    """Simulate every design.
 
     Parameters
     ----------
-    designs
-        Designs, SI, shape (15, n), in the order of `DesignTable`.
-    readings
-        Which formulas are read as printed.
-    control
-        Step, horizon, limit; its choice of soil and of stopping is ignored.
-
-    Returns
-    -------
-    ndarray, shape (10, n)
-        Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
+    ws, rows, waiting
+        The workspace, the row in each lane and the first not yet started, and room for a list of lanes; all zero.
+    designs, readings, control, out
+        As of `simulate_lanes`, and its result.
     """
-    out = empty_outcomes(designs.shape[1])
-    ws = np.zeros(WHOLE)
     first, second, third, fourth = ws[:SIZE], ws[SIZE:], ws[2 * SIZE :], ws[3 * SIZE :]
     events = ws[EVENTS:]
-    rows, waiting = np.zeros(GROUPS * LANES + 1, np.int64), np.zeros(GROUPS * LANES, np.int64)
     running = 0
     for i in range(GROUPS * LANES):
         next_design(ws, i, rows, designs, readings, control, out)
@@ -343,4 +341,27 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
                 carry_on(ws, i, EVENTS + k, rows, designs, readings, control, out)
                 running -= rows[i] == EMPTY
             done += size
+
+
+@array_kernel
+def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
+    """Simulate every design of a table in lanes, by the closed form of the soil and stopping at the limit.
+
+    Parameters
+    ----------
+    designs
+        Designs, SI, shape (15, n), in the order of `DesignTable`.
+    readings
+        Which formulas are read as printed.
+    control
+        Step, horizon, limit; its choice of soil and of stopping is ignored.
+
+    Returns
+    -------
+    ndarray, shape (10, n)
+        Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
+    """
+    out = empty_outcomes(designs.shape[1])
+    rows, waiting = np.zeros(GROUPS * LANES + 1, np.int64), np.zeros(GROUPS * LANES, np.int64)
+    run_lanes(np.zeros(WHOLE), rows, waiting, designs, readings, control, out)
     return out

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import array_kernel, inlined, kernel
 from .dense_output import DenseOutput, displacement_at, state_at, turning_point
 from .design import Constants
 from .dynamics import State
@@ -132,7 +132,7 @@ STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END = (
 )
 
 
-@kernel
+@array_kernel
 def empty_outcomes(n: int) -> np.ndarray:
     """Return an array for n outcomes, the columns of an `OutcomeTable` as its rows: INVALID and NaN until written."""
     out = np.full((len(OUTCOME_FIELDS), n), np.nan)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import array_kernel, kernel
 from .design import DesignTable, design_in
 from .impact import Control, no_record, simulate_design
 from .lanes import simulate_lanes
@@ -22,7 +22,7 @@ LEAST_ROTATION = 1e-4
 """Rotation that an error of the truck may stand for even where the boulder turns less [rad]."""
 
 
-@kernel
+@array_kernel
 def simulate_rows(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
     """Simulate designs one by one, with any representation of the soil; arguments as of `simulate_lanes`."""
     out = empty_outcomes(designs.shape[1])
