@@ -41,6 +41,7 @@ def boundary(
     """
     from boulder_sweep.answers.boundary import boundary as find
     from boulder_sweep.answers.tables import checked_parquet
+    from boulder_sweep.cli.progress import working
 
     sweep = load_sweep(grid, overrides, quiet)
     if out is not None:
@@ -50,7 +51,8 @@ def boundary(
 
         require_matplotlib()
         checked_kind(picture)
-    found = find(sweep, jobs=jobs)
+    with working(quiet):
+        found = find(sweep, jobs=jobs)
     counts = found.counts()
     if as_json:
         record = {"name": sweep.name, "designs": sweep.n_designs, "simulations": found.simulations, "verdicts": counts}

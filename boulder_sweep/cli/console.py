@@ -1,110 +1,21 @@
-"""What the command line shows: progress on stderr, short tables on stdout."""
+"""What the command line shows on stdout: short tables."""
 
 from __future__ import annotations
 
 import shlex
-import sys
 import textwrap
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.cli.output import say
 from boulder_sweep.columns import BY_NAME, VERDICTS
-from boulder_sweep.text import duration_text, printable, size_text
+from boulder_sweep.text import duration_text, size_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from boulder_sweep.places import Place
     from boulder_sweep.runner.estimate import Estimate
-    from boulder_sweep.runner.summary import Progress, Summary
+    from boulder_sweep.runner.summary import Summary
     from boulder_sweep.settings import Sweep
     from boulder_sweep.store import RunStatus
-
-PLAIN_EVERY_S = 10.0
-"""Time between two lines of progress where there is no terminal."""
-
-
-COLD_START = "compiling kernels, once on this machine, about 40 s"
-
-
-def is_cold() -> bool:
-    """Whether the kernels are not compiled yet, or the compiled code cannot be kept."""
-    from pathlib import Path
-
-    from boulder_kernels._jit import CACHE_FOLDER
-
-    return CACHE_FOLDER is None or next(Path(CACHE_FOLDER).rglob("*.nbc"), None) is None
-
-
-@contextmanager
-def progress(quiet: bool, notes: Notes, cold: bool = False) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere."""
-    if quiet:
-        yield None
-    elif sys.stderr.isatty():
-        with _bar(notes, COLD_START if cold else "preparing") as show:
-            yield show
-    else:
-        if cold:
-            say(COLD_START)
-        yield _PlainLines(notes)
-
-
-class Notes:
-    """The notes of a run that were shown already."""
-
-    def __init__(self) -> None:
-        self._shown = 0
-
-    def new(self, notes: Sequence[str]) -> Sequence[str]:
-        """Return the notes that were not shown yet; they count as shown now."""
-        fresh, self._shown = notes[self._shown :], len(notes)
-        return fresh
-
-
-class _PlainLines:
-    """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
-
-    def __init__(self, notes: Notes) -> None:
-        self.last = time.monotonic()
-        self._notes = notes
-
-    def __call__(self, now: Progress) -> None:
-        for note in self._notes.new(now.notes):
-            say(f"note: {note}")
-        if time.monotonic() - self.last < PLAIN_EVERY_S:
-            return
-        self.last = time.monotonic()
-        left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
-        say(
-            f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} designs, "
-            f"{now.rows_per_second:,.0f} per second{left}"
-        )
-
-
-@contextmanager
-def _bar(notes: Notes, beginning: str) -> Iterator[Callable[[Progress], None]]:
-    # rich is for terminals only. It honours NO_COLOR by itself.
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bars
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[numbers]}"))
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-        # Before the first block is done there is no progress to show; the bar pulses.
-        task = bars.add_task(beginning, total=None, numbers="")
-
-        def show(now: Progress) -> None:
-            for note in notes.new(now.notes):
-                bars.console.print(f"note: {printable(note)}", markup=False, highlight=False)
-            left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
-            numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
-            bars.update(task, description="simulating", total=now.rows, completed=now.rows_done, numbers=numbers)
-
-        yield show
 
 
 def grid_lines(sweep: Sweep) -> list[str]:

@@ -34,14 +34,14 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     Says whether every outcome is the same to the last bit and, if not, what has changed since: versions, kernels,
     rules. As in `sweep simulate`, the time history continues beyond the rotation limit.
     """
-    from boulder_sweep.cli.console import COLD_START, is_cold, value_lines
+    from boulder_sweep.cli.console import value_lines
+    from boulder_sweep.cli.progress import working
     from boulder_sweep.impact.explanation import explain as compute_again
     from boulder_sweep.settings.shown_units import shown_values
 
-    if is_cold():
-        say(COLD_START)
     try:
-        found = compute_again(out, design_id)
+        with working(as_json, "design"):
+            found = compute_again(out, design_id)
     except IndexError as problem:
         raise click.UsageError(str(problem)) from None
     if found.trajectory is not None:

@@ -67,6 +67,7 @@ def need(
     from boulder_sweep.answers.printing import need_lines
     from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.cli.console import counted
+    from boulder_sweep.cli.progress import working
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
     sweep = load_sweep(grid, overrides, quiet)
@@ -77,18 +78,20 @@ def need(
 
         require_matplotlib()
         checked_kind(picture)
-    found = find(
-        sweep,
-        least,
-        most=most,
-        margin=margin,
-        probability=probability,
-        open_readings=open_readings,
-        between=between,
-        tolerance=tolerance,
-        both_readings=not own_readings,
-        jobs=jobs,
-    )
+    with working(quiet) as told:
+        found = find(
+            sweep,
+            least,
+            most=most,
+            margin=margin,
+            probability=probability,
+            open_readings=open_readings,
+            between=between,
+            tolerance=tolerance,
+            both_readings=not own_readings,
+            jobs=jobs,
+            told=told,
+        )
     if as_json:
         show(json.dumps(found.to_dict()))
     else:

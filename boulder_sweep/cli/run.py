@@ -38,6 +38,7 @@ def run(
 ) -> int:
     """Simulate every design of GRID and write the table of verdicts."""
     from boulder_sweep.cli import console
+    from boulder_sweep.cli.progress import Notes, progress
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite exclude each other")
@@ -53,8 +54,8 @@ def run(
         say(f"{sweep.name}: {console.counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.runner.sweeper import run as run_sweep
 
-    notes = console.Notes()
-    with console.progress(quiet, notes, cold=not quiet and console.is_cold()) as shown:
+    notes = Notes()
+    with progress(quiet, notes) as shown:
         summary = run_sweep(
             sweep,
             target,

@@ -44,6 +44,7 @@ def simulate(
 ) -> int:
     """Simulate one design of CASE with its time history, beyond the rotation limit and to the end."""
     from boulder_sweep.cli import console
+    from boulder_sweep.cli.progress import working
 
     sweep = load_sweep(case, overrides, quiet)
     number = design or 0
@@ -61,9 +62,8 @@ def simulate(
     from boulder_sweep.impact.simulation import simulate as simulate_design
     from boulder_sweep.settings.shown_units import shown_values
 
-    if not quiet and console.is_cold():
-        say(console.COLD_START)
-    result = simulate_design(sweep, number)
+    with working(quiet, "design"):
+        result = simulate_design(sweep, number)
     # Before anything else: there may be nothing to draw, and a film takes a while.
     values = shown_values(result.summary(), units)
     show(*([json.dumps(values)] if as_json else [*console.value_lines(values), *_cautions(values)]))

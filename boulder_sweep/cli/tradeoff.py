@@ -53,6 +53,7 @@ def tradeoff(
     sums over elements, both readings of the paper: errors, changed verdicts, and CPU time per design. With -o the table
     is written as Parquet and CSV, and a picture.
     """
+    from boulder_sweep.cli.progress import working
     from boulder_sweep.settings import load
     from boulder_sweep.tradeoff.study import measure
 
@@ -64,7 +65,8 @@ def tradeoff(
 
         require_matplotlib()
         make_folder(Path(out))
-    found = measure(sweep, designs=designs, seconds=seconds, tell=None if quiet else say)
+    with working(quiet, doing="measuring"):
+        found = measure(sweep, designs=designs, seconds=seconds, tell=None if quiet else say)
     files = [] if out is None else found.write(out)
     if as_json:
         show(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))

@@ -84,6 +84,7 @@ def uncertainty(
     from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
     from boulder_sweep.cli.console import counted
+    from boulder_sweep.cli.progress import working
 
     sweep = load_sweep(grid, overrides, quiet)
     if out is not None:
@@ -93,9 +94,17 @@ def uncertainty(
 
         require_matplotlib()
         checked_kind(picture)
-    found = estimate(
-        sweep, half_width=half_width, confidence=confidence, margin=margin, seed=seed, rare=rare, jobs=jobs
-    )
+    with working(quiet) as told:
+        found = estimate(
+            sweep,
+            half_width=half_width,
+            confidence=confidence,
+            margin=margin,
+            seed=seed,
+            rare=rare,
+            jobs=jobs,
+            told=told,
+        )
     parts = []
     if doubts:
         from boulder_sweep.answers.doubts import doubts as part

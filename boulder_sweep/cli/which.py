@@ -33,11 +33,13 @@ def which(grid: str, jobs: int | None, out: str | None, quiet: bool, overrides: 
     from boulder_sweep.answers.printing import reserve_lines
     from boulder_sweep.answers.reserves import reserves
     from boulder_sweep.answers.tables import checked_parquet
+    from boulder_sweep.cli.progress import working
 
     sweep = load_sweep(grid, overrides, quiet)
     if out is not None:
         checked_parquet(out)
-    found = reserves(sweep, jobs=jobs)
+    with working(quiet) as told:
+        found = reserves(sweep, jobs=jobs, told=told)
     show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found)))
     if out is not None:
         found.write(out)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, corrected, simulate_table
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
@@ -152,6 +152,12 @@ PLAIN_DESIGN = Designs(
     bed_offset=np.array([2.9]),
 )
 """One usual design."""
+
+
+def compile_kernels() -> None:
+    """Compile the kernels that simulate tables, or load their compiled code, by one step of a plain design."""
+    control = Control(h=0.01, horizon=0.01, theta_limit=math.radians(20.0), elements=0, error_estimate=False)
+    by_kernels(PLAIN_DESIGN.table, corrected(), control)
 
 
 def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels) -> Evaluation:

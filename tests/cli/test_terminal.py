@@ -13,12 +13,12 @@ import pytest
 COMMAND = [sys.executable, "-m", "boulder_sweep"]
 
 
-def _on_a_terminal(words, **environment):
+def _on_a_terminal(words, command=COMMAND, **environment):
     """Run a command with a terminal as stderr; return exit code, stdout and what the terminal received."""
     ours, theirs = pty.openpty()
     env = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
     env |= {"TERM": "xterm-256color", "COLUMNS": "120"} | environment
-    process = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=theirs, env=env, text=True)
+    process = subprocess.Popen([*command, *words], stdout=subprocess.PIPE, stderr=theirs, env=env, text=True)
     os.close(theirs)
     received = bytearray()
     while True:
@@ -45,6 +45,20 @@ def test_a_terminal_gets_a_bar_with_the_time_left(possible_grid):
     assert "simulating" in shown
     assert re.search(r"[\d,]+ of 54,000, [\d,]+/s, [\d.]+ s left", shown)
     assert re.search(r"\x1b\[[0-9;]*38;5", shown)
+
+
+def test_a_cold_start_shows_a_bar_with_what_it_waits_for(possible_grid, tmp_path):
+    """The words stand beside a bar that moves while the kernels compile, and give way to those of the work."""
+    code = (
+        "import sys, time; from boulder_sweep.cli import main, progress; import boulder_sweep.judge.evaluation as e;"
+        "progress.cold_start = lambda kernels: 'compiling kernels, once on this machine, about 2 s';"
+        "e.compile_kernels = lambda: time.sleep(1.0); progress._remember = lambda *_: None;"
+        "main.main(sys.argv[1:])"
+    )
+    ended, _, shown = _on_a_terminal(["run", "grid.yaml", *GRID_OF_THOUSANDS], command=[sys.executable, "-c", code])
+    assert ended == 0
+    assert len(set(re.findall(r"compiling kernels, once on this machine, about 2 s.*?\x1b\[2K", shown, re.S))) >= 3
+    assert "simulating" in shown
 
 
 def test_no_color_holds(possible_grid):

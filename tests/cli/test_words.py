@@ -1,8 +1,15 @@
 """Words on a terminal: what a cold start waits for, what was written, what decided a row."""
 
 import json
+from pathlib import Path
+
+import pytest
 
 import boulder_sweep
+from boulder_sweep import simulate
+from boulder_sweep.cli import progress
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.judge.evaluation import compile_kernels
 
 
 def test_explain_tells_what_decided_and_how_near(sweep, possible_grid):
@@ -21,11 +28,58 @@ def test_explain_tells_what_decided_and_how_near(sweep, possible_grid):
     assert f"  penetration: {passed.penetration_m:.4g} m, P1 allows 1 m beyond the far face" in text
 
 
-def test_a_cold_start_says_so_and_lines_fit_a_terminal(sweep, possible_grid, monkeypatch):
-    monkeypatch.setattr("boulder_sweep.cli.console.is_cold", lambda: True)
-    code, out, err = sweep("run", possible_grid)
+COMPILING = "compiling kernels, once on this machine, about "
+SITE = Path(__file__).parents[2] / "configs" / "site.yaml"
+ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", SITE, *ONE),
+        ("simulate", SITE, *ONE),
+        ("need", SITE, *ONE, "--own-readings"),
+        ("which", SITE, *ONE),
+        ("boundary", SITE),
+        ("uncertainty", SITE, *ONE, "--half-width", "0.2", "--set", "vehicle.speed={mean: 30 mph, cov: 5 %}"),
+        ("tradeoff", SITE, *ONE, "--seconds", "0"),
+    ],
+)
+def test_every_command_that_compiles_says_so_first(sweep, words, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert COMPILING not in sweep(*words)[2]
+    monkeypatch.setattr("boulder_sweep.cli.progress.cold_start", lambda kernels: f"{COMPILING}7 s")
+    remembered = {}
+    monkeypatch.setattr("boulder_sweep.cli.progress._remember", remembered.__setitem__)
+    code, _, err = sweep(*words, *(["--overwrite"] if words[0] == "run" else []))
     assert code == 0
-    assert "compiling kernels, once on this machine, about 40 s" in err
+    assert f"{COMPILING}7 s" in err
+    assert list(remembered) == ["design" if words[0] == "simulate" else "table"]
+
+
+def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatch, tmp_path):
+    folder = tmp_path / "kernels-1"
+    folder.mkdir()
+    monkeypatch.setattr("boulder_kernels._jit.CACHE_FOLDER", str(folder))
+    assert progress.cold_start("table") == f"{COMPILING}40 s"
+    progress._remember("table", 12.3)
+    assert progress.cold_start("table") == f"{COMPILING}12 s"
+    assert progress.cold_start("design") == f"{COMPILING}20 s"
+    (folder / "lanes.simulate_lanes-343.py311.1.nbc").touch()
+    assert progress.cold_start("table") is None
+    assert progress.cold_start("design") is not None
+
+
+def test_compiled_kernels_are_those_that_are_looked_for():
+    compile_kernels()
+    simulate(crash_test("rwg"))
+    assert progress.cold_start("table") is None
+    assert progress.cold_start("design") is None
+
+
+def test_a_run_ends_with_how_to_read_its_table(sweep, possible_grid):
+    code, out, _ = sweep("run", possible_grid)
+    assert code == 0
     assert max(map(len, out.splitlines())) <= 80
     assert "FROM read_parquet('small-grid.sweep/*.parquet')" in out
     code, _, err = sweep("simulate", possible_grid, "--design", 1, "--trajectory", "one.parquet")

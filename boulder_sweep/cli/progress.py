@@ -1,0 +1,187 @@
+"""What the command line shows on stderr while it works: a bar on a terminal, occasional lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from boulder_sweep.cli.output import say
+from boulder_sweep.text import duration_text, printable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from boulder_sweep.runner.summary import Progress
+
+PLAIN_EVERY_S = 10.0
+"""Time between two lines of progress where there is no terminal."""
+Kernels = Literal["table", "design"]
+COMPILED = {"table": ("lanes.simulate_lanes", 40.0), "design": ("impact.simulate_design", 20.0)}
+"""Kernels for tables, and for one design over time: the function that is compiled last, and seconds where unknown."""
+
+
+def cold_start(kernels: Kernels) -> str | None:
+    """Return what to say before kernels are compiled; None if their compiled code is there.
+
+    Parameters
+    ----------
+    kernels
+        Those for tables, or those for one design over time.
+    """
+    from boulder_kernels._jit import CACHE_FOLDER
+
+    function, seconds = COMPILED[kernels]
+    if CACHE_FOLDER is not None:
+        if next(Path(CACHE_FOLDER).rglob(f"{function}-*.nbc"), None) is not None:
+            return None
+        with suppress(OSError, ValueError):  # no earlier compilation on this machine
+            seconds = float(_remembered(kernels).read_text())
+    return f"compiling kernels, once on this machine, about {max(seconds, 1.0):.0f} s"
+
+
+def _remembered(kernels: Kernels) -> Path:
+    """Return the file with the seconds that the last compilation took, of whatever version of the kernels."""
+    from boulder_kernels._jit import CACHE_FOLDER
+
+    return Path(CACHE_FOLDER or "").parent / f"compilation-of-{kernels}-kernels-in-seconds"
+
+
+@contextmanager
+def working(
+    quiet: bool, kernels: Kernels = "table", doing: str = "simulating"
+) -> Iterator[Callable[[int, int], None] | None]:
+    """Give a function that shows how many rows of how many are done; None where nothing is to be shown.
+
+    Parameters
+    ----------
+    quiet
+        Show nothing.
+    kernels
+        What the work begins with: where these must be compiled, this is said, with a moving bar on a terminal.
+    doing
+        Word beside the bar.
+    """
+    with progress(quiet, Notes(), kernels, doing) as shown:
+        if shown is None:
+            yield None
+            return
+        from boulder_sweep.runner.summary import Progress
+
+        begun = time.monotonic()
+
+        def told(done: int, total: int) -> None:
+            seconds = max(time.monotonic() - begun, 1e-9)
+            left = seconds / done * (total - done) if done else None
+            shown(Progress(done, total, seconds, done / seconds, left))
+
+        yield told
+
+
+@contextmanager
+def progress(
+    quiet: bool, notes: Notes, kernels: Kernels = "table", doing: str = "simulating"
+) -> Iterator[Callable[[Progress], None] | None]:
+    """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere.
+
+    Parameters
+    ----------
+    quiet
+        Show nothing.
+    notes
+        What was shown already.
+    kernels, doing
+        As of `working`.
+    """
+    if quiet:
+        yield None
+        return
+    cold, begun = cold_start(kernels), time.monotonic()
+    if sys.stderr.isatty():
+        with _bar(notes, cold, doing) as (task, show):
+            _compile(kernels, cold)
+            task(doing)
+            yield show
+    else:
+        if cold:
+            say(cold)
+        _compile(kernels, cold)
+        yield _PlainLines(notes)
+    if cold and kernels == "design":
+        _remember(kernels, time.monotonic() - begun)
+
+
+def _compile(kernels: Kernels, cold: str | None) -> None:
+    """Compile the kernels for tables, so that their time does not count as simulation; the others are soon compiled."""
+    if cold and kernels == "table":
+        from boulder_sweep.judge.evaluation import compile_kernels
+
+        begun = time.monotonic()
+        compile_kernels()
+        _remember(kernels, time.monotonic() - begun)
+
+
+def _remember(kernels: Kernels, seconds: float) -> None:
+    """Keep how long a compilation took, for the next version of the kernels."""
+    with suppress(OSError):
+        _remembered(kernels).write_text(f"{seconds:.1f}")
+
+
+class Notes:
+    """The notes of a run that were shown already."""
+
+    def __init__(self) -> None:
+        self._shown = 0
+
+    def new(self, notes: Sequence[str]) -> Sequence[str]:
+        """Return the notes that were not shown yet; they count as shown now."""
+        fresh, self._shown = notes[self._shown :], len(notes)
+        return fresh
+
+
+class _PlainLines:
+    """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
+
+    def __init__(self, notes: Notes) -> None:
+        self.last = time.monotonic()
+        self._notes = notes
+
+    def __call__(self, now: Progress) -> None:
+        for note in self._notes.new(now.notes):
+            say(f"note: {note}")
+        if time.monotonic() - self.last < PLAIN_EVERY_S:
+            return
+        self.last = time.monotonic()
+        left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
+        say(
+            f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} designs, "
+            f"{now.rows_per_second:,.0f} per second{left}"
+        )
+
+
+@contextmanager
+def _bar(
+    notes: Notes, cold: str | None, doing: str
+) -> Iterator[tuple[Callable[[str], None], Callable[[Progress], None]]]:
+    """Show a bar; give what changes the words beside it, and what shows progress."""
+    # rich is for terminals only. It honours NO_COLOR by itself.
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[numbers]}"))
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        # Before the first block is done there is no progress to show; the bar pulses.
+        task = bars.add_task(cold or doing, total=None, numbers="")
+
+        def show(now: Progress) -> None:
+            for note in notes.new(now.notes):
+                bars.console.print(f"note: {printable(note)}", markup=False, highlight=False)
+            left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
+            numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
+            bars.update(task, total=now.rows, completed=now.rows_done, numbers=numbers)
+
+        yield lambda words: bars.update(task, description=words), show
