@@ -9,7 +9,6 @@ strain rate factor does (Eq 27).
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,13 +19,15 @@ from boulder_sweep.answers.draws import Draws, threads
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import Judges, Rows, judges_of
 from boulder_sweep.designs import block_of
-from boulder_sweep.settings.model import PRINTED, SWITCHES, Model, ReadingChoice
+from boulder_sweep.settings.model import PRINTED, SWITCHES, ReadingChoice
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 DRAWN = 512
 """Sampled designs, each simulated with every reading and law."""
+COMPARED = ("kp_squared", "broms")
+"""Laws of the resistance, whichever the settings name."""
 INPUTS, READINGS, LAW, NUMERICAL = "uncertain inputs", "readings of the paper", "K_p² or 3 K_p", "numerical error"
 
 
@@ -53,7 +54,7 @@ def every_reading(sweep: Sweep) -> list[Sweep]:
     """Return a sweep with every combination of the five readings."""
     choices = itertools.product(*((PRINTED, corrected) for corrected in SWITCHES.values()))
     readings = (ReadingChoice(**dict(zip(SWITCHES, own, strict=True))) for own in choices)
-    return [replace(sweep, model=Model(own, sweep.model.soil_elements)) for own in readings]
+    return [replace(sweep, model=replace(sweep.model, readings=own)) for own in readings]
 
 
 def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = None) -> list[Doubt]:
@@ -89,10 +90,9 @@ def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = N
     index = np.zeros(DRAWN, dtype=np.int64)
     margins = np.empty((2 ** len(SWITCHES), 2, DRAWN))
     for place, own in enumerate(every_reading(sweep)):
-        for law in range(2):
-            judges = judges_of(own)
-            draws = Draws(rows, _Law(spread, bool(law)), judges, threads(jobs))
-            margins[place, law] = draws.distance(index, z)
+        for law, resistance in enumerate(COMPARED):
+            judges = judges_of(replace(own, model=replace(own.model, resistance=resistance)))
+            margins[place, law] = Draws(rows, spread, judges, threads(jobs)).distance(index, z)
     return [*parted(margins), Doubt(NUMERICAL, *(2 * [_numerical(sweep, spread, rows, z, judges_of(sweep), margins)]))]
 
 
@@ -105,22 +105,6 @@ def parted(margins: np.ndarray) -> list[Doubt]:
         alone, total = margins.mean(axis=others).var(), margins.var(axis=axis).mean()
         found.append(Doubt(cause, *(float(own / variance) if variance > 0.0 else 0.0 for own in (alone, total))))
     return found
-
-
-class _Law(Spread):
-    """Uncertain inputs, with the soil resistance by one of two laws."""
-
-    def __init__(self, spread: Spread, broms: bool) -> None:
-        self.distributions, self.correlation = spread.distributions, spread.correlation
-        self.broms = broms
-
-    def filled(self, given: Rows, z: np.ndarray) -> Rows:
-        """Return designs with sampled inputs, and the factor on the resistance of the soil."""
-        found = super().filled(given, z)
-        if self.broms:
-            K_p = np.tan(math.pi / 4.0 + np.radians(found["friction_angle_deg"]) / 2.0) ** 2
-            found["strain_rate_factor"] = found["strain_rate_factor"] * 3.0 / K_p
-        return found
 
 
 def _numerical(sweep: Sweep, spread: Spread, rows: Rows, z: np.ndarray, judges: Judges, margins: np.ndarray) -> float:

@@ -22,7 +22,7 @@ from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.settings.model import Model, ReadingChoice
+from boulder_sweep.settings.model import ReadingChoice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -244,7 +244,7 @@ def _question(
 def other_readings(sweep: Sweep) -> Sweep:
     """Return the sweep with the other preset of readings: as printed where it is corrected, else corrected."""
     preset = "as_printed" if sweep.model.preset == "corrected" else "corrected"
-    return replace(sweep, model=Model(ReadingChoice.of_preset(preset), sweep.model.soil_elements))
+    return replace(sweep, model=replace(sweep.model, readings=ReadingChoice.of_preset(preset)))
 
 
 def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: int) -> tuple[pa.Table, int]:

@@ -67,6 +67,10 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
     return lines
 
 
+OTHER_LAW = {"broms": "3 K_p for K_p^2", "kp_squared": "K_p^2 for this law"}
+"""Law of the soil's resistance that the verdicts are compared with, in words."""
+
+
 def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
     """Return how firm the verdicts are, from a sample of the designs; nothing if it was not found out."""
     if not firmness:
@@ -82,7 +86,7 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
         f"firm?  sample of {sample}: {exact}",
         f"       verdicts changed by the other reading of the paper {changed['reading']:.1%},",
         f"       by 1 deg of friction angle {changed['friction_angle']:.1%}, 5 % of speed {changed['speed']:.1%}, "
-        f"3 K_p for K_p^2 {changed['resistance']:.1%}",
+        f"{OTHER_LAW[firmness.get('other_resistance', 'broms')]} {changed['resistance']:.1%}",
     ]
     if firmness["passes"]:
         shares = {name: count / firmness["passes"] for name, count in flags.items()}

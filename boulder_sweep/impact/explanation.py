@@ -116,7 +116,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         raise OtherVersionError(folder, why, version_of({"identity": there})) from unfamiliar
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
-    judged = Evaluation(readings, control, limits)(block)
+    judged = Evaluation(readings, control, limits, resistance=sweep.model.resistance)(block)
     again = part_table(block, judged, {}).to_pylist()[0]
     computable = not block.reasons[0]
     return Explanation(
@@ -139,7 +139,9 @@ def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], contr
         axes=(),
         constants={name: float(value) for name, value in inputs.items() if value is not None},
         criterion=Criterion(**settings["criterion"]),
-        model=Model(readings, control.elements, settings["model"]["calibrated_crush_m"]),
+        model=Model(
+            readings, control.elements, settings["model"]["calibrated_crush_m"], settings["model"]["resistance"]
+        ),
         solver=SolverSettings(
             accuracy=None,
             step_s=step_s,

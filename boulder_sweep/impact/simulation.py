@@ -112,7 +112,7 @@ def simulate(
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    designs = designs_of(block)
+    designs = designs_of(block, None, sweep.model.resistance)
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     decided = evaluation.judged(designs)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def base_reaction(trajectory: Trajectory) -> np.ndarray:
-    """Return the upward force of the ground that the planar motion takes for granted [N], shape (n,).
+    """Return the upward force of the ground that the planar motion takes for granted [N], shape (n,) (Eq 104).
 
     The centre of a box that turns about a lower corner stands at f = L/2 sin|theta| + H/2 cos(theta) over it, so the
     ground must push with N = m_b (g + f''), f'' = (L/2 cos - H/2 sin|theta|) alpha - (L/2 sin|theta| + H/2 cos) omega^2

@@ -18,6 +18,7 @@ from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
+from boulder_sweep.settings.model import RESISTANCES
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -56,6 +57,8 @@ class Evaluation:
         Function that simulates a table of designs.
     only
         Outcome columns wanted, verdict and reason among them; all of the table where empty.
+    resistance
+        Law of the ultimate resistance of the soil.
     """
 
     readings: Readings
@@ -63,6 +66,7 @@ class Evaluation:
     limits: Limits
     simulate: Simulate = by_kernels
     only: tuple[str, ...] = ()
+    resistance: str = RESISTANCES[0]
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -78,13 +82,13 @@ class Evaluation:
             n rows, in the same order.
         """
         if not block.reasons.any:
-            return self.judged(designs_of(block))
+            return self.judged(designs_of(block, None, self.resistance))
         codes = np.asarray(block.reasons.codes)
         computable = codes == 0
         refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1)
         if not computable.any():
             return joined([refused])
-        both = joined([self.judged(designs_of(block, computable)), refused])
+        both = joined([self.judged(designs_of(block, computable, self.resistance)), refused])
         # In `both` the refused rows follow the others; restore the order of the block.
         place = np.empty(len(codes), dtype=np.int64)
         place[computable] = np.arange(computable.sum())
@@ -167,6 +171,7 @@ def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kern
         control=control_of(sweep, accuracy),
         limits=limits_of(sweep),
         simulate=simulate,
+        resistance=sweep.model.resistance,
     )
 
 

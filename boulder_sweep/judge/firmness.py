@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import DesignTable, Readings, as_printed, corrected
-from boulder_kernels.design import passive_pressure_coefficient
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, sampled_designs, simulated
 from boulder_sweep.judge.refinement import reported_step_s
+from boulder_sweep.judge.resistance import with_law
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.judge.verdict import judge
 
@@ -44,7 +44,7 @@ CHANGES = {
     "reading": "the other reading of the paper",
     "friction_angle": f"{ANGLE_DEG:g} deg of friction angle either way",
     "speed": f"{SPEED:.0%} of speed either way",
-    "resistance": "3 K_p in place of K_p^2",
+    "resistance": "3 K_p in place of K_p^2, or the reverse where another law is chosen",
 }
 """What is changed, by its name in the result."""
 
@@ -65,6 +65,8 @@ class Firmness:
         Passes of the sample.
     flags : dict of str to int
         Passes of the sample with each flag of `boulder_sweep.judge.validity`; under ``""`` those without any.
+    other_resistance : str
+        Law of the soil's resistance that ``resistance`` stands for.
     """
 
     designs: int
@@ -73,6 +75,7 @@ class Firmness:
     numerical_error_m: float | None
     passes: int
     flags: dict[str, int] = field(default_factory=dict)
+    other_resistance: str = "broms"
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -91,6 +94,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     designs, limits = sampled_designs(sweep, count), evaluation.limits
     control, readings = evaluation.control._replace(elements=0), evaluation.readings
+    law = sweep.model.resistance
     other = as_printed() if readings == corrected() else corrected()
 
     def verdicts(table: DesignTable, read: Readings) -> Judged:
@@ -110,7 +114,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
             (table._replace(phi=table.phi + math.radians(ANGLE_DEG)), readings),
         ],
         "speed": [(table._replace(v_0=table.v_0 * factor), readings) for factor in (1.0 - SPEED, 1.0 + SPEED)],
-        "resistance": [(table._replace(K_epsilon=table.K_epsilon * 3.0 / _passive(table.phi)), readings)],
+        "resistance": [(with_law(table, other_law(law), law), readings)],
     }
     changed = {}
     for name, tables in variants.items():
@@ -125,7 +129,13 @@ def firmness_of(sweep: Sweep) -> Firmness:
         **_numerical_errors(designs, readings, control),
         passes=int(passes.sum()),
         flags=flag_counts(words.items()),
+        other_resistance=other_law(law),
     )
+
+
+def other_law(law: str) -> str:
+    """Return the law of the soil's resistance that a table is compared with."""
+    return "broms" if law == "kp_squared" else "kp_squared"
 
 
 def _numerical_errors(designs: Designs, readings: Readings, control: Control) -> dict[str, float | None]:
@@ -142,8 +152,3 @@ def _numerical_errors(designs: Designs, readings: Readings, control: Control) ->
             # Rounded so that a processor that differs in the last bits finds the same.
             error_deg, error_m = (float(f"{np.quantile(values, QUANTILE, method='higher'):.2g}") for values in of_all)
     return {"numerical_error_deg": error_deg, "numerical_error_m": error_m}
-
-
-def _passive(phi: np.ndarray) -> np.ndarray:
-    """Coefficient of passive earth pressure K_p of every angle [rad]."""
-    return np.array([passive_pressure_coefficient(angle) for angle in phi.tolist()])

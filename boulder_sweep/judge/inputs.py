@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_kernels import DesignTable
+from boulder_sweep.judge.resistance import with_law
+from boulder_sweep.settings.model import RESISTANCES
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -50,7 +52,7 @@ class Designs(NamedTuple):
         return Designs(table, self.bed_offset[chosen])
 
 
-def designs_of(block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
+def designs_of(block: DesignBlock, rows: np.ndarray | None = None, resistance: str = RESISTANCES[0]) -> Designs:
     """Return the designs of a block.
 
     Parameters
@@ -59,10 +61,12 @@ def designs_of(block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
         Inputs of n rows under the names and units of the table.
     rows
         Which of them (bool, shape (n,)); all by default.
+    resistance
+        Law of the ultimate resistance of the soil.
     """
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
-    return Designs(DesignTable(**columns), _values(block, "bed_offset_m", rows))
+    return Designs(with_law(DesignTable(**columns), resistance), _values(block, "bed_offset_m", rows))
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

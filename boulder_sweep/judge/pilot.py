@@ -92,7 +92,7 @@ def pilot_size(elements: int) -> int:
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
     """Return about this many designs of a sweep, without those that cannot be computed."""
     block = sweep.plan.selection(sampled_rows(sweep, count))
-    return designs_of(block, np.asarray(block.reasons.codes) == 0)
+    return designs_of(block, np.asarray(block.reasons.codes) == 0, sweep.model.resistance)
 
 
 def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:

@@ -26,7 +26,7 @@ def side_friction(table: DesignTable) -> np.ndarray:
 
 
 def blow_lift(F_v: np.ndarray, table: DesignTable) -> np.ndarray:
-    """Return how strongly blows lift n boulders, as a share of what holds them down, shape (n,).
+    """Return how strongly blows lift n boulders, as a share of what holds them down, shape (n,) (Eq 103).
 
     The moment of the blow about the far lower corner turns the box with the angular acceleration
     F_v (e + d) / (m_b (L^2 + H^2) / 3), and its centre rises with L/2 times that. The force this takes over weight

@@ -79,6 +79,7 @@ def page_data(
             if spec.name in OUTCOME_WORDS
         ],
         "start": dict(start),
+        "resistance": settings["model"]["resistance"],
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": REASONS,
         "words": REASON_WORDS,
@@ -239,6 +240,6 @@ def _yaml(settings: Mapping[str, Any]) -> list[str]:
     return [
         f"criterion: {{max_rotation: {criterion['max_rotation_deg']} deg, rating: {criterion['rating']}, "
         f"min_overlap: {criterion['min_overlap_m']} m}}",
-        f"model: {{readings: {readings}, soil: {soil}}}",
+        f"model: {{readings: {readings}, soil: {soil}, resistance: {model['resistance']}}}",
         f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",
     ]

@@ -8,7 +8,15 @@ from typing import Any
 from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.fields import BY_NAME, MAX_ELEMENTS, Field
 from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
-from boulder_sweep.settings.model import ACCURACIES, CLOSED_FORM, PRESETS, PRINTED, SWITCHES, ReadingChoice
+from boulder_sweep.settings.model import (
+    ACCURACIES,
+    CLOSED_FORM,
+    PRESETS,
+    PRINTED,
+    RESISTANCES,
+    SWITCHES,
+    ReadingChoice,
+)
 from boulder_sweep.settings.numbers import NumberError, read_count, split_number
 from boulder_sweep.settings.problems import did_you_mean, shorten
 from boulder_sweep.settings.tree import Mapping, Node, Scalar
@@ -85,6 +93,10 @@ def _read_soil(node: Node) -> int:
     raise _wrong(node, f"{_shown(node)} is not a representation of the soil: closed_form, or {{elements: 5000}}")
 
 
+def _read_resistance(node: Node) -> str:
+    return _one_of(node, RESISTANCES, "a law of the soil's resistance")
+
+
 def _read_accuracy(node: Node) -> str | float:
     """Read a name, or the error of the rotation that is admitted."""
     field = BY_NAME["accuracy"]
@@ -105,6 +117,7 @@ _READERS: dict[str, Callable[[Node], Any]] = {
     "rating": _read_rating,
     "readings": _read_readings,
     "soil_elements": _read_soil,
+    "resistance": _read_resistance,
     "accuracy": _read_accuracy,
 }
 """Readers by name; an entry without one is a single number within its admitted range."""

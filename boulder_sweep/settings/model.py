@@ -18,6 +18,8 @@ SWITCHES: dict[str, str] = {
 PRINTED = "printed"
 ACCURACIES = ("fast", "balanced", "fine")
 CLOSED_FORM = "closed_form"
+RESISTANCES = ("kp_squared", "broms", "width_capped")
+"""Laws of the ultimate resistance of the soil; the first is the paper's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +92,14 @@ class Model:
         Number of soil elements; 0 means the closed form, the limit of infinitely many.
     calibrated_crush_m : float
         Crush up to which spring and damper describe the vehicle's front [m].
+    resistance : str
+        Law of the ultimate resistance of the soil, one of `RESISTANCES`.
     """
 
     readings: ReadingChoice = ReadingChoice()
     soil_elements: int = 0
     calibrated_crush_m: float = 1.0
+    resistance: str = RESISTANCES[0]
 
     @property
     def preset(self) -> str:

@@ -212,6 +212,7 @@ class Sweep:
                 "readings": self.model.readings.as_dict(),
                 "soil": self.model.soil_elements or CLOSED_FORM,
                 "calibrated_crush_m": self.model.calibrated_crush_m,
+                "resistance": self.model.resistance,
             },
             "solver": {
                 "accuracy": accuracy if isinstance(accuracy, str) else None,

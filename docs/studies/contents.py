@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import answers, energy, uplift
+from docs.studies import answers, energy, soil, uplift
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -147,6 +147,14 @@ def _validity_shares(root: Path) -> str:
     return flags_of_grids(root / GRID).markdown()
 
 
+def _soil_tests(_: Path) -> str:
+    return soil.tests_table().markdown()
+
+
+def _soil_grid(root: Path) -> str:
+    return soil.grid_table(root / GRID).markdown()
+
+
 def _uplift_tests(_: Path) -> str:
     return uplift.tests_table().markdown()
 
@@ -175,6 +183,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "box-shares": _box_shares,
     "validity-flags": _validity_flags,
     "validity-shares": _validity_shares,
+    "soil-tests": _soil_tests,
+    "soil-grid": _soil_grid,
     "uplift-tests": _uplift_tests,
     "uplift-grid": _uplift_grid,
     "settings-entries": _settings_entries,

@@ -17,6 +17,7 @@ from boulder_sweep.settings.model import (
     CLOSED_FORM,
     PRESETS,
     PRINTED,
+    RESISTANCES,
     SWITCHES,
 )
 from boulder_sweep.settings.units import EXPECTED
@@ -161,6 +162,7 @@ _FORMS: dict[str, Schema] = {
             _object({"elements": {"type": "integer", "minimum": 1, "maximum": MAX_ELEMENTS}}, ("elements",)),
         ]
     },
+    "resistance": _words(*RESISTANCES),
     "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
 }
 """Entries that are more than a quantity."""

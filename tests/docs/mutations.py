@@ -20,6 +20,9 @@ _VEHICLE, _RESTORING = "kernels/boulder_kernels/vehicle.py", "kernels/boulder_ke
 _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS = "boulder_sweep/designs.py"
+_RESISTANCE, _LIFT, _UPLIFT = (
+    f"boulder_sweep/{name}.py" for name in ("judge/resistance", "judge/uplift", "impact/uplift")
+)
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return 0.25 * math.pi + 0.5 * phi", "return 0.25 * math.pi - 0.5 * phi"),
@@ -74,4 +77,10 @@ MUTATIONS = (
     Mutation((52,), _DYNAMICS, "s.net * M + couple_moment", "M + couple_moment"),
     Mutation((53, 54, 55), _TRAJECTORY, "+ up * np.sin(theta)", "- up * np.sin(theta)"),
     Mutation((53, 54, 55), _TRAJECTORY, "x_b - along *", "x_b + along *"),
+    Mutation((101,), _RESISTANCE, "return 3.0 * passive_coefficient", "return 2.0 * passive_coefficient"),
+    Mutation((102,), _RESISTANCE, "5.0 * table.W / table.d", "5.0 * table.d / table.W"),
+    Mutation((102,), _RESISTANCE, "np.minimum(K_p**2, K_p * R)", "K_p * R"),
+    Mutation((103,), _LIFT, "(table.L**2 + table.H**2)", "(table.L**2 - table.H**2)"),
+    Mutation((103,), _LIFT, "table.d**2 * table.L", "table.d**2 * table.W"),
+    Mutation((104,), _UPLIFT, "- (across + over) * omega**2", "+ (across + over) * omega**2"),
 )

@@ -10,7 +10,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-EQUATIONS = range(1, 56)
+EQUATIONS = (*range(1, 56), *range(101, 105))
+"""Those of the paper, and those added to it."""
 WAYS = ("implemented", "derived", "explained")
 SWITCHES = ("inertia", "impact_arm", "contact", "restoring", "separation")
 _ROW = re.compile(r"^\| (\d+) \|(.*)\|$", re.MULTILINE)

@@ -33,6 +33,8 @@ class Inputs:
         Spring [N/m] and damper [N s/m] of the vehicle's Maxwell element, Eqs 40 and 41.
     K_epsilon : float
         Strain-rate factor on the ultimate soil pressure, Eq 27.
+    resistance : {'kp_squared', 'broms', 'width_capped'}
+        Law of the ultimate soil pressure: Eq 27, or one of the two that are not the paper's.
     """
 
     L: float
@@ -49,6 +51,7 @@ class Inputs:
     k_v: float
     c_v: float
     K_epsilon: float = 1.0
+    resistance: str = "kp_squared"
 
 
 CORRECTED_NAMES = {

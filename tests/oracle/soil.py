@@ -7,7 +7,7 @@ formulas serve the sum over N elements (all of height d/N) and the quadrature no
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, pi, tan
+from math import inf, pi, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,10 +77,21 @@ def spring_constants(inputs: Inputs, alpha: Array, height: Array) -> Array:
     return 1e6 * inputs.beta * inputs.d * inputs.W / L_soil_c * (height / inputs.d) * alpha
 
 
+def lateral_coefficient(inputs: Inputs) -> float:
+    """Ultimate pressure over the vertical stress: K_p^2 of Eq 27, Broms' 3 K_p, or at most a wide wall's."""
+    K_p = (1 + sin(inputs.phi)) / (1 - sin(inputs.phi))
+    if inputs.resistance == "broms":
+        return 3 * K_p
+    if inputs.resistance == "width_capped":
+        K_a, slenderness = 1 / K_p, inputs.W / inputs.d
+        beside = (K_p - K_a) ** 0.67 * 1.6 / (1 + 5 * slenderness)
+        return min(K_p * K_p, K_p + K_p * beside)
+    return K_p * K_p
+
+
 def ultimate_forces(inputs: Inputs, alpha: Array, height: Array) -> Array:
     """Largest force F_u,n [N] each spring can give, Eqs 27 and 28, with d/N = height."""
-    K_p = tan(pi / 4 + inputs.phi / 2) ** 2
-    sigma_n = K_p**2 * inputs.rho_s * GRAVITY * alpha * inputs.K_epsilon  # Eq 27
+    sigma_n = lateral_coefficient(inputs) * inputs.rho_s * GRAVITY * alpha * inputs.K_epsilon  # Eq 27
     return sigma_n * inputs.W * height
 
 

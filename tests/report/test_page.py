@@ -9,6 +9,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.report import example, write_explorer, write_report
+from boulder_sweep.settings.model import RESISTANCES
 from tests.report.conftest import GRID, SETS
 
 pytestmark = pytest.mark.slow  # these need Chromium, which not every machine has
@@ -259,6 +260,17 @@ def test_a_printed_reading_and_soil_elements_are_said(tmp_path, opened):
     assert "Readings: as printed." in text
     assert "50 soil elements" in text
     assert "strongly discouraged" in text
+
+
+@pytest.mark.parametrize("law", RESISTANCES[1:])
+def test_a_law_of_the_resistance_acts_in_the_simulator_and_is_copied(tmp_path, opened, law):
+    sweep = boulder_sweep.load("configs/rwg.yaml", [f"model.resistance={law}"])
+    page = opened(write_explorer(sweep, 0, tmp_path / "law.html"))
+    found = page.evaluate("page.simulator.whole(page.design).judged")
+    theirs = boulder_sweep.simulate(sweep).summary()
+    assert found["max_rotation_deg"] == pytest.approx(theirs["max_rotation_deg"], rel=1e-9)
+    assert found["verdict"] == theirs["verdict"] == "fail"
+    assert f"resistance: {law}" in page.content()
 
 
 def test_print_has_every_section_and_no_switches(report, opened):

@@ -7,6 +7,19 @@ const BEFORE_THE_END = 1 - 1e-14;
 /** Columns that `sweep simulate`, which goes on beyond the limit, takes from a row of `sweep run`, which stops there. */
 const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"];
 
+/**
+ * The coefficient of a law of the soil's ultimate resistance over the paper's: `boulder_sweep.judge.resistance`.
+ * @param {string} law
+ * @param {KernelDesign} design
+ * @returns {number}
+ */
+function resistanceFactor(law, { phi, W, d }) {
+  const K_p = Math.tan(Math.PI / 4 + phi / 2) ** 2;
+  if (law === "broms") return 3 / K_p;
+  if (law === "width_capped") return Math.min(1, (1 + (1.6 * (K_p - 1 / K_p) ** 0.67) / (1 + (5 * W) / d)) / K_p);
+  return 1;
+}
+
 /** Designs by the columns of the table in, judged rows and motions out. */
 class Simulator {
   /** @param {any} data of the page @param {Kernel} kernel */
@@ -29,13 +42,15 @@ class Simulator {
    * @returns {KernelDesign}
    */
   kernelDesign(inputs) {
-    const { layout } = this.data;
-    return Object.fromEntries(
+    const { layout, resistance } = this.data;
+    /** @type {KernelDesign} */
+    const design = Object.fromEntries(
       layout.design.map((/** @type {string} */ field) => {
         const value = inputs[layout.columns[field]];
         return [field, field === "phi" ? value / DEGREES : value];
       }),
     );
+    return { ...design, K_epsilon: design.K_epsilon * resistanceFactor(resistance, design) };
   }
 
   /**
