@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from ._jit import kernel
 from .design import Constants, Design, constants_of, is_computable
-from .impact import Control, Outcome, failed, first_step, no_record, simulate_by_steps, simulate_design
+from .impact import Control, Outcome, Record, failed, first_step, simulate_by_steps, simulate_design
 from .outcomes import Status
 from .readings import Readings
 from .stability import ACCEPTED, Rates, rates_of, stable_step
@@ -53,7 +53,7 @@ def longest_step(theta_limit: float, c: Constants) -> float:
 
 
 @kernel
-def simulate_patiently(design: Design, readings: Readings, control: Control) -> Outcome:
+def simulate_patiently(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
 
     Parameters
@@ -64,18 +64,20 @@ def simulate_patiently(design: Design, readings: Readings, control: Control) -> 
         Which formulas are read as printed.
     control
         As of `boulder_kernels.impact.simulate_design`.
+    record
+        A record that keeps nothing.
     """
     c = constants_of(design, readings, control.elements)
     if design.H - design.d <= design.e_bumper or not is_computable(c):
-        return simulate_design(design, readings, control, no_record())
+        return simulate_design(design, readings, control, record)
     _, status = first_step(control, control.theta_limit, c)
     if status == ACCEPTED:
-        return simulate_design(design, readings, control, no_record())
+        return simulate_design(design, readings, control, record)
     factor = spring_to_follow(rates_of(control.theta_limit, c), control)
     c = constants_of(with_spring(design, factor), readings, control.elements)
     apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)
     part = 0.5 if control.halved else 1.0
     h = part * min(control.h, RESOLVED * longest_step(control.theta_limit, c))
     h_apart = part * min(control.h, longest_step(control.theta_limit, apart)) if readings.separation_released else h
-    found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, no_record())
+    found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record)
     return failed(status) if found.status == Status.STEP_BUDGET.value else found

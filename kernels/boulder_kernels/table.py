@@ -31,12 +31,12 @@ def simulate_rows(designs: np.ndarray, readings: Readings, control: Control) -> 
     return out
 
 
-@kernel
+@array_kernel
 def simulate_rows_patiently(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
     """The same for designs that need more steps than are allowed, see `boulder_kernels.patience`."""
     out = empty_outcomes(designs.shape[1])
     for row in range(designs.shape[1]):
-        write_outcome(out, row, simulate_patiently(design_in(designs, row), readings, control))
+        write_outcome(out, row, simulate_patiently(design_in(designs, row), readings, control, no_record()))
     return out
 
 
