@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 _LONGEST_LINE = 200
+NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 
 
 def size_text(size: float) -> str:
@@ -29,7 +30,7 @@ def duration_text(seconds: float) -> str:
 
 def printable(text: str) -> str:
     """Escape what a terminal or a log would act on: control characters, line breaks, invisible marks of direction."""
-    return "".join(character if character.isprintable() else _escaped(character) for character in text)
+    return "".join(one if one.isprintable() or one == NO_BREAK_SPACE else _escaped(one) for one in text)
 
 
 def _escaped(character: str) -> str:

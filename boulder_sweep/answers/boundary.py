@@ -9,6 +9,7 @@ a line, is missed.
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
 from boulder_sweep.settings.fields import EMBEDMENT
+from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 
 MOST_CELLS = 20_000_000
 AT_ONCE = 2048
+MAP = "boulder_sweep.boundary"
+"""Name of the file's writer in its metadata."""
 WORSE_UPWARDS = ("impact_speed_m_s", "vehicle_mass_kg", "impact_height_m")
 """Inputs for which small values pass."""
 UNKNOWN = -1
@@ -88,6 +92,8 @@ class Boundary:
         block = self.sweep.block(0, self.sweep.n_designs)
         columns: dict[str, Any] = {"design_id": block.design_id()}
         columns |= {name: block.columns[name].to_numpy() for name in INPUT_COLUMNS}
+        for name, label in block.labels.items():
+            columns[name] = pd.Categorical.from_codes(label.codes, list(label.words))
         columns["verdict"] = pd.Categorical.from_codes(self.verdict, list(VERDICTS))
         columns["reason"] = pd.Categorical.from_codes(self.reason, list(REASONS))
         return pd.DataFrame(columns | {"simulated": self.simulated})
@@ -103,8 +109,14 @@ class Boundary:
         import pyarrow as pa
 
         from boulder_sweep.answers.tables import write_parquet
+        from boulder_sweep.store.provenance import file_metadata, identity
 
-        return write_parquet(pa.Table.from_pandas(self.frame, preserve_index=False), path)
+        judges = judges_of(self.sweep)
+        own = judges.own
+        found = identity(self.sweep.resolved(), *own.settings(), judges.accuracy.to_dict())
+        table = pa.Table.from_pandas(self.frame, preserve_index=False)
+        metadata = (table.schema.metadata or {}) | file_metadata(found, MAP)
+        return write_parquet(table.replace_schema_metadata(metadata), path)
 
     def plot(self, path: str | Path, **shown: Any) -> None:
         """Draw the map as ``sweep plot`` draws a result; keywords as of `boulder_sweep.views.verdict_map`.
@@ -114,7 +126,8 @@ class Boundary:
         PictureError
             It cannot be drawn.
         """
-        draw("verdict_map", "draw_verdict_map", self.frame, path, title=self.sweep.name, **shown)
+        sets = {axis.name: axis.labels for axis in self.sweep.axes if axis.labels}
+        draw("verdict_map", "draw_verdict_map", self.frame, path, title=self.sweep.name, sets=sets, **shown)
 
 
 def boundary(sweep: Sweep, *, jobs: int | None = None) -> Boundary:
@@ -158,6 +171,34 @@ def _without_overlap(found: Boundary) -> Boundary:
         verdict=np.where(slight, UNDECIDED, found.verdict).astype(np.int8),
         reason=np.where(slight, OVERRIDE, found.reason).astype(np.int8),
     )
+
+
+def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Read a map that `Boundary.write` wrote.
+
+    Returns
+    -------
+    frame : DataFrame
+        One row a design.
+    settings : dict
+        The resolved settings of the grid.
+
+    Raises
+    ------
+    QuestionError
+        The file is no such map, or cannot be read.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowException) as problem:
+        raise QuestionError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+    settings = (table.schema.metadata or {}).get(b"boulder_sweep.settings")
+    if settings is None or not {"verdict", "reason", "simulated"} <= set(table.column_names):
+        raise QuestionError(f"{path} is neither the folder of a run nor a file that `sweep boundary` wrote")
+    return table.to_pandas(), json.loads(settings)
 
 
 class _Lines:

@@ -112,15 +112,15 @@ class Need:
 
         return write_parquet(self.arrow, path)
 
-    def plot(self, path: str | Path) -> None:
-        """Draw a design chart: the answer over the size of the boulder, one curve for each soil.
+    def plot(self, path: str | Path, *, units: str = "si") -> None:
+        """Draw a design chart in ``si`` or ``us`` units: the answer over the size of the boulder, one curve a soil.
 
         Raises
         ------
         PictureError
             It cannot be drawn.
         """
-        draw("design_chart", "draw_design_chart", self, path)
+        draw("design_chart", "draw_design_chart", self, path, units=units)
 
 
 def need(

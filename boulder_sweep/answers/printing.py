@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import BOULDER_MASS
 from boulder_sweep.answers.lightest import SIDES
+from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.shown_units import shown_unit
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -58,7 +60,7 @@ Cell = Callable[[Row], str]
 Column = tuple[tuple[str, str], Cell]
 
 
-def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:
+def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
     """Return the answers as lines.
 
     Parameters
@@ -76,8 +78,8 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES) -> list[s
         Header, one line for each row, and a legend.
     """
     count = len(need)
-    rows = _shown_rows(need.arrow, most)
-    lines = table_lines(need_columns(need), rows, width)
+    rows = _shown_rows(need.arrow, most, units)
+    lines = table_lines(need_columns(need, units), rows, width)
     if count > most:
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
     occurring = {row[name] for row in rows for name in row if name.startswith("found")}
@@ -85,14 +87,14 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES) -> list[s
     return lines
 
 
-def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:
+def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
     """Return probabilities as lines: varying inputs, verdict at the means, probability, most influential input.
 
     Parameters as of `need_lines`. For a single design, its Sobol indices follow.
     """
     count = len(found)
-    rows = _shown_rows(found.arrow, most)
-    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given])
+    rows = _shown_rows(found.arrow, most, units)
+    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
     columns += [
         (("at the", "means"), lambda row: str(row["verdict"])),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
@@ -131,19 +133,19 @@ def _share(value: float) -> str:
     return f"{value:.1%}" if value >= 5e-4 else "< 0.05%"
 
 
-def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES) -> list[str]:
+def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
     """Return what designs withstand as lines: varying inputs, verdict, each value and its distance from the design.
 
     Parameters are those of `need_lines`.
     """
     count = len(found)
-    rows = _shown_rows(found.arrow, most)
-    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given])
+    rows = _shown_rows(found.arrow, most, units)
+    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
     columns.append((("verdict", ""), lambda row: str(row["verdict"])))
     for head, column, own, decimals in (
-        (("speed", "m/s"), "withstands_speed_m_s", "impact_speed_m_s", 2),
-        (("truck", "kg"), "withstands_mass_kg", "vehicle_mass_kg", 0),
-        (("φ′", "deg"), "withstands_friction_angle_deg", "friction_angle_deg", 2),
+        (_head("impact_speed_m_s", units), "withstands_speed_m_s", "impact_speed_m_s", 2),
+        (_head("vehicle_mass_kg", units), "withstands_mass_kg", "vehicle_mass_kg", 0),
+        (_head("friction_angle_deg", units), "withstands_friction_angle_deg", "friction_angle_deg", 2),
     ):
         columns.append((head, _withstood(column, own, decimals)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
@@ -184,31 +186,45 @@ def _index_lines(found: Uncertainty, width: int) -> list[str]:
     return table_lines(columns, found.indices.to_pylist(), width)
 
 
-def _shown_rows(table: pa.Table, most: int) -> list[Row]:
+def _head(name: str, units: str) -> tuple[str, str]:
+    """Return name and unit over the column of an input."""
+    word, unit = HEADS[name]
+    if units == "si" or name not in COLUMNS:
+        return word, unit
+    return word, shown_unit(COLUMNS[name].unit, units).unit
+
+
+def _shown_rows(table: pa.Table, most: int, units: str) -> list[Row]:
     """Return the rows of a table to show: all, or evenly spaced ones."""
     count = len(table)
     places = range(count) if count <= most else [place * (count - 1) // (most - 1) for place in range(most)]
-    return [table.slice(place, 1).to_pylist()[0] for place in places]
+    rows = [table.slice(place, 1).to_pylist()[0] for place in places]
+    if units == "si":
+        return rows
+    named = ((field.name, (field.metadata or {}).get(b"unit", b"").decode()) for field in table.schema)
+    sizes = {name: shown_unit(unit, units).size for name, unit in named}
+    return [{n: value / sizes[n] if isinstance(value, float) else value for n, value in row.items()} for row in rows]
 
 
-def need_columns(need: Need) -> list[Column]:
+def need_columns(need: Need, units: str = "si") -> list[Column]:
     """Return the columns of a terminal table: varying inputs, the answer, and what follows from it."""
     key = need.key
     open_ = (key.name, *need.derived)
-    columns = _leading(need.sweep, need.arrow, [name for name in HEADS if name not in open_])
+    unit, size = (key.field.unit, 1.0) if units == "si" else shown_unit(key.field.unit, units)
+    columns = _leading(need.sweep, need.arrow, [name for name in HEADS if name not in open_], units)
     if key.name == BOULDER_MASS.name:
-        columns.append((("mass", "kg"), _answer(key, "")))
-        columns += [(HEADS[name], _size(name)) for name in (*SIDES, "embedment_depth_m")]
+        columns.append((("mass", unit), _answer(key, "", size)))
+        columns += [(_head(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]
         columns.append((("margin", ""), _margin))
-        return columns + [((SHORT[name], key.field.unit), _answer(key, f"_{name}")) for name in need.others]
-    columns.append((HEADS[key.name], _answer(key, "")))
+        return columns + [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
+    columns.append((_head(key.name, units), _answer(key, "", size)))
     if key.name == "embedment_depth_m":
         columns.append((("ratio", "d/H"), _ratio))
-        columns.append((("above", "m"), _above_ground))
-    columns += [(("mass", "t"), _mass), (("margin", ""), _margin)]
+        columns.append((("above", unit), _above_ground))
+    columns += [_mass(units), (("margin", ""), _margin)]
     if "p_pass" in need.arrow.column_names:
         columns[-1] = (("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}")
-    columns += [((SHORT[name], key.field.unit), _answer(key, f"_{name}")) for name in need.others]
+    columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
     return columns
 
 
@@ -225,12 +241,12 @@ def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> l
     return [*lines[:2], "  ".join("─" * own for own in widths), *lines[2:]]
 
 
-def _leading(sweep: Sweep, table: pa.Table, names: Sequence[str]) -> list[Column]:
+def _leading(sweep: Sweep, table: pa.Table, names: Sequence[str], units: str) -> list[Column]:
     """Return the columns that tell rows apart: names of sets, and inputs that vary; the numbers of listed designs."""
     labels: list[Column] = [((name, ""), _word(name)) for name in sweep.plan.labels]
     if sweep.table is not None:
         return [*labels, (("design", ""), lambda row: str(row["design_id"]))]
-    return labels + [(HEADS[name], _number(name)) for name in names if _varies(table, name)]
+    return labels + [(_head(name, units), _number(name)) for name in names if _varies(table, name)]
 
 
 def _word(name: str) -> Cell:
@@ -251,9 +267,9 @@ def _size(name: str) -> Cell:
     return lambda row: "" if row["passes_at"] is None else f"{row[name]:.3f}"
 
 
-def _answer(key: Key, suffix: str) -> Cell:
+def _answer(key: Key, suffix: str, size: float) -> Cell:
     """Return a formatter for the answer by some readings."""
-    decimals = max(0, -math.floor(math.log10(key.tolerance) + 1e-9))
+    decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
     name, found = f"{key.answer}{suffix}", f"found{suffix}"
 
     def cell(row: Row) -> str:
@@ -277,8 +293,11 @@ def _above_ground(row: Row) -> str:
     return f"{row['boulder_height_m'] - row['embedment_depth_m']:.2f}"
 
 
-def _mass(row: Row) -> str:
-    return f"{row['boulder_mass_kg'] / 1000:.1f}"
+def _mass(units: str) -> Column:
+    """Return the column of the mass of the boulder: tonnes, or pounds."""
+    if units == "us":
+        return ("mass", "lb"), lambda row: f"{row['boulder_mass_kg']:.0f}"
+    return ("mass", "t"), lambda row: f"{row['boulder_mass_kg'] / 1000:.1f}"
 
 
 def _margin(row: Row) -> str:

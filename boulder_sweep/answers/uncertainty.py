@@ -100,15 +100,15 @@ class Uncertainty:
                 files.append(write_parquet(table, target.with_suffix(f".{name}.parquet")))
         return files
 
-    def plot(self, path: str | Path, design_id: int = 0) -> None:
-        """Draw which samples pass, and how each input affects the probability.
+    def plot(self, path: str | Path, design_id: int = 0, *, units: str = "si") -> None:
+        """Draw which samples pass, and how each input affects the probability; in ``si`` or ``us`` units.
 
         Raises
         ------
         PictureError
             It cannot be drawn.
         """
-        draw("uncertainty", "draw_uncertainty", self, path, design_id=design_id)
+        draw("uncertainty", "draw_uncertainty", self, path, design_id=design_id, units=units)
 
 
 def uncertainty(

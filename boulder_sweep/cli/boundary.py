@@ -7,7 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.options import json_option, set_option, units_option
 from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
@@ -23,6 +23,7 @@ Examples:
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all designs.")
 @click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Map (.png, .svg or .pdf).")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@units_option
 @set_option
 @json_option
 def boundary(
@@ -30,6 +31,7 @@ def boundary(
     jobs: int | None,
     out: str | None,
     picture: str | None,
+    units: str,
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
@@ -67,5 +69,5 @@ def boundary(
     if out is not None:
         found.write(out)
     if picture is not None:
-        found.plot(picture)
+        found.plot(picture, units=units)
     return 0

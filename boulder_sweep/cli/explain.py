@@ -46,7 +46,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
         raise click.UsageError(str(problem)) from None
     if found.trajectory is not None:
         if plot is not None:
-            found.trajectory.plot(plot)
+            found.trajectory.plot(plot, units=units)
         if trajectory is not None:
             found.trajectory.to_parquet(trajectory)
     elif plot is not None or trajectory is not None:

@@ -7,7 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.options import json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
@@ -38,6 +38,7 @@ Examples:
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Design chart (.png, .svg or .pdf).")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@units_option
 @set_option
 @json_option
 def need(
@@ -53,6 +54,7 @@ def need(
     jobs: int | None,
     out: str | None,
     picture: str | None,
+    units: str,
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
@@ -95,13 +97,13 @@ def need(
     if as_json:
         show(json.dumps(found.to_dict()))
     else:
-        show(*need_lines(found))
+        show(*need_lines(found, units=units))
     if not quiet:
         counts = ", ".join(f"{word} {count:,}" for word, count in found.counts().items())
         say(f"{counted(len(found), 'row')}: {counts}; {counted(found.simulated, 'simulation')}")
     if out is not None:
         found.write(out)
     if picture is not None:
-        found.plot(picture)
+        found.plot(picture, units=units)
     errors = found.arrow["verdict"].to_pylist().count("error")
     return EXIT_SOME_ROWS_FAILED if errors else EXIT_DONE

@@ -101,7 +101,7 @@ def json_option(function: Command) -> Command:
 def units_option(function: Command) -> Command:
     """Add ``--units``."""
     return click.option(
-        "--units", type=click.Choice(["si", "us"]), default="si", show_default=True, help="Units shown first."
+        "--units", type=click.Choice(["si", "us"]), default="si", show_default=True, help="Units shown."
     )(function)
 
 

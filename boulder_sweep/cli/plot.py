@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
 import click
 
+from boulder_sweep.cli.options import units_option
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.places import beside, place_of
 
@@ -11,6 +16,7 @@ EXAMPLES = """\b
 Examples:
   sweep plot m30-sizing.sweep
   sweep plot m30-sizing.sweep -o map.png --at boulder_width_m=1.8
+  sweep plot map.parquet --units us
   sweep plot m30-sizing.sweep --across boulder_width_m --at embedment_ratio=0.6
 """
 COLUMN = "COLUMN"
@@ -29,48 +35,82 @@ COLUMN = "COLUMN"
     metavar="COLUMN=VALUE",
     help="Hold another input at a value, in the unit of its column [default: its middle one] (may be repeated).",
 )
-def plot(out: str, picture: str | None, at: tuple[str, ...], **axes: str | None) -> int:
+@units_option
+def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes: Any) -> int:
     """Draw a map of the verdicts in OUT: embedment across, height up, one map for each soil.
 
-    OUT may belong to a run in progress; finished designs are drawn. COLUMN is the name of an input column of the
-    table, or embedment_ratio.
+    OUT is the folder of a run, perhaps in progress, of which finished designs are drawn, or a file of `sweep boundary`.
+    COLUMN is the name of an input column of the table, embedment_ratio, or soil or vehicle where these have names.
     """
-    held = dict(_held(text) for text in at)
+    given = dict(_given(text) for text in at)
     from boulder_sweep.errors import PictureError
-    from boulder_sweep.store.finished import FinishedRows
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
-    from boulder_sweep.views.pieces import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
     from boulder_sweep.views.wording import terms_line
 
     require_matplotlib()
-    folder = place_of(out)
-    finished = FinishedRows(folder)
-    target = checked_kind(picture or beside(folder, ".png"))
-    if finished.rows_done == 0:
+    target = checked_kind(picture or beside(place_of(out.removesuffix(".parquet")), ".png"))
+    source = _of_map(out) if Path(out).is_file() else _of_run(out)
+    if source.rows_done == 0:
         raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
-    settings = finished.identity["settings"]
-    shown = draw_verdict_map(
-        finished_pieces(finished), target, title=settings["name"], terms=terms_line(settings), at=held, **axes
-    )
+    settings = source.settings
+    sets = settings.get("labels", {}) if settings["order"] != "table" else {}
+    held = {name: _held(name, text, sets) for name, text in given.items()}
+    words = {"title": settings["name"], "terms": terms_line(settings)}
+    shown = draw_verdict_map(source.table, target, at=held, sets=sets, units=units, **words, **axes)
     for name, value in held.items():
         taken = shown.fixed.get(name, value)
         if abs(taken - value) > 1e-6 * abs(value):
             say(f"note: {name} is {taken:.6g} in this map, the value nearest to {value:.6g}")
-    if finished.rows_done < finished.rows:
+    if source.rows_done < source.rows:
         say(f"note: the run is not finished; {shown.total:,} designs are drawn")
     show(f"{target}: {shown.count:,} of {shown.total:,} designs")
     return 0
 
 
-def _held(text: str) -> tuple[str, float]:
+class _Source(NamedTuple):
+    """What is drawn."""
+
+    table: Any
+    settings: dict[str, Any]
+    rows_done: int
+    rows: int
+
+
+def _of_run(out: str) -> _Source:
+    """Return the result of a run."""
+    from boulder_sweep.store.finished import FinishedRows
+    from boulder_sweep.views.pieces import finished_pieces
+
+    finished = FinishedRows(place_of(out))
+    return _Source(finished_pieces(finished), finished.identity["settings"], finished.rows_done, finished.rows)
+
+
+def _of_map(out: str) -> _Source:
+    """Return the map in a file of `sweep boundary`."""
+    from boulder_sweep.answers.boundary import read_map
+
+    frame, settings = read_map(out)
+    return _Source(frame, settings, len(frame), len(frame))
+
+
+def _given(text: str) -> tuple[str, str]:
     """Read ``COLUMN=VALUE``."""
     name, equals, value = text.partition("=")
+    if not equals:
+        raise click.UsageError(f"--at {text}: no = found; write COLUMN=VALUE")
+    return name.strip(), value.strip()
+
+
+def _held(name: str, text: str, sets: Mapping[str, Sequence[str]]) -> float:
+    """Return the value at which an input is held; of a named soil or vehicle its place."""
+    if name in sets:
+        if text in sets[name]:
+            return float(sets[name].index(text))
+        raise click.UsageError(f"--at {name}={text}: there are {', '.join(sets[name])}")
     try:
-        return name.strip(), float(value)
+        return float(text)
     except ValueError:
         raise click.UsageError(
-            f"--at {text}: must be COLUMN=VALUE, with a number in the unit of the column"
-            if equals
-            else f"--at {text}: no = found; write COLUMN=VALUE"
+            f"--at {name}={text}: must be COLUMN=VALUE, with a number in the unit of the column"
         ) from None

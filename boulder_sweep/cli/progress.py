@@ -24,14 +24,16 @@ COMPILED = {"table": ("lanes.simulate_lanes", 40.0), "design": ("impact.simulate
 """Kernels for tables, and for one design over time: the function that is compiled last, and seconds where unknown."""
 
 
-def cold_start(kernels: Kernels) -> str | None:
+def cold_start(kernels: Kernels | None) -> str | None:
     """Return what to say before kernels are compiled; None if their compiled code is there.
 
     Parameters
     ----------
     kernels
-        Those for tables, or those for one design over time.
+        Those for tables, or those for one design over time; None where no kernel is called.
     """
+    if kernels is None:
+        return None
     from boulder_kernels._jit import CACHE_FOLDER
 
     function, seconds = COMPILED[kernels]
@@ -52,9 +54,9 @@ def _remembered(kernels: Kernels) -> Path:
 
 @contextmanager
 def working(
-    quiet: bool, kernels: Kernels = "table", doing: str = "simulating"
+    quiet: bool, kernels: Kernels | None = "table", doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[int, int], None] | None]:
-    """Give a function that shows how many rows of how many are done; None where nothing is to be shown.
+    """Give a function that shows how many of how many are done; None where nothing is to be shown.
 
     Parameters
     ----------
@@ -62,10 +64,10 @@ def working(
         Show nothing.
     kernels
         What the work begins with: where these must be compiled, this is said, with a moving bar on a terminal.
-    doing
-        Word beside the bar.
+    doing, of
+        Word beside the bar, and what is counted.
     """
-    with progress(quiet, Notes(), kernels, doing) as shown:
+    with progress(quiet, Notes(), kernels, doing, of) as shown:
         if shown is None:
             yield None
             return
@@ -83,7 +85,7 @@ def working(
 
 @contextmanager
 def progress(
-    quiet: bool, notes: Notes, kernels: Kernels = "table", doing: str = "simulating"
+    quiet: bool, notes: Notes, kernels: Kernels | None = "table", doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[Progress], None] | None]:
     """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere.
 
@@ -93,7 +95,7 @@ def progress(
         Show nothing.
     notes
         What was shown already.
-    kernels, doing
+    kernels, doing, of
         As of `working`.
     """
     if quiet:
@@ -109,12 +111,12 @@ def progress(
         if cold:
             say(cold)
         _compile(kernels, cold)
-        yield _PlainLines(notes)
+        yield _PlainLines(notes, of)
     if cold and kernels == "design":
         _remember(kernels, time.monotonic() - begun)
 
 
-def _compile(kernels: Kernels, cold: str | None) -> None:
+def _compile(kernels: Kernels | None, cold: str | None) -> None:
     """Compile the kernels for tables, so that their time does not count as simulation; the others are soon compiled."""
     if cold and kernels == "table":
         from boulder_sweep.judge.evaluation import compile_kernels
@@ -145,9 +147,9 @@ class Notes:
 class _PlainLines:
     """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
 
-    def __init__(self, notes: Notes) -> None:
+    def __init__(self, notes: Notes, of: str) -> None:
         self.last = time.monotonic()
-        self._notes = notes
+        self._notes, self._of = notes, of
 
     def __call__(self, now: Progress) -> None:
         for note in self._notes.new(now.notes):
@@ -157,7 +159,7 @@ class _PlainLines:
         self.last = time.monotonic()
         left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
         say(
-            f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} designs, "
+            f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} {self._of}, "
             f"{now.rows_per_second:,.0f} per second{left}"
         )
 
@@ -175,7 +177,7 @@ def _bar(
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[numbers]}"))
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         # Before the first block is done there is no progress to show; the bar pulses.
-        task = bars.add_task(cold or doing, total=None, numbers="")
+        task = bars.add_task(printable(cold or doing), total=None, numbers="")
 
         def show(now: Progress) -> None:
             for note in notes.new(now.notes):

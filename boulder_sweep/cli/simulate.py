@@ -68,15 +68,14 @@ def simulate(
     values = shown_values(result.summary(), units)
     show(*([json.dumps(values)] if as_json else [*console.value_lines(values), *_cautions(values)]))
     if plot is not None:
-        result.plot(plot)
+        result.plot(plot, units=units)
     if trajectory is not None:
         result.to_parquet(trajectory, energy=energy is not None)
     if energy is not None:
-        result.plot_energy(energy)
+        result.plot_energy(energy, units=units)
     if animate is not None:
-        if not quiet:
-            say(f"drawing {animate}, some tens of seconds for a long film")
-        result.animate(animate)
+        with working(quiet, None, f"drawing {animate}", "frames") as told:
+            result.animate(animate, told)
     for file in (plot, trajectory, energy, animate):
         if file is not None and not quiet:
             say(f"written  {file}")

@@ -8,7 +8,7 @@ from dataclasses import asdict
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.options import json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
@@ -57,6 +57,7 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
     help="List published spreads with their sources.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@units_option
 @set_option
 @json_option
 def uncertainty(
@@ -71,6 +72,7 @@ def uncertainty(
     out: str | None,
     picture: str | None,
     design: int,
+    units: str,
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
@@ -113,7 +115,7 @@ def uncertainty(
     if as_json:
         show(json.dumps(found.to_dict() | ({"doubts": [asdict(own) for own in parts]} if doubts else {})))
     else:
-        show(*uncertainty_lines(found), *(["", *doubt_lines(parts)] if doubts else []))
+        show(*uncertainty_lines(found, units=units), *(["", *doubt_lines(parts)] if doubts else []))
     if not quiet:
         drawn = sum(found.arrow["p_pass_designs"].to_pylist())
         say(f"{counted(len(found), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {seed}")
@@ -121,5 +123,5 @@ def uncertainty(
         for file in found.write(out):
             say(f"written  {file}")
     if picture is not None:
-        found.plot(picture, design)
+        found.plot(picture, design, units=units)
     return 0

@@ -7,7 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.options import json_option, set_option, units_option
 from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
@@ -22,9 +22,12 @@ Examples:
 @click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all designs.")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@units_option
 @set_option
 @json_option
-def which(grid: str, jobs: int | None, out: str | None, quiet: bool, overrides: tuple[str, ...], as_json: bool) -> int:
+def which(
+    grid: str, jobs: int | None, out: str | None, units: str, quiet: bool, overrides: tuple[str, ...], as_json: bool
+) -> int:
     """Find how far speed, mass of the truck and friction angle may change before each verdict does.
 
     Also names the highest ASTM F2656 class whose nominal speed (30, 40, 50 mph) is withstood. The class is
@@ -40,7 +43,7 @@ def which(grid: str, jobs: int | None, out: str | None, quiet: bool, overrides: 
         checked_parquet(out)
     with working(quiet) as told:
         found = reserves(sweep, jobs=jobs, told=told)
-    show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found)))
+    show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found, units=units)))
     if out is not None:
         found.write(out)
     return 0

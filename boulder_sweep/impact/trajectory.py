@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -221,32 +222,42 @@ class Trajectory:
 
         write(self.to_arrow(energy=energy), path)
 
-    def plot(self, path: str | Path) -> None:
+    def plot(self, path: str | Path, *, units: str = "si") -> None:
         """Draw rotation, displacements and force over time.
 
         Parameters
         ----------
         path
             Picture to write, its kind by its ending (.png, .svg, .pdf).
+        units
+            ``si`` or ``us``.
 
         Raises
         ------
         PictureError
             There is nothing to draw, the kind is unknown, or matplotlib is not installed.
         """
-        draw("trajectory", "draw_trajectory", self, path)
+        draw("trajectory", "draw_trajectory", self, path, units=units)
 
-    def plot_energy(self, path: str | Path) -> None:
+    def plot_energy(self, path: str | Path, *, units: str = "si") -> None:
         """Draw where the vehicle's energy goes, stacked over time; see `plot`."""
-        draw("energy", "draw_energy", self, path)
+        draw("energy", "draw_energy", self, path, units=units)
 
     def plot_side_view(self, path: str | Path, *, time_s: float | None = None) -> None:
         """Draw the impact from the side at one instant, by default when the contact force peaks; see `plot`."""
         draw("side_view", "draw_still", self, path, time_s=time_s)
 
-    def animate(self, path: str | Path) -> None:
-        """Draw a moving side view: .gif, .mp4 (needs ffmpeg) or .html; see `plot`."""
-        draw("animation", "animate", self, path)
+    def animate(self, path: str | Path, told: Callable[[int, int], None] | None = None) -> None:
+        """Draw a moving side view: .gif, .mp4 (needs ffmpeg) or .html; see `plot`.
+
+        Parameters
+        ----------
+        path
+            File to write.
+        told
+            Told how many frames of how many are drawn.
+        """
+        draw("animation", "animate", self, path, told)
 
 
 def _plain(value: Any) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ from boulder_sweep.views.wording import design_line, verdict_line
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
+Told = Callable[[int, int], None]
 KINDS = (".gif", ".mp4", ".html")
 EVERY_S = 0.005
 """Time between two frames [s]."""
@@ -37,7 +38,7 @@ SWATCH = 40
 """Height of a strip of each colour in the picture that the palette of a GIF is taken from."""
 
 
-def animate(trajectory: Trajectory, path: str | Path) -> None:
+def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) -> None:
     """Animate the side view: truck, boulder, soil wedge and forces to scale over time.
 
     Parameters
@@ -46,6 +47,8 @@ def animate(trajectory: Trajectory, path: str | Path) -> None:
         The impact.
     path
         File to write: .gif, .mp4 (needs the program ffmpeg), or .html, one file with a player and a slider.
+    told
+        Told how many frames of how many are drawn.
 
     Raises
     ------
@@ -64,15 +67,15 @@ def animate(trajectory: Trajectory, path: str | Path) -> None:
         if kind == ".html":
             target.write_text(page(trajectory), encoding="utf-8")
         elif kind == ".gif":
-            _write_gif(trajectory, target)
+            _write_gif(trajectory, target, told)
         else:
-            _write_mp4(trajectory, target)
+            _write_mp4(trajectory, target, told)
     except OSError as problem:
         raise PictureError(f"{path} cannot be written: {problem.strerror or problem}") from problem
 
 
-def frames(trajectory: Trajectory) -> Iterator[np.ndarray]:
-    """Draw the frames of an animation one by one.
+def frames(trajectory: Trajectory, told: Told | None = None) -> Iterator[np.ndarray]:
+    """Draw the frames of an animation one by one; `told` hears how many of how many.
 
     Yields
     ------
@@ -94,7 +97,8 @@ def frames(trajectory: Trajectory) -> Iterator[np.ndarray]:
         title = axes.set_title(view.caption(0), fontsize=8.5, fontweight="normal", family="monospace")
         canvas.draw()
         fig.set_layout_engine("none")  # placed once; the frames must not jump
-        for sample in samples_shown(trajectory, MOST_FRAMES, EVERY_S):
+        chosen = samples_shown(trajectory, MOST_FRAMES, EVERY_S)
+        for drawn, sample in enumerate(chosen, start=1):
             title.set_text(view.caption(sample))
             moving = draw(axes, view.moving(sample))
             canvas.draw()
@@ -103,12 +107,14 @@ def frames(trajectory: Trajectory) -> Iterator[np.ndarray]:
             yield picture[:height, :width].copy()
             for artist in moving:
                 artist.remove()
+            if told is not None:
+                told(drawn, len(chosen))
 
 
-def _write_gif(trajectory: Trajectory, target: Path) -> None:
+def _write_gif(trajectory: Trajectory, target: Path, told: Told | None) -> None:
     from PIL import Image  # comes with matplotlib
 
-    pictures = [Image.fromarray(picture) for picture in frames(trajectory)]
+    pictures = [Image.fromarray(picture) for picture in frames(trajectory, told)]
     # One palette for all, from frames spread over the film, so that every colour is in it and none flickers.
     width, height = pictures[0].size
     sample = pictures[:: max(1, len(pictures) // 6)]
@@ -124,9 +130,9 @@ def _write_gif(trajectory: Trajectory, target: Path) -> None:
     reduced[0].save(target, save_all=True, append_images=reduced[1:], duration=times, loop=0, optimize=True)
 
 
-def _write_mp4(trajectory: Trajectory, target: Path) -> None:
+def _write_mp4(trajectory: Trajectory, target: Path, told: Told | None) -> None:
     """Pipe raw frames to ffmpeg."""
-    film = frames(trajectory)
+    film = frames(trajectory, told)
     first = next(film)
     height, width = first.shape[:2]
     command = [

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS
+from boulder_sweep.columns import BY_NAME as COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
-from boulder_sweep.views.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, figure
-from boulder_sweep.views.slices import label, unit_of, value_text
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, figure
+from boulder_sweep.views.labels import label, name_of, size_of, sized, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,10 +30,13 @@ CURVES = ("friction_angle_deg", "subgrade_reaction_MN_m3", "boulder_width_m", "i
 """What is across and what tells curves apart: the first of each that varies."""
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 """Of as many curves as can be told apart with their bands."""
+SET_COLOURS = (*COLOURS, SKY, AMBER, BLACK)
+"""Of named soils or vehicles, each of which gets its curve; beyond that the dashes differ."""
+DASHES = ("-", "--", "-.", (0, (1, 1)))
 CHARACTERS_PER_INCH = 15
 
 
-def draw_design_chart(need: Need, path: str | Path) -> None:
+def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> None:
     """Draw the answers to a question.
 
     Parameters
@@ -39,6 +45,8 @@ def draw_design_chart(need: Need, path: str | Path) -> None:
         The answers.
     path
         Picture to write.
+    units
+        ``si`` or ``us``.
 
     Raises
     ------
@@ -46,14 +54,18 @@ def draw_design_chart(need: Need, path: str | Path) -> None:
         Nothing varies, or there is no answer to draw, or the picture cannot be written.
     """
     frame = need.frame
-    varying = [
-        name for name in INPUT_COLUMNS if name not in (need.key.name, *need.derived) and len(frame[name].unique()) > 1
-    ]
+    sets = {axis.name: axis.labels for axis in need.sweep.axes if axis.labels}
+    open_ = [name for name in INPUT_COLUMNS if name not in (need.key.name, *need.derived)]
+    varying = [name for name in open_ if BY_NAME[name].section not in sets and len(frame[name].unique()) > 1]
     across = next((name for name in ACROSS if name in varying), next(iter(varying), None))
     if across is None:
         raise PictureError("a design chart needs an input with several values; this question has one answer, no curve")
-    over = next((name for name in CURVES if name in varying and name != across), None)
-    held = {}
+    over = next(iter(sets), None) or next((name for name in CURVES if name in varying and name != across), None)
+    held: dict[str, float | str] = {}
+    for name, names in sets.items():
+        if name != over:
+            held[name] = names[len(names) // 2]
+            frame = frame[frame[name].astype(str) == held[name]]
     for name in varying:
         if name not in (across, over):
             levels = np.unique(frame[name].astype(float))
@@ -61,21 +73,17 @@ def draw_design_chart(need: Need, path: str | Path) -> None:
             frame = frame[frame[name].astype(float) == held[name]]
     if frame[need.key.answer].isna().all():
         raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
-    values = [None] if over is None else sorted(frame[over].astype(float).unique())
-    if len(values) > len(COLOURS):
-        values = [values[place] for place in np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
     with figure(path, 7.2, 4.8) as fig:
         axes = fig.subplots()
-        for colour, value in zip(COLOURS, values, strict=False):
-            rows = frame if value is None else frame[frame[over].astype(float) == value]
-            words = "" if over is None or value is None else value_text(over, value)
-            _curve(axes, need, rows.sort_values(across), across, colour, words)
-        axes.set_xlabel(label(across))
-        axes.set_ylabel(_answer_label(need))
+        for place, (words, rows) in enumerate(_curves(frame, over, sets, units)):
+            colour, dashes = SET_COLOURS[place % len(SET_COLOURS)], DASHES[place // len(SET_COLOURS) % len(DASHES)]
+            _curve(axes, need, rows.sort_values(across), across, (colour, dashes), words, units)
+        axes.set_xlabel(label(across, units))
+        axes.set_ylabel(_answer_label(need, units))
         axes.legend(loc="best")
         fig.suptitle(f"{need.sweep.name}: {_title(need)}", x=0.01, ha="left", fontsize=11.5, fontweight="bold")
         fig.supxlabel(
-            textwrap.fill(_caption(need, held), int(CHARACTERS_PER_INCH * 7.2)),
+            textwrap.fill(_caption(need, held, units), int(CHARACTERS_PER_INCH * 7.2)),
             x=0.01,
             ha="left",
             fontsize=8.0,
@@ -83,16 +91,37 @@ def draw_design_chart(need: Need, path: str | Path) -> None:
         )
 
 
-def _curve(axes: Axes, need: Need, rows: pd.DataFrame, across: str, colour: str, words: str) -> None:
+def _curves(
+    frame: pd.DataFrame, over: str | None, sets: Mapping[str, Sequence[str]], units: str
+) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Yield the words and the rows of each curve: of every named set, or of some values of an input."""
+    if over is None:
+        yield "", frame
+    elif over in sets:
+        for name in sets[over]:
+            yield name, frame[frame[over].astype(str) == name]
+    else:
+        values = sorted(frame[over].astype(float).unique())
+        if len(values) > len(COLOURS):
+            values = [values[place] for place in np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
+        for value in values:
+            yield value_text(over, value, units), frame[frame[over].astype(float) == value]
+
+
+def _curve(
+    axes: Axes, need: Need, rows: pd.DataFrame, across: str, style: tuple[str, Any], words: str, units: str
+) -> None:
     """Draw the answers of one soil, and the band to those by other readings."""
-    x = rows[across].to_numpy(dtype=float)
-    y = rows[need.key.answer].to_numpy(dtype=float)
+    colour, dashes = style
+    size = sized(need.key.field.unit, units)[1]
+    x = rows[across].to_numpy(dtype=float) / size_of(across, units)
+    y = rows[need.key.answer].to_numpy(dtype=float) / size
     bound = (rows["found"] == "always").to_numpy()
-    axes.plot(x, y, color=colour, label=words or need.sweep.model.preset.replace("_", " "))
+    axes.plot(x, y, color=colour, linestyle=dashes, label=words or need.sweep.model.preset.replace("_", " "))
     axes.plot(x[~bound], y[~bound], "o", color=colour, markersize=4)
     axes.plot(x[bound], y[bound], "o", color=colour, markersize=4, markerfacecolor="white")
     for name in need.others:
-        other = rows[f"{need.key.answer}_{name}"].to_numpy(dtype=float)
+        other = rows[f"{need.key.answer}_{name}"].to_numpy(dtype=float) / size
         axes.fill_between(x, y, other, color=colour, alpha=0.13, linewidth=0)
         axes.plot(x, other, color=colour, linewidth=0.9, linestyle=":")
 
@@ -104,19 +133,19 @@ def _title(need: Need) -> str:
 
 def _words(need: Need) -> str:
     name = need.key.name
-    return label(name).partition(" [")[0] if name in BY_NAME else name.rpartition("_")[0].replace("_", " ")
+    return name_of(name) if name in COLUMNS else name.rpartition("_")[0].replace("_", " ")
 
 
-def _answer_label(need: Need) -> str:
-    unit = (
-        unit_of(need.key.name) if need.key.name in BY_NAME else {"1": ""}.get(need.key.field.unit, need.key.field.unit)
-    )
+def _answer_label(need: Need, units: str) -> str:
+    unit = sized(need.key.field.unit, units)[0]
     return f"{_words(need)} [{unit}]" if unit else _words(need)
 
 
-def _caption(need: Need, held: dict[str, float]) -> str:
+def _caption(need: Need, held: Mapping[str, float | str], units: str) -> str:
     """What else holds, and how to read the signs."""
-    parts = [value_text(name, value) for name, value in held.items()]
+    parts = [
+        f"{name}: {value}" if isinstance(value, str) else value_text(name, value, units) for name, value in held.items()
+    ]
     if need.least_margin:
         parts.append(f"margin {need.least_margin:.0%} or more")
     parts.append("hollow: passes in the whole range searched; no point: nothing passes")

@@ -10,6 +10,7 @@ import numpy as np
 
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, YELLOW
+from boulder_sweep.views.labels import sized
 from boulder_sweep.views.trajectory import require_samples
 from boulder_sweep.views.wording import design_line, verdict_line
 
@@ -31,7 +32,7 @@ LAYERS = (
 """What is stacked, from below: first what is lost for good, last what the vehicle still has."""
 
 
-def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
+def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:
     """Draw the energy ledger of one impact, stacked over time.
 
     Parameters
@@ -40,6 +41,8 @@ def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
         The impact.
     path
         Picture to write (.png, .svg, .pdf).
+    units
+        ``si`` or ``us``.
 
     Raises
     ------
@@ -55,12 +58,14 @@ def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
     require_samples(trajectory)
     ledger = trajectory.energy()
     time = ledger.time_s
+    unit, size = sized("J", units)
+    initial = ledger.initial / size
     with figures.figure(path, 8.0, 4.9) as fig:
         axes = fig.subplots()
         above, below = np.zeros_like(time), np.zeros_like(time)
-        layers = [(getattr(ledger, name) / 1e3, label, colour) for name, label, colour in LAYERS]
+        layers = [(getattr(ledger, name) / size, label, colour) for name, label, colour in LAYERS]
         if np.abs(ledger.pull_J).max() > 0.0:
-            layers.append((ledger.pull_J / 1e3, "out of nothing (printed separation)", BLACK))
+            layers.append((ledger.pull_J / size, "out of nothing (printed separation)", BLACK))
         handles = []
         for values, label, colour in layers:
             up, down = np.maximum(values, 0.0), np.minimum(values, 0.0)
@@ -68,21 +73,21 @@ def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
             handles.append(axes.fill_between(time, above, above + up, label=label, **style))
             axes.fill_between(time, below, below + down, **style)
             above, below = above + up, below + down
-        axes.axhline(ledger.initial / 1e3, color=BLACK, linestyle="--", linewidth=1.0)
+        axes.axhline(initial, color=BLACK, linestyle="--", linewidth=1.0)
         axes.annotate(
-            f"at first touch {ledger.initial / 1e3:.0f} kJ",
-            (0.01, ledger.initial / 1e3),
+            f"at first touch {initial:.0f} {unit}",
+            (0.01, initial),
             xycoords=("axes fraction", "data"),
             xytext=(0, 3),
             textcoords="offset points",
             fontsize=8.5,
         )
         axes.set_xlim(0.0, float(time[-1]))
-        figures.limit_y(axes, 1.05 * float(below.min()), 1.09 * max(float(above.max()), ledger.initial / 1e3))
+        figures.limit_y(axes, 1.05 * float(below.min()), 1.09 * max(float(above.max()), initial))
         axes.grid(visible=False)
         _mark_limit(axes, trajectory)
         axes.set_xlabel("time since first touch [s]")
-        axes.set_ylabel("energy [kJ]")
+        axes.set_ylabel(f"energy [{unit}]")
         axes.set_title(
             f"The parts add up to the energy at first touch to within {ledger.largest_residual:.0e} of it.",
             fontsize=8.5,
@@ -90,7 +95,7 @@ def draw_energy(trajectory: Trajectory, path: str | Path) -> None:
         )
         axes.legend(handles=handles[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5))
         fig.suptitle(verdict_line(trajectory), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
-        fig.supxlabel(design_line(trajectory), x=0.01, ha="left", fontsize=8.0, color=GREY)
+        fig.supxlabel(design_line(trajectory, units), x=0.01, ha="left", fontsize=8.0, color=GREY)
 
 
 def _mark_limit(axes: Axes, trajectory: Trajectory) -> None:

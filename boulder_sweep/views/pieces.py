@@ -32,6 +32,20 @@ def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
     return lambda columns: [whole]
 
 
+def with_places(pieces: Pieces, sets: Mapping[str, Sequence[str]]) -> Pieces:
+    """Return a table whose columns of names hold the place of each name instead."""
+    if not sets:
+        return pieces
+    places = {column: {name: float(place) for place, name in enumerate(names)} for column, names in sets.items()}
+
+    def placed(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
+        for piece in pieces(columns):
+            own = {name: piece[name].astype(str).map(places[name]).astype(float) for name in places if name in piece}
+            yield piece.assign(**own)
+
+    return placed
+
+
 def finished_pieces(finished: FinishedRows) -> Pieces:
     """Return a source of pieces of the finished rows of a result.
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
-from boulder_sweep.views.pieces import DEPTH, HEIGHT, RATIO, Kept, Pieces, pieces_of
+from boulder_sweep.settings.fields import BY_NAME as FIELDS
+from boulder_sweep.views.pieces import DEPTH, HEIGHT, RATIO, Kept, Pieces, pieces_of, with_places
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,6 +26,8 @@ TRIPLET = {RATIO, DEPTH, HEIGHT}
 """Two of them give the third."""
 DIGITS = 9
 """Inputs that agree to so many digits are the same value; products of axes differ in their last bits."""
+MOST_SETS = 8
+"""Most named soils or vehicles side by side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,8 @@ class Slice:
         Whether there were too many rows to keep them all.
     left_out : dict of str to int
         Of which multiples only some are shown: how many values there are.
+    sets : dict of str to sequence of str
+        Named soils or vehicles; their values here are places in these names.
     """
 
     rows: pd.DataFrame
@@ -68,6 +73,7 @@ class Slice:
     passing: int
     thinned: bool
     left_out: dict[str, int] = field(default_factory=dict)
+    sets: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
 def plane(
@@ -79,6 +85,7 @@ def plane(
     rows: str | None = None,
     at: Mapping[str, float] | None = None,
     most: tuple[int, int] = (4, 3),
+    sets: Mapping[str, Sequence[str]] | None = None,
 ) -> Slice:
     """Choose a plane of a table of designs.
 
@@ -97,6 +104,8 @@ def plane(
         in the table is taken.
     most
         Most columns and rows of small multiples; of more values, evenly spaced ones are shown.
+    sets
+        Named soils or vehicles: the names by the column that holds them. Each is drawn for itself, up to `MOST_SETS`.
 
     Raises
     ------
@@ -104,13 +113,19 @@ def plane(
         An input is unknown, is used twice, or cannot be held at a value because it has another one in every design;
         or fewer than two inputs vary.
     """
-    pieces = pieces_of(table)
-    levels, total = _levels_of(pieces)
+    named = dict(sets or {})
+    pieces = with_places(pieces_of(table), named)
+    levels, total = _levels_of(pieces, named)
     held = dict(at or {})
     chosen: dict[str, str | None] = {"across": across, "up": up, "columns": columns, "rows": rows}
     _check(levels, [name for name in chosen.values() if name], held)
     varying = _independent(levels, {*filter(None, chosen.values()), *held})
-    for place, wanted in (("across", ACROSS), ("up", UP), ("columns", OVER[::-1][2:]), ("rows", OVER)):
+    for place, wanted in (
+        ("across", ACROSS),
+        ("up", UP),
+        ("columns", (*named, *OVER[::-1][2:])),
+        ("rows", (*named, *OVER)),
+    ):
         free = [name for name in varying if name not in chosen.values() and name not in held]
         if chosen[place] is None:
             candidates = [name for name in wanted if name in free]
@@ -127,7 +142,8 @@ def plane(
             wanted_value = held.get(name, values[(len(values) - 1) // 2])
             fixed[name] = float(values[np.argmin(np.abs(values - wanted_value))])
     shown_columns, shown_rows = (
-        _some(levels, chosen[place], n) for place, n in (("columns", most[0]), ("rows", most[1]))
+        _some(levels, chosen[place], MOST_SETS if chosen[place] in named else n)
+        for place, n in (("columns", most[0]), ("rows", most[1]))
     )
     admitted = [(name, [value]) for name, value in fixed.items()]
     multiples = ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows))
@@ -159,6 +175,7 @@ def plane(
         passing=kept.passing,
         thinned=kept.thinned,
         left_out=left_out,
+        sets=named,
     )
 
 
@@ -201,57 +218,14 @@ def select(rows: pd.DataFrame, name: str | None, value: float) -> pd.DataFrame:
     return rows if name is None else rows[_equal(rows[name].to_numpy(dtype=float), value)]
 
 
-def label(name: str) -> str:
-    """Name of an input with its unit, for an axis: ``boulder height [m]``."""
-    if name == RATIO:
-        return "embedment depth / boulder height"
-    words = {
-        "boulder_height_m": "boulder height",
-        "embedment_depth_m": "embedment depth",
-        "friction_angle_deg": "friction angle φ′",
-        "subgrade_reaction_MN_m3": "subgrade reaction β",
-    }
-    unit = unit_of(name)
-    suffix = "_" + BY_NAME[name].unit.replace("/", "_").replace("*", "_").replace("^", "")
-    plain = words.get(name) or name.removesuffix(suffix).replace("_", " ")
-    return f"{plain} [{unit}]" if unit else plain
-
-
-def value_text(name: str, value: float) -> str:
-    """Value of an input with its unit: ``φ′ = 36°``."""
-    symbols = {
-        "friction_angle_deg": "φ′ = {}°",
-        "subgrade_reaction_MN_m3": "β = {} MN/m³",
-        "boulder_width_m": "width {} m",
-        "boulder_length_m": "length {} m",
-        "boulder_height_m": "height {} m",
-        "boulder_density_kg_m3": "boulder {} kg/m³",
-        "soil_density_kg_m3": "soil {} kg/m³",
-        "impact_speed_m_s": "speed {} m/s",
-        "vehicle_mass_kg": "vehicle {} kg",
-        "vehicle_spring_N_m": "spring {} kN/m",
-        "vehicle_damper_N_s_m": "damper {} kN·s/m",
-    }
-    number = f"{value / (1e3 if name in ('vehicle_spring_N_m', 'vehicle_damper_N_s_m') else 1.0):.5g}"
-    if name in symbols:
-        return symbols[name].format(number)
-    unit = unit_of(name)
-    return f"{label(name).partition(' [')[0]} {number}{' ' + unit if unit else ''}"
-
-
-def unit_of(name: str) -> str:
-    """Unit of an input as printed in a picture; empty for plain numbers."""
-    unit = BY_NAME[name].unit if name in BY_NAME else ""
-    return {"1": "", "MN/m^3": "MN/m³", "kg/m^3": "kg/m³", "N*s/m": "N·s/m"}.get(unit, unit)
-
-
-def _levels_of(pieces: Pieces) -> tuple[dict[str, np.ndarray], int]:
-    """Return the different values of every input, and the number of rows."""
+def _levels_of(pieces: Pieces, sets: Collection[str]) -> tuple[dict[str, np.ndarray], int]:
+    """Return the different values of every input, and the number of rows; a named set stands for what it gives."""
     found: dict[str, np.ndarray] = {}
     total = 0
-    for piece in pieces([*INPUT_COLUMNS, RATIO]):
+    given = [name for name in (*INPUT_COLUMNS, RATIO) if FIELDS[name].section not in sets]
+    for piece in pieces([*given, *sets]):
         total += len(piece)
-        for name in (*INPUT_COLUMNS, RATIO):
+        for name in (*given, *sets):
             if name in piece:
                 values = piece[name].astype(float).unique()
                 found[name] = np.unique(np.concatenate([found.get(name, values), values]))

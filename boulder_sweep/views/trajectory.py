@@ -11,6 +11,7 @@ import numpy as np
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE
+from boulder_sweep.views.labels import sized
 from boulder_sweep.views.wording import design_line, verdict_line
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ BEYOND_LIMIT, AFTER_PEAK = "#F3E7DF", "#F0F0F0"
 """Behind the curves where the model no longer holds, and where its soil springs back without memory."""
 
 
-def draw_trajectory(trajectory: Trajectory, path: str | Path) -> None:
+def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:
     """Draw rotation, forces and displacements of one impact.
 
     Parameters
@@ -31,6 +32,8 @@ def draw_trajectory(trajectory: Trajectory, path: str | Path) -> None:
         The impact.
     path
         Picture to write (.png, .svg, .pdf).
+    units
+        ``si`` or ``us``.
 
     Raises
     ------
@@ -41,17 +44,17 @@ def draw_trajectory(trajectory: Trajectory, path: str | Path) -> None:
     with figures.figure(path, 9.0, 6.2) as fig:
         (rotation, force), (boulder, vehicle) = fig.subplots(2, 2, sharex=True)
         _rotation(rotation, trajectory)
-        _force(force, trajectory)
-        _boulder(boulder, trajectory)
-        _vehicle(vehicle, trajectory)
+        _force(force, trajectory, units)
+        _boulder(boulder, trajectory, units)
+        _vehicle(vehicle, trajectory, units)
         for axes in (rotation, force, boulder, vehicle):
             axes.set_xlim(0.0, float(trajectory.time_s[-1]))
             shade_unreliable(axes, trajectory)
         for axes in (boulder, vehicle):
             axes.set_xlabel("time since first touch [s]")
-        _peaks(rotation, force, boulder, vehicle, trajectory)
+        _peaks(rotation, force, boulder, vehicle, trajectory, units)
         fig.suptitle(verdict_line(trajectory), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
-        fig.supxlabel(design_line(trajectory), x=0.01, ha="left", fontsize=8.5, color=GREY)
+        fig.supxlabel(design_line(trajectory, units), x=0.01, ha="left", fontsize=8.5, color=GREY)
 
 
 def require_samples(trajectory: Trajectory) -> None:
@@ -109,32 +112,35 @@ def _rotation(axes: Axes, trajectory: Trajectory) -> None:
     axes.set_ylabel("rotation [deg]")
 
 
-def _force(axes: Axes, trajectory: Trajectory) -> None:
-    axes.plot(trajectory.time_s, trajectory.contact_force_N / 1e3, color=ORANGE, label="vehicle on boulder")
-    soil = -trajectory.soil_force_N / 1e3
+def _force(axes: Axes, trajectory: Trajectory, units: str) -> None:
+    unit, size = sized("N", units)
+    contact, soil = trajectory.contact_force_N / size, -trajectory.soil_force_N / size
+    axes.plot(trajectory.time_s, contact, color=ORANGE, label="vehicle on boulder")
     axes.plot(trajectory.time_s, soil, color=GREEN, linestyle="--", label="soil against boulder")
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
-    top = max(float(soil.max()), float(trajectory.contact_force_N.max() / 1e3))
+    top = max(float(soil.max()), float(contact.max()))
     figures.limit_y(axes, min(1.15 * float(soil.min()), -0.05 * top), top)
     _legend_above(axes)
     axes.set_title("Horizontal forces")
-    axes.set_ylabel("force [kN]")
+    axes.set_ylabel(f"force [{unit}]")
 
 
-def _boulder(axes: Axes, trajectory: Trajectory) -> None:
-    axes.plot(trajectory.time_s, trajectory.boulder_displacement_m, color=BLUE, label="boulder and wedge")
-    centre = trajectory.boulder_centre_displacement_m
+def _boulder(axes: Axes, trajectory: Trajectory, units: str) -> None:
+    unit, size = sized("m", units)
+    axes.plot(trajectory.time_s, trajectory.boulder_displacement_m / size, color=BLUE, label="boulder and wedge")
+    centre = trajectory.boulder_centre_displacement_m / size
     axes.plot(trajectory.time_s, centre, color=PURPLE, linestyle="--", label="boulder alone (as filmed)")
     _legend_above(axes)
     axes.set_title("Displacement of the centre of mass")
-    axes.set_ylabel("displacement [m]")
+    axes.set_ylabel(f"displacement [{unit}]")
 
 
-def _vehicle(axes: Axes, trajectory: Trajectory) -> None:
-    axes.plot(trajectory.time_s, trajectory.vehicle_displacement_m, color=ORANGE)
+def _vehicle(axes: Axes, trajectory: Trajectory, units: str) -> None:
+    unit, size = sized("m", units)
+    axes.plot(trajectory.time_s, trajectory.vehicle_displacement_m / size, color=ORANGE)
     _room_above(axes)
     axes.set_title("Displacement of the vehicle")
-    axes.set_ylabel("displacement [m]")
+    axes.set_ylabel(f"displacement [{unit}]")
     start, why = unreliable_from(trajectory)
     if start < trajectory.time_s[-1]:
         axes.annotate(why, (0.98, 0.05), xycoords="axes fraction", ha="right", fontsize=8.5, color=GREY)
@@ -152,12 +158,13 @@ def _legend_above(axes: Axes) -> None:
     axes.legend(loc="upper left", ncols=2, columnspacing=1.0, handlelength=1.7, borderpad=0.2, borderaxespad=0.2)
 
 
-def _peaks(rotation: Axes, force: Axes, boulder: Axes, vehicle: Axes, trajectory: Trajectory) -> None:
+def _peaks(rotation: Axes, force: Axes, boulder: Axes, vehicle: Axes, trajectory: Trajectory, units: str) -> None:
     m = trajectory.motion.outcome.maxima
     # The largest |rotation| may be a backward one.
     at = np.interp(m.t_theta, trajectory.time_s, trajectory.rotation_rad)
     theta = math.copysign(math.degrees(m.theta), float(at))
     figures.mark_peak(rotation, m.t_theta, theta, f"{abs(theta):.2f}°", BLUE)
-    figures.mark_peak(force, m.t_F_v, m.F_v / 1e3, f"{m.F_v / 1e3:.0f} kN", ORANGE)
-    figures.mark_peak(boulder, m.t_x_b, m.x_b, f"{m.x_b:.3f} m", BLUE, below=True)
-    figures.mark_peak(vehicle, m.t_x_v, m.x_v, f"{m.x_v:.3f} m", ORANGE)
+    (force_unit, force_size), (unit, size) = sized("N", units), sized("m", units)
+    figures.mark_peak(force, m.t_F_v, m.F_v / force_size, f"{m.F_v / force_size:.0f} {force_unit}", ORANGE)
+    figures.mark_peak(boulder, m.t_x_b, m.x_b / size, f"{m.x_b / size:.3f} {unit}", BLUE, below=True)
+    figures.mark_peak(vehicle, m.t_x_v, m.x_v / size, f"{m.x_v / size:.3f} {unit}", ORANGE)

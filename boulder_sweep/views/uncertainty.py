@@ -9,7 +9,7 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views.figures import BLUE, GREY, LIGHT_GREY, ORANGE, PALE_ORANGE, figure
-from boulder_sweep.views.slices import label
+from boulder_sweep.views.labels import label, name_of, size_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FIFTHS = 5
 
 
-def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0) -> None:
+def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0, units: str = "si") -> None:
     """Draw one design of a result.
 
     Parameters
@@ -31,6 +31,8 @@ def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0
         Picture to write.
     design_id
         The design.
+    units
+        ``si`` or ``us``.
 
     Raises
     ------
@@ -47,7 +49,7 @@ def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0
     order = sorted(names, key=lambda name: float(np.ptp(changes[name])), reverse=True)
     with figure(path, 9.6, 4.4) as fig:
         left, right = fig.subplots(1, 2, width_ratios=(1.1, 1.0))
-        _scatter(left, samples, order)
+        _scatter(left, samples, order, units)
         _tornado(right, changes, order, row["p_pass"])
         fig.suptitle(
             f"{found.sweep.name}: P(pass) = {row['p_pass']:.3f} ({row['p_pass_low']:.3f} to {row['p_pass_high']:.3f})",
@@ -65,15 +67,15 @@ def _by_fifths(samples: pd.DataFrame, name: str) -> np.ndarray:
     return np.array([part.mean() for part in np.array_split(passes, FIFTHS)])
 
 
-def _scatter(axes: Axes, samples: pd.DataFrame, order: list[str]) -> None:
+def _scatter(axes: Axes, samples: pd.DataFrame, order: list[str], units: str) -> None:
     """Draw the samples over the two inputs that decide most; over one and its margin where there is one only."""
     passes = samples.distance.to_numpy() > 0.0
-    x = samples[order[0]].to_numpy()
-    y = samples[order[1]].to_numpy() if len(order) > 1 else samples.distance.to_numpy()
+    x = samples[order[0]].to_numpy() / size_of(order[0], units)
+    y = samples[order[1]].to_numpy() / size_of(order[1], units) if len(order) > 1 else samples.distance.to_numpy()
     for rows, colour, words in ((~passes, ORANGE, "does not pass"), (passes, BLUE, "passes")):
         axes.plot(x[rows], y[rows], ".", color=colour, markersize=2.2, alpha=0.6, label=words, rasterized=True)
-    axes.set_xlabel(label(order[0]))
-    axes.set_ylabel(label(order[1]) if len(order) > 1 else "margin (below 0: does not pass)")
+    axes.set_xlabel(label(order[0], units))
+    axes.set_ylabel(label(order[1], units) if len(order) > 1 else "margin (below 0: does not pass)")
     axes.set_title("designs drawn")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, markerscale=4)
 
@@ -96,7 +98,7 @@ def _tornado(axes: Axes, changes: dict[str, np.ndarray], order: list[str], p_pas
                 color=GREY,
             )
     axes.axvline(p_pass, color=LIGHT_GREY, zorder=0)
-    axes.set_yticks(range(len(order)), [label(name).partition(" [")[0] for name in reversed(order)])
+    axes.set_yticks(range(len(order)), [name_of(name) for name in reversed(order)])
     axes.margins(x=0.3)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("P(pass) where the input lies in its lowest or highest fifth")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,9 @@ import numpy as np
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE
+from boulder_sweep.views.labels import label, name_of, size_of, value_text
 from boulder_sweep.views.pieces import Pieces
-from boulder_sweep.views.slices import Slice, label, plane, select, value_text
+from boulder_sweep.views.slices import Slice, plane, select
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,6 +52,8 @@ def draw_verdict_map(
     columns: str | None = None,
     rows: str | None = None,
     at: Mapping[str, float] | None = None,
+    sets: Mapping[str, Sequence[str]] | None = None,
+    units: str = "si",
 ) -> Slice:
     """Draw which designs of a table pass, over two of their inputs.
 
@@ -65,8 +68,10 @@ def draw_verdict_map(
         Name of the study.
     terms
         What a pass means, for the caption.
-    across, up, columns, rows, at
+    across, up, columns, rows, at, sets
         What is shown, see `boulder_sweep.views.slices.plane`.
+    units
+        ``si`` or ``us``.
 
     Returns
     -------
@@ -78,9 +83,9 @@ def draw_verdict_map(
     PictureError
         Nothing can be drawn of this table, or the picture cannot be written.
     """
-    shown = plane(table, across=across, up=up, columns=columns, rows=rows, at=at)
+    shown = plane(table, across=across, up=up, columns=columns, rows=rows, at=at, sets=sets)
     if shown.count == 0:
-        held = ", ".join(f"{name}={value:.5g}" for name, value in shown.fixed.items())
+        held = ", ".join(_held(shown, name, value, "si") for name, value in shown.fixed.items())
         raise PictureError(
             f"none of the {shown.total:,} designs lies at {held}: this is a list of designs rather than a grid; "
             "hold values that occur together (--at), or draw the table in a notebook"
@@ -88,7 +93,7 @@ def draw_verdict_map(
     n_columns, n_rows = len(shown.column_values), len(shown.row_values)
     beside = n_columns <= NARROW
     width = max(2.2 * n_columns + 1.9, 5.2) + 1.8 * beside
-    caption = _caption(shown, terms, int(CHARACTERS_PER_INCH * width))
+    caption = _caption(shown, terms, int(CHARACTERS_PER_INCH * width), units)
     height = max(1.9 * n_rows + 1.45, 3.45) + CAPTION_LINE_IN * (caption.count("\n") + 1)
     with figures.figure(path, width, height) as fig:
         grid = fig.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
@@ -97,13 +102,13 @@ def draw_verdict_map(
             for column, column_value in enumerate(shown.column_values):
                 axes = grid[row, column]
                 cell_rows = select(select(shown.rows, shown.columns, column_value), shown.rows_over, row_value)
-                present |= _panel(axes, cell_rows, shown)
-                axes.set_title(_panel_title(shown, row_value, column_value), fontsize=8.5)
+                present |= _panel(axes, cell_rows, shown, units)
+                axes.set_title(_panel_title(shown, row_value, column_value, units), fontsize=8.5)
                 axes.grid(visible=False)
         for axes in grid[-1]:
-            axes.set_xlabel(label(shown.across))
+            axes.set_xlabel(label(shown.across, units))
         for axes in grid[:, 0]:
-            axes.set_ylabel(label(shown.up))
+            axes.set_ylabel(label(shown.up, units))
         _legend(fig, present, beside=beside)
         fig.suptitle(
             f"{title}: which designs stop the truck" if title else "Which designs stop the truck",
@@ -128,14 +133,14 @@ def classes_of(rows: pd.DataFrame) -> np.ndarray:
     return codes
 
 
-def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice) -> set[int]:
+def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]:
     """Draw one map; return the classes that occur."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     codes = classes_of(rows)
     colours = ListedColormap([colour for _, colour, _ in CLASSES])
     norm = BoundaryNorm(np.arange(len(CLASSES) + 1) - 0.5, len(CLASSES))
-    x, y = (rows[name].to_numpy(dtype=float) for name in (shown.across, shown.up))
+    x, y = (rows[name].to_numpy(dtype=float) / size_of(name, units) for name in (shown.across, shown.up))
     x_levels, x_place = np.unique(np.round(x, 9), return_inverse=True)
     y_levels, y_place = np.unique(np.round(y, 9), return_inverse=True)
     cells = np.full((len(y_levels), len(x_levels)), -1, dtype=np.int16)
@@ -162,9 +167,16 @@ def _edges(levels: np.ndarray) -> np.ndarray:
     return np.concatenate(([2 * levels[0] - middles[0]], middles, [2 * levels[-1] - middles[-1]]))
 
 
-def _panel_title(shown: Slice, row_value: float, column_value: float) -> str:
+def _panel_title(shown: Slice, row_value: float, column_value: float, units: str) -> str:
     pairs = ((shown.rows_over, row_value), (shown.columns, column_value))
-    return ", ".join(value_text(name, value) for name, value in pairs if name is not None)
+    return ", ".join(_held(shown, name, value, units) for name, value in pairs if name is not None)
+
+
+def _held(shown: Slice, name: str, value: float, units: str) -> str:
+    """Return the value of an input in words; of a named soil or vehicle its name."""
+    if name in shown.sets:
+        return f"{name}: {shown.sets[name][int(value)]}"
+    return value_text(name, value, units)
 
 
 def _legend(fig: Any, present: set[int], *, beside: bool) -> None:
@@ -176,18 +188,22 @@ def _legend(fig: Any, present: set[int], *, beside: bool) -> None:
     fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
 
 
-def _caption(shown: Slice, terms: str, width: int) -> str:
+def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     """Say what is shown, what all designs have in common, and what a pass means, each on a new line."""
-    fixed = ", ".join(_unbroken(name, value) for name, value in shown.fixed.items())
+    fixed = ", ".join(_unbroken(_held(shown, name, value, units)) for name, value in shown.fixed.items())
     words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
     for name, count in shown.left_out.items():
-        words.append(f"{label(name).partition(' [')[0]}: {count} values, not all shown")
-    same = [_unbroken(name, value) for name, value in shown.constants.items() if (name, value) not in USUAL]
+        words.append(f"{name_of(name)}: {count} values, not all shown")
+    same = [
+        _unbroken(_held(shown, name, value, units))
+        for name, value in shown.constants.items()
+        if (name, value) not in USUAL
+    ]
     lines = (" · ".join(words), f"All designs: {', '.join(same)}" if same else "", terms)
     return "\n".join(textwrap.fill(line, width) for line in lines if line)
 
 
-def _unbroken(name: str, value: float) -> str:
-    """Value of an input that stays on one line."""
-    return value_text(name, value).replace(" ", "\N{NO-BREAK SPACE}")
+def _unbroken(words: str) -> str:
+    """Return words that stay on one line."""
+    return words.replace(" ", "\N{NO-BREAK SPACE}")

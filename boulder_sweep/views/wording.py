@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from boulder_sweep.views.labels import sized, value_text
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -47,15 +49,18 @@ def terms_line(settings: Mapping[str, Any]) -> str:
     )
 
 
-def design_line(trajectory: Trajectory) -> str:
+def design_line(trajectory: Trajectory, units: str = "si") -> str:
     """Boulder, soil, vehicle and readings in one line; below it, that this is a simulation."""
     value = trajectory.inputs
-    size = " × ".join(f"{value[f'boulder_{side}_m']:.4g}" for side in ("length", "width", "height"))
+    unit, metre = sized("m", units)
+    size = " × ".join(f"{value[f'boulder_{side}_m'] / metre:.4g}" for side in ("length", "width", "height"))
+    soil = (value_text(name, value[name], units) for name in ("friction_angle_deg", "subgrade_reaction_MN_m3"))
+    truck, speed = (value_text(name, value[name], units) for name in ("vehicle_mass_kg", "impact_speed_m_s"))
     words = " · ".join(
         (
-            f"boulder {size} m (L × W × H), {value['embedment_depth_m']:.4g} m deep",
-            f"soil φ′ {value['friction_angle_deg']:.4g}°, β {value['subgrade_reaction_MN_m3']:.4g} MN/m³",
-            f"vehicle {value['vehicle_mass_kg']:.5g} kg at {value['impact_speed_m_s']:.4g} m/s",
+            f"boulder {size} {unit} (L × W × H), {value['embedment_depth_m'] / metre:.4g} {unit} deep",
+            f"soil {', '.join(soil)}",
+            f"{truck}, {speed}",
             f"readings {trajectory.settings['model']['preset'].replace('_', ' ')}",
         )
     )

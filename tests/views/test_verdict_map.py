@@ -15,8 +15,10 @@ import boulder_sweep
 from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
+from boulder_sweep.settings import load_text
+from boulder_sweep.views.labels import label, value_text
 from boulder_sweep.views.pieces import Kept, Pieces, pieces_of
-from boulder_sweep.views.slices import Slice, label, plane, value_text
+from boulder_sweep.views.slices import Slice, plane
 from boulder_sweep.views.verdict_map import CLASSES, classes_of, draw_verdict_map
 
 GRID = """\
@@ -233,7 +235,10 @@ def test_the_command_never_holds_more_than_a_few_parts(out, monkeypatch, capsys)
 def test_words() -> None:
     assert label("boulder_height_m") == "boulder height [m]"
     assert label("subgrade_reaction_MN_m3") == "subgrade reaction β [MN/m³]"
-    assert label("vehicle_damper_N_s_m") == "vehicle damper [N·s/m]"
+    assert label("vehicle_damper_N_s_m") == "vehicle damper [kN·s/m]"
+    assert label("vehicle_damper_N_s_m", "us") == "vehicle damper [lb·s/in]"
+    assert value_text("subgrade_reaction_MN_m3", 95.0, "us") == "β = 349.98 pci"
+    assert value_text("impact_speed_m_s", 13.4112, "us") == "speed 30 mph"
     assert label("strain_rate_factor") == "strain rate factor"
     assert value_text("friction_angle_deg", 36.0) == "φ′ = 36°"
     assert value_text("bed_offset_m", 2.9) == "bed offset 2.9 m"
@@ -321,3 +326,65 @@ def test_the_caption_tells_truck_speed_and_constants(out: Path, monkeypatch: pyt
     assert caption.endswith(
         "Pass: rotation up to 20° and rating P1 · readings corrected. Simulation, not a rating by test."
     )
+
+
+NAMED = """\
+name: three soils
+boulder: {length: 1.65 m, width: 1.68 m, height: [2.6, 3.0, 3.4] m, density: 2596 kg/m^3}
+site: {embedment_ratio: [0.4, 0.5, 0.6]}
+soil:
+  - {name: loose, density: 1700 kg/m^3, friction_angle: 30 deg, subgrade_reaction: 10 MN/m^3}
+  - {name: dense, density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+  - {name: gravel, density: 2000 kg/m^3, friction_angle: 44 deg, subgrade_reaction: 95 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+@pytest.fixture
+def named_soils(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A result with three named soils."""
+    monkeypatch.chdir(tmp_path)
+    Path("named.yaml").write_text(NAMED)
+    assert execute(["run", "named.yaml", "-q", "-o", "named.sweep"]) == 0
+    return "named.sweep"
+
+
+def test_every_named_soil_has_its_map(named_soils: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["plot", named_soils, "-o", "map.svg"]) == 0
+    assert "map.svg: 27 of 27 designs" in capsys.readouterr().out
+    drawn = Path("map.svg").read_text()
+    assert all(f"<!-- soil: {name} -->" in drawn for name in ("loose", "dense", "gravel"))
+    assert execute(["plot", named_soils, "-o", "one.svg", "--at", "soil=dense"]) == 0
+    assert "one.svg: 9 of 27 designs" in capsys.readouterr().out
+    assert "soil:" in Path("one.svg").read_text()
+    assert execute(["plot", named_soils, "-o", "one.svg", "--at", "soil=mud"]) == 2
+    assert "there are loose, dense, gravel" in capsys.readouterr().err
+
+
+def test_a_map_in_us_units(named_soils: str) -> None:
+    assert execute(["plot", named_soils, "-o", "us.svg", "--units", "us"]) == 0
+    drawn = Path("us.svg").read_text()
+    assert "<!-- boulder height [ft] -->" in drawn
+    assert "speed\N{NO-BREAK SPACE}30\N{NO-BREAK SPACE}mph" in drawn, "values stay on one line, as they are"
+
+
+def test_a_file_of_sweep_boundary_is_drawn_as_the_run_is(named_soils: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["boundary", "named.yaml", "-q", "-o", "named.parquet"]) == 0
+    assert execute(["plot", "named.parquet"]) == 0
+    assert "named.png: 27 of 27 designs" in capsys.readouterr().out
+    assert execute(["plot", named_soils, "-o", "run.png"]) == 0
+    assert Path("named.png").read_bytes() == Path("run.png").read_bytes()
+    boulder_sweep.read(named_soils).to_parquet("other.parquet")
+    assert execute(["plot", "other.parquet"]) == 2
+    assert "neither the folder of a run nor a file that `sweep boundary` wrote" in capsys.readouterr().err
+    assert execute(["plot", "named.yaml"]) == 2
+    assert "cannot be read as a Parquet file" in capsys.readouterr().err
+
+
+def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None:
+    sweep = load_text(NAMED, tmp_path / "named.yaml")
+    found = boulder_sweep.need(sweep, both_readings=False)
+    found.plot(tmp_path / "chart.svg", units="us")
+    drawn = (tmp_path / "chart.svg").read_text()
+    assert all(f"<!-- {name} -->" in drawn for name in ("loose", "dense", "gravel"))
+    assert "<!-- embedment depth [ft] -->" in drawn
