@@ -361,9 +361,14 @@ def _wait_for_a_worker(client: Any, address: str) -> None:
 
 
 def _check_versions(client: Any) -> None:
-    """Refuse workers whose rows could differ from those of this machine."""
-    here = fingerprint()
-    different = [address for address, there in client.run(fingerprint).items() if tuple(there) != here]
+    """Refuse workers whose rows could differ from those of this machine; one that leaves meanwhile does not matter."""
+    here, different = fingerprint(), []
+    for address, there in client.run(fingerprint, on_error="return").items():
+        if isinstance(there, Exception):
+            if not isinstance(there, OSError):
+                raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")
+        elif tuple(there) != here:
+            different.append(address)
     if different:
         raise BackendError(_other_versions_text(f"the workers {', '.join(different)}"))
 

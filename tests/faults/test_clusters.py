@@ -54,12 +54,17 @@ def test_losing_the_last_worker_ends_the_run_resumable(tmp_path, monkeypatch):
     monkeypatch.setattr(backend, "NO_WORKER_S", 2.0)
     rows, out, told = 40_000, tmp_path / "out", []
     with Cluster(1, tmp_path) as cluster:
-        threading.Timer(1.5, cluster.kill_worker).start()
+
+        def progress(now):
+            told.append(now)
+            if cluster.workers and now.rows_done:
+                cluster.kill_worker()
+
         how = {"backend": "dask", "scheduler": cluster.address, "rows_per_part": 5000, "simulate": slowly}
         with pytest.raises(
             ClusterLostError, match=r"has no worker; start one with.*rows are safe. Resume with"
         ) as lost:
-            run(grid_of(rows), out, progress=told.append, **how)
+            run(grid_of(rows), out, progress=progress, **how)
         assert lost.value.exit_code == 130
         notes = told[-1].notes
         assert any(note.startswith("lost worker tcp://127.0.0.1") for note in notes)
