@@ -134,6 +134,11 @@ def run_options(function: Command) -> Command:
                 help="Threads, or a Dask cluster.",
             ),
             click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, with --backend dask."),
+            click.option(
+                "--dashboard",
+                metavar="ADDRESS",
+                help="Where Dask's dashboard listens [default: this machine only].",
+            ),
             click.option("--resume", is_flag=True, help="Resume an interrupted run."),
             click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run."),
             click.option("--force", is_flag=True, help="Run even if disk or memory seem too small."),

@@ -44,6 +44,8 @@ def run(
         raise click.UsageError("--resume and --overwrite exclude each other")
     if options["scheduler"] and options["backend"] != "dask":
         raise click.UsageError("--scheduler needs --backend dask")
+    if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
+        raise click.UsageError("--dashboard needs --backend dask, and no --scheduler: that one has its own")
     sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
     target = place_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:

@@ -12,10 +12,12 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
 from boulder_sweep.places import place_of
 from boulder_sweep.runner.computing import Computation, EncodedPart, failed_rows
+from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.lock import LOCK_NAME
@@ -33,6 +35,9 @@ _QUIET_S = 10.0
 _TASKS_PER_THREAD = 2
 _TRIES = 3
 _LOOPBACK = "127.0.0.1:0"
+_prepared: set[str] = set()
+_preparing = threading.Lock()
+"""Which runs this process, a worker, is ready for."""
 
 Fingerprint = tuple[dict[str, str], str, str]
 
@@ -46,6 +51,14 @@ class Cluster:
         Threads of the worker to start where no scheduler is given.
     scheduler
         Address of a running scheduler; None to start one in this process, reachable from this machine only.
+    dashboard
+        Where the dashboard of a scheduler in this process listens, such as ``0.0.0.0:8787``; a free port of
+        127.0.0.1 by default.
+
+    Attributes
+    ----------
+    dashboard : str or None
+        Address of the dashboard, if there is one.
 
     Raises
     ------
@@ -53,18 +66,21 @@ class Cluster:
         Dask is not installed, the scheduler does not answer, it has no worker, or a worker has other versions.
     """
 
-    def __init__(self, jobs: int, scheduler: str | None):
+    def __init__(self, jobs: int, scheduler: str | None, dashboard: str | None = None):
         self.address = scheduler
         self._levels: dict[str, int] = {}
         self._local: Any = None
         self.client: Any = None
         try:
-            self.client = self._connected(jobs, scheduler)
+            self.client = self._connected(jobs, scheduler, dashboard or _LOOPBACK)
+            port = self.client.scheduler_info()["services"].get("dashboard")
+            link = f"http://127.0.0.1:{port}/status" if scheduler is None and dashboard is None else None
+            self.dashboard: str | None = (link or self.client.dashboard_link) if port else None
         except BaseException:
             self.close()
             raise
 
-    def _connected(self, jobs: int, scheduler: str | None) -> Any:
+    def _connected(self, jobs: int, scheduler: str | None, dashboard: str) -> Any:
         """Connect, or start a scheduler and a worker of threads in this process."""
         try:
             distributed = import_module("distributed")  # an extra: most users have no cluster
@@ -76,7 +92,7 @@ class Cluster:
                 processes=False,
                 n_workers=1,
                 threads_per_worker=jobs,
-                dashboard_address=_LOOPBACK,
+                dashboard_address=dashboard,
                 worker_dashboard_address=_LOOPBACK,
             )
             return distributed.Client(self._local, set_as_default=False)
@@ -121,7 +137,7 @@ class Cluster:
 
 @dataclass(frozen=True)
 class _Task:
-    """Rows [start, stop) of one part, and how often computing them has failed."""
+    """Rows [start, stop), and how often computing them has failed."""
 
     start: int
     stop: int
@@ -136,8 +152,10 @@ class _Task:
 class _Work:
     """What every task of a run has in common; sent to the cluster once."""
 
+    name: str
     computation: Computation
     rows_per_block: int
+    rows_per_part: int
     folder: str
     table_rows: int
     fingerprint: Fingerprint
@@ -146,8 +164,8 @@ class _Work:
 class _Done(NamedTuple):
     """What a worker returns."""
 
-    staged: StagedPart | None
-    relayed: EncodedPart | None
+    staged: list[StagedPart]
+    relayed: list[EncodedPart]
 
 
 class ClusterWorkers(threading.Thread):
@@ -160,7 +178,7 @@ class ClusterWorkers(threading.Thread):
     computation
         What to do with rows.
     tasks
-        Ranges of rows [start, stop), none across two parts.
+        Ranges of rows [start, stop).
     rows_per_block
         Rows that a worker computes at once.
     folder
@@ -212,8 +230,16 @@ class ClusterWorkers(threading.Thread):
 
     def _work(self) -> None:
         """Keep some tasks in flight until all are done."""
-        folder, rows = str(self._folder.path.resolve()), self._folder.manifest.rows
-        work = _Work(self._computation, self._rows_per_block, folder, rows, fingerprint())
+        manifest = self._folder.manifest
+        work = _Work(
+            uuid4().hex,
+            self._computation,
+            self._rows_per_block,
+            manifest.rows_per_part,
+            str(self._folder.path.resolve()),
+            manifest.rows,
+            fingerprint(),
+        )
         shared = self._cluster.client.submit(_received, work, pure=False)
         looked = result = time.monotonic()
         self._look_at_workers()
@@ -266,18 +292,22 @@ class ClusterWorkers(threading.Thread):
             raise ClusterLostError(self._cluster.lost_text())
 
     def _accept(self, task: _Task, done: _Done) -> None:
-        """Pass on a part that a worker has written, or write one that it sent."""
-        staged = done.staged
-        if done.relayed is not None:
-            part = done.relayed
-            staged = self._folder.stage(part.first, part.content, part.rows, part.verdicts)
-        elif staged is None or not (self._folder.path / hidden_name(staged.name)).exists():
+        """Pass on the parts that a worker has written, or write those that it sent."""
+        for part in done.relayed:
+            done.staged.append(self._folder.stage(part.first, part.content, part.rows, part.verdicts))
+        here = [staged for staged in done.staged if (self._folder.path / hidden_name(staged.name)).exists()]
+        for staged in here:
+            self.messages.put(Computed(staged.part.rows))
+            self.messages.put(staged)
+        if len(here) < len(_parts(task.start, task.stop, self._folder.manifest.rows_per_part)):
             if not task.relayed:
                 self.messages.put(Note("a worker does not share the output folder: its rows pass the scheduler"))
-            self._again.append(replace(task, tries=task.tries + 1, relayed=True))
-            return
-        self.messages.put(Computed(task.stop - task.start))
-        self.messages.put(staged)
+            there = {staged.part.first for staged in here}
+            self._again += [
+                _Task(start, stop, task.tries + 1, relayed=True)
+                for start, stop in _parts(task.start, task.stop, self._folder.manifest.rows_per_part)
+                if start not in there
+            ]
 
     def _retry(self, task: _Task, problem: BaseException) -> None:
         """Submit a failed task again; halve one that ends its workers, until the row that does so is alone."""
@@ -298,7 +328,7 @@ class ClusterWorkers(threading.Thread):
             part = self._computation.encoded(
                 task.start, [failed_rows(1, "every worker that computed this design died")]
             )
-            self._accept(task, _Done(None, part))
+            self._accept(task, _Done([], [part]))
 
     def _look_at_workers(self) -> None:
         """Notice workers that came and went."""
@@ -332,30 +362,57 @@ def _received(work: _Work) -> _Work:
 
 
 def _compute(work: _Work, start: int, stop: int, relayed: bool) -> _Done:
-    """Compute, encode and stage some rows of one part on a worker."""
-    if fingerprint() != work.fingerprint:
-        raise BackendError(_other_versions_text("a worker"))
-    firsts = range(start, stop, work.rows_per_block)
-    pieces = [work.computation.judged(first, min(first + work.rows_per_block, stop)) for first in firsts]
-    part = work.computation.encoded(start, pieces)
-    if relayed:
-        return _Done(None, part._replace(content=bytes(part.content)))
+    """Compute, encode and stage some rows on a worker, part by part."""
+    _prepare(work)
     folder = place_of(work.folder)
-    if not (folder / LOCK_NAME).exists():
-        return _Done(None, None)
-    return _Done(stage(storage_of(folder), work.table_rows, part.first, part.content, part.rows, part.verdicts), None)
+    done = _Done([], [])
+    if not relayed and not (folder / LOCK_NAME).exists():
+        return done
+    storage = storage_of(folder)
+    for begin, end in _parts(start, stop, work.rows_per_part):
+        pieces = [work.computation.judged(*rows) for rows in blocks(iter([(begin, end)]), work.rows_per_block)]
+        part = work.computation.encoded(begin, pieces)
+        if relayed:
+            done.relayed.append(part._replace(content=bytes(part.content)))
+        else:
+            done.staged.append(stage(storage, work.table_rows, part.first, part.content, part.rows, part.verdicts))
+    return done
+
+
+def _prepare(work: _Work) -> None:
+    """Compare versions and load or compile the kernels, once in the process of a worker.
+
+    Raises
+    ------
+    BackendError
+        Rows computed here could differ from those of the others.
+    """
+    with _preparing:
+        if work.name not in _prepared:
+            if fingerprint() != work.fingerprint:
+                raise BackendError(_other_versions_text("a worker"))
+            work.computation.warm_up()
+            _prepared.add(work.name)
+
+
+def _parts(start: int, stop: int, size: int) -> list[tuple[int, int]]:
+    """Cut rows [start, stop) at the ends of parts."""
+    ends = [*range(start - start % size + size, stop, size), stop]
+    return list(zip([start, *ends[:-1]], ends, strict=True))
 
 
 def _wait_for_a_worker(client: Any, address: str) -> None:
-    """Wait until a worker is connected.
+    """Wait until a worker is connected; the scheduler of an adaptive cluster starts one when there is work.
 
     Raises
     ------
     BackendError
         None has come.
     """
+    work = client.submit(int, pure=False)
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)
+        work.release()
     except TimeoutError:
         raise BackendError(_no_worker_text(address)) from None
 

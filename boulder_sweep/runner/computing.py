@@ -47,13 +47,26 @@ class Computation:
         Gives the inputs of some rows.
     metadata
         Metadata of the files of parts.
+    warm_up
+        Loads or compiles what `evaluate` calls.
     """
 
-    def __init__(self, evaluate: Evaluate, make_block: MakeBlock, metadata: Mapping[bytes, bytes]):
+    def __init__(
+        self,
+        evaluate: Evaluate,
+        make_block: MakeBlock,
+        metadata: Mapping[bytes, bytes],
+        warm_up: Callable[[], None] = lambda: None,
+    ):
         self._evaluate = evaluate
         self._make_block = make_block
         self._metadata = dict(metadata)
+        self._warm_up = warm_up
         self._failures = 0
+
+    def warm_up(self) -> None:
+        """Load or compile the kernels."""
+        self._warm_up()
 
     def judged(self, start: int, stop: int, tries: int = _TRIES) -> Judged:
         """Compute the rows [start, stop); those that fail every time are rows of verdict ``error``."""

@@ -235,10 +235,11 @@ def rows_per_block(seconds_per_row: float, rows: int, jobs: int) -> int:
 
 
 def rows_per_task(estimate: Estimate, rows_per_part: int) -> int:
-    """Return the rows that a worker of a cluster computes and writes at once: a part, or less where rows take long."""
+    """Return the rows of a task of a cluster: some whole parts, or less than a part where rows take long."""
     by_time = int(TASK_S * estimate.rows_per_second / estimate.jobs)
     by_share = -(-estimate.rows_to_compute // (4 * estimate.jobs))
-    return max(1, min(rows_per_part, by_time, by_share))
+    rows = max(1, min(by_time, by_share))
+    return rows - rows % rows_per_part if rows > rows_per_part else rows
 
 
 def refuse_hopeless(sweep: Sweep, rows_to_compute: int, out: Place) -> None:
@@ -286,6 +287,19 @@ def blocks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, 
     for start, stop in ranges:
         for first in range(start, stop, size):
             yield first, min(first + size, stop)
+
+
+def tasks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:
+    """Join neighbouring ranges of rows [start, stop) up to a size, and cut those that are longer, lazily."""
+    first = last = -1
+    for start, stop in blocks(ranges, size):
+        if start != last or stop - first > size:
+            if last > first:
+                yield first, last
+            first = start
+        last = stop
+    if last > first:
+        yield first, last
 
 
 def _disk_free(out: Place) -> int | None:

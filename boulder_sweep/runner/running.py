@@ -24,6 +24,7 @@ from boulder_sweep.runner.estimate import (
     rows_in_progress,
     rows_per_task,
     take_sample,
+    tasks,
 )
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
@@ -71,12 +72,12 @@ class Run:
         """What is recorded of the folder."""
         return self._folder.manifest
 
-    def prepare(self, backend: str, jobs: int, scheduler: str | None, force: bool) -> None:
+    def prepare(self, backend: str, jobs: int, scheduler: str | None, dashboard: str | None, force: bool) -> None:
         """Connect to workers, warm up the kernels, and check that the result will fit."""
         self._jobs = jobs
         try:
             if backend == DASK:
-                self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler))
+                self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler, dashboard))
                 self._jobs = max(sum(self._cluster.threads().values()), 1)
             self.firmness = self._signals.call(lambda: firmness_of(self._sweep).to_dict())
             identity, command = self._folder.manifest.identity, repeat_command(self._sweep)
@@ -92,9 +93,12 @@ class Run:
 
     def compute(self, progress: Report | None, commit_every_s: float) -> None:
         """Compute and write what is missing."""
-        computation = Computation(self._evaluation, self._sweep.block, self._metadata)
+        evaluation = self._evaluation
+        computation = Computation(evaluation, self._sweep.block, self._metadata, evaluation.warm_up)
         admission = Admission(0)
         workers = self._workers(computation, admission, commit_every_s)
+        if progress is not None and self._cluster is not None and self._cluster.dashboard:
+            self.notes.append(f"dashboard of the cluster: {self._cluster.dashboard}")
         committer = Committer(self._folder, computation, admission, tuple if workers is None else workers.flush)
         committer.start()
         try:
@@ -156,7 +160,7 @@ class Run:
         manifest, size = self._folder.manifest, self._estimate.rows_per_block
         if self._cluster is not None:
             rows = rows_per_task(self._estimate, manifest.rows_per_part)
-            return ClusterWorkers(self._cluster, computation, blocks(manifest.missing(), rows), size, self._folder)
+            return ClusterWorkers(self._cluster, computation, tasks(manifest.missing(), rows), size, self._folder)
         admission.limit = rows_in_progress(size, self._jobs, manifest.rows_per_part)
         assembly = Assembly(manifest.missing(), commit_every_s)
         ranges = blocks(manifest.missing(), size)

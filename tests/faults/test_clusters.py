@@ -8,12 +8,16 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
+from distributed import LocalCluster
 
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
+from boulder_sweep.runner.computing import Computation
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
@@ -52,7 +56,7 @@ def test_a_scheduler_without_workers_says_how_to_start_one(tmp_path, monkeypatch
 
 def test_losing_the_last_worker_ends_the_run_resumable(tmp_path, monkeypatch):
     monkeypatch.setattr(backend, "NO_WORKER_S", 2.0)
-    rows, out, told = 40_000, tmp_path / "out", []
+    rows, out, told = 20_000, tmp_path / "out", []
     with Cluster(1, tmp_path) as cluster:
 
         def progress(now):
@@ -118,6 +122,48 @@ def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypa
     assert table["reason"][5].as_py() == "every worker that computed this design died"
     others = [row for row in range(rows) if row != 5]
     assert same_bits(table.take(others), whole.take(others))
+
+
+def test_an_adaptive_cluster_starts_workers_for_a_run(tmp_path):
+    """From none: work that waits is what makes it start them."""
+    rows, how = 4000, {"rows_per_part": 500, "simulate": slowly}
+    with LocalCluster(
+        n_workers=0, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        cluster.adapt(minimum=0, maximum=2, interval="100 ms", wait_count=1)
+        run(grid_of(rows), tmp_path / "out", backend="dask", scheduler=cluster.scheduler_address, **how)
+    run(grid_of(rows), tmp_path / "whole", **how)
+    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+
+
+def test_a_worker_makes_itself_ready_once_and_refuses_other_versions():
+    calls = []
+    computation = Computation(None, None, {}, lambda: (time.sleep(0.05), calls.append(1)))
+    work = backend._Work("a run", computation, 10, 10, "", 10, backend.fingerprint())
+    threads = [threading.Thread(target=backend._prepare, args=(work,)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(calls) == 1
+    versions, _, rules = backend.fingerprint()
+    other = replace(work, name="another", fingerprint=(versions, "0" * 64, rules))
+    with pytest.raises(BackendError, match="a worker and this machine have different versions"):
+        backend._prepare(other)
+    assert len(calls) == 1
+
+
+def test_the_dashboard_is_named_and_answers(tmp_path):
+    told = []
+
+    def look(progress):
+        (address,) = [note.split()[-1] for note in progress.notes if note.startswith("dashboard of the cluster: ")]
+        with urlopen(address) as page:
+            told.append((address, page.status))
+
+    run(grid_of(2000), tmp_path / "out", backend="dask", progress=look, jobs=1, simulate=plausible)
+    assert told[-1][0].startswith("http://127.0.0.1:")
+    assert told[-1][1] == 200
 
 
 def test_workers_that_do_not_share_the_folder_send_their_parts(tmp_path, monkeypatch):
