@@ -14,9 +14,11 @@ from docs.studies import answers, energy, soil, uplift
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
+from docs.studies.one_face import one_face_words
 from docs.studies.readings import ReadingsStudy, readings_study
 from docs.studies.settings_tables import choices_table, columns_table, entries_table
 from docs.studies.validity import flags_of_grids, flags_table
+from docs.studies.wild import wild_table
 from docs.studies.wording import balance_words, convergence_words, fit_text, readings_words
 
 GRID = Path("configs/m30_sizing.yaml")
@@ -163,6 +165,14 @@ def _uplift_grid(root: Path) -> str:
     return uplift.grid_words(root / GRID).replace(f"{root}/", "")
 
 
+def _front_face(_: Path) -> str:
+    return one_face_words(GRID)
+
+
+def _wild_families(_: Path) -> str:
+    return wild_table().markdown()
+
+
 CONTENTS: dict[str, Callable[[Path], str]] = {
     "validation-table": _validation_table,
     "statements": _statements,
@@ -187,6 +197,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "soil-grid": _soil_grid,
     "uplift-tests": _uplift_tests,
     "uplift-grid": _uplift_grid,
+    "front-face": _front_face,
+    "wild-families": _wild_families,
     "settings-entries": _settings_entries,
     "settings-choices": _settings_choices,
     "result-columns": _result_columns,

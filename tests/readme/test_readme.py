@@ -114,6 +114,27 @@ def test_the_named_accuracies_are_those_of_the_benchmark() -> None:
     assert marked("named").splitlines()[2:] == rows
 
 
+def block(page: str, name: str) -> str:
+    """Return the text of a computed block of a page of the documentation."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    found = re.search(rf"<!-- {name} -->\n(.*?)\n<!-- end -->", text, re.DOTALL)
+    assert found, f"docs/{page} has no block {name}"
+    return found[1]
+
+
+def test_the_errors_far_from_usual_designs_are_those_of_the_study() -> None:
+    worst = block("accuracy.md", "wild-families").splitlines()[-1].split("|")
+    shown = re.search(r"the largest errors are ([\d.]+)°, ([\d.]+)° and ([\d.]+)°", " ".join(README.split()))
+    assert shown
+    assert list(shown.groups()) == [cell.strip() for cell in worst[3:6]]
+
+
+def test_what_the_soil_on_the_approach_side_is_worth_is_that_of_the_study() -> None:
+    assert "every pass of the M30 grid overturns" in " ".join(README.split())
+    passes, overturn = re.findall(r"Of (\d+) passes .*?, (\d+) overturn", block("validity.md", "front-face"))[0]
+    assert passes == overturn
+
+
 def test_the_comparison_with_others_is_that_of_the_benchmark() -> None:
     """Milliseconds of the paper's way and the factors of both ways, in round numbers."""
     benchmark = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
