@@ -78,10 +78,10 @@ FLAGS = (
     Flag(
         "crush",
         "more crush than the vehicle's front is calibrated for",
-        "crush above `vehicle.calibrated_crush` (1 m)",
-        "Spring and damper were fitted up to about 1 m; beyond it the chassis stiffens, as the paper says, and the "
-        "model parts from the test on the unsafe side.",
-        lambda facts: facts.outcomes.crush_max > facts.limits.calibrated_crush,
+        "vehicle driven on by more than `vehicle.calibrated_crush` (1 m) further than the boulder moved",
+        "After about 1 m of displacement the chassis stiffens, as the paper says, and the model parts from the test on "
+        "the unsafe side. The larger boulder of the paper is at 1.04 m itself (0.77 m as printed).",
+        lambda facts: facts.outcomes.x_v_max - facts.outcomes.x_b_max > facts.limits.calibrated_crush,
     ),
     Flag(
         "rotation",

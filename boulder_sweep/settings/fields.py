@@ -266,7 +266,8 @@ SETTINGS: tuple[Field, ...] = (
         "calibrated_crush",
         "calibrated_crush_m",
         "m",
-        "crush up to which spring and damper describe the vehicle's front; beyond it a row is flagged",
+        "crush up to which spring and damper describe the vehicle's front; a row is flagged where the vehicle drives "
+        "on by more, counted from the boulder",
         Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
         also=("crush", "max_crush"),
     ),

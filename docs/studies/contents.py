@@ -17,7 +17,7 @@ from docs.studies.knife_edge import knife_edge_words
 from docs.studies.one_face import one_face_words
 from docs.studies.readings import ReadingsStudy, readings_study
 from docs.studies.settings_tables import choices_table, columns_table, entries_table
-from docs.studies.validity import flags_of_grids, flags_table
+from docs.studies.validity import crush_words, flags_of_grids, flags_table
 from docs.studies.wild import wild_table
 from docs.studies.wording import balance_words, convergence_words, fit_text, readings_words
 
@@ -165,8 +165,12 @@ def _uplift_grid(root: Path) -> str:
     return uplift.grid_words(root / GRID).replace(f"{root}/", "")
 
 
-def _front_face(_: Path) -> str:
-    return one_face_words(GRID)
+def _crush_words(root: Path) -> str:
+    return crush_words(root / GRID)
+
+
+def _front_face(root: Path) -> str:
+    return one_face_words(root / GRID)
 
 
 def _wild_families(_: Path) -> str:
@@ -197,6 +201,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "soil-grid": _soil_grid,
     "uplift-tests": _uplift_tests,
     "uplift-grid": _uplift_grid,
+    "crush-words": _crush_words,
     "front-face": _front_face,
     "wild-families": _wild_families,
     "settings-entries": _settings_entries,

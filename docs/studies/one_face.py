@@ -7,6 +7,7 @@ elements, all designs side by side. With soil on both faces it is held against t
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ class Motion(NamedTuple):
     v_v: np.ndarray
 
 
-def rate(y: Motion, c: Constants, *, both_faces: bool) -> Motion:
+def rate(y: Motion, c: SimpleNamespace, *, both_faces: bool) -> Motion:
     """Rate of the motion (Eqs 10, 11, 17, 26, 28, 36, 37, 46 as corrected).
 
     Parameters
@@ -44,7 +45,7 @@ def rate(y: Motion, c: Constants, *, both_faces: bool) -> Motion:
     y
         The state.
     c
-        Constants of the designs, arrays of shape (n,).
+        The fields of `Constants`, arrays of shape (n,).
     both_faces
         Whether the soil on the approach side takes part: without it, no soil pulls.
     """
@@ -78,7 +79,8 @@ def rate(y: Motion, c: Constants, *, both_faces: bool) -> Motion:
 def largest_rotation(table: DesignTable, limit: float, horizon: float, *, both_faces: bool) -> np.ndarray:
     """Return the largest rotation of every design [rad], cut off a little beyond the limit [rad]."""
     rows = [constants_of(design_at(table, row), corrected(), 0) for row in range(table.L.size)]
-    c = Constants(*(np.array(column) for column in zip(*rows, strict=True)))
+    columns = (np.array(column) for column in zip(*rows, strict=True))
+    c = SimpleNamespace(**dict(zip(Constants._fields, columns, strict=True)))
     still = np.zeros(table.L.size)
     y = Motion(still, still, still, still, still, c.v_0.copy())
     largest, h = still.copy(), STEP_S
@@ -112,7 +114,7 @@ def one_face_words(grid: Path) -> str:
     alone = largest_rotation(table, limit, horizon, both_faces=False)
     apart = np.degrees(np.abs(both - known).max())
     return (
-        f"Of {len(known)} passes of a sample of `{grid.as_posix()}`, {np.count_nonzero(alone >= limit)} overturn with "
-        f"soil behind the boulder alone. (With soil on both faces the same integrator is at most {apart:.1g}° from the "
-        "kernels.)"
+        f"Of {len(known)} passes of a sample of `configs/{grid.name}`, {np.count_nonzero(alone >= limit)} overturn "
+        f"with soil behind the boulder alone. (With soil on both faces the same integrator is at most {apart:.1g}° "
+        "from the kernels.)"
     )

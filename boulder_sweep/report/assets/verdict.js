@@ -112,7 +112,7 @@ function flagsOf(outcomes, row, inputs, overlap, rules) {
   const reaction = inputs.subgrade_reaction_MN_m3;
   /** @type {Record<string, boolean>} */
   const raised = {
-    crush: outcomes.crush_max[row] > tested.crush,
+    crush: outcomes.x_v_max[row] - outcomes.x_b_max[row] > tested.crush,
     rotation: outcomes.theta_max[row] > tested.rotation,
     width: tested.width * depth < inputs.boulder_width_m,
     size: ["boulder_length_m", "boulder_width_m", "boulder_height_m"].some((name) => outside(name, inputs[name])),
