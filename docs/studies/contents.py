@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import answers, energy, soil, uplift
+from docs.studies import against_tests, answers, energy, soil, uplift
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -157,6 +157,14 @@ def _soil_grid(root: Path) -> str:
     return soil.grid_table(root / GRID).markdown()
 
 
+def _pushover(_: Path) -> str:
+    return against_tests.pushover_table().markdown()
+
+
+def _post_speeds(_: Path) -> str:
+    return against_tests.post_table().markdown()
+
+
 def _uplift_tests(_: Path) -> str:
     return uplift.tests_table().markdown()
 
@@ -199,6 +207,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "validity-shares": _validity_shares,
     "soil-tests": _soil_tests,
     "soil-grid": _soil_grid,
+    "pushover": _pushover,
+    "post-speeds": _post_speeds,
     "uplift-tests": _uplift_tests,
     "uplift-grid": _uplift_grid,
     "crush-words": _crush_words,
