@@ -6,19 +6,11 @@ import numba
 import numpy as np
 
 from boulder_kernels import Constants, Control, Readings
-from boulder_kernels.lanes import (
-    EMPTY,
-    attempt_steps,
-    carry_on,
-    find_waiting,
-    handle,
-    next_design,
-    step_groups,
-    take_over_steps,
-)
+from boulder_kernels.lane_steps import attempt_steps, take_over_steps
+from boulder_kernels.lanes import BUSY, HANDLED, STEPPED, begin, empty_queue, sweep
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.soil import Kinematics, closed_form, element_sums
-from boulder_kernels.workspace import EVENTS, GROUPS, LANES, SIZE, WHOLE
+from boulder_kernels.workspace import WHOLE
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 
@@ -37,32 +29,15 @@ def simulate_and_count(
         Steps attempted by all lanes; those by lanes that held a design; those that needed more than to be accepted.
     """
     out = empty_outcomes(designs.shape[1])
-    ws = np.zeros(WHOLE)
-    first, second, third, fourth = ws[:SIZE], ws[SIZE:], ws[2 * SIZE :], ws[3 * SIZE :]
-    events = ws[EVENTS:]
-    rows, waiting = np.zeros(GROUPS * LANES + 1, np.int64), np.zeros(GROUPS * LANES, np.int64)
-    running = 0
-    attempts, in_use, attended = 0, 0, 0
-    for i in range(GROUPS * LANES):
-        next_design(ws, i, rows, designs, readings, control, out)
-        running += rows[i] != EMPTY
-    while running > 0 and attempts < sweeps * GROUPS * LANES:
-        attempts += GROUPS * LANES
-        in_use += running
-        step_groups(first, second, third, fourth)
-        count = find_waiting(ws, rows, waiting)
-        together = min(LANES, max(running // GROUPS, 1))
-        done = 0
-        while count - done >= together:
-            size = min(LANES, count - done)
-            attended += size
-            handle(ws, events, waiting, done, size, readings, control)
-            for k in range(size):
-                i = waiting[done + k]
-                carry_on(ws, i, EVENTS + k, rows, designs, readings, control, out)
-                running -= rows[i] == EMPTY
-            done += size
-    return ws, (attempts, in_use, attended)
+    ws, q = np.zeros(WHOLE), empty_queue()
+    attempts, in_use = 0, 0
+    begin(ws, q, designs, readings, control, out)
+    going = q.counts[BUSY] > 0
+    while going and attempts < sweeps * STEPPED:
+        attempts += STEPPED
+        in_use += q.counts[BUSY]
+        going = sweep(ws, q, designs, readings, control, out)
+    return ws, (attempts, in_use, q.counts[HANDLED])
 
 
 @_compiled

@@ -38,7 +38,7 @@ KEPT = ("design", "readings", "stability")
 ORDER = (
     *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "soil", "tableau"),
     *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
-    *("energy", "settling", "after_step", "workspace", "impact", "lane_events"),
+    *("energy", "settling", "after_step", "workspace", "impact", "lane_events", "lane_steps"),
     "lanes",
 )
 CHANGES = {
@@ -93,7 +93,7 @@ def _decorators() -> types.ModuleType:
         return lambda f: numba.njit(nogil=True, error_model="numpy", fastmath=fastmath, forceinline=inline)(f)
 
     module: Any = types.ModuleType(f"{PACKAGE}._jit")
-    module.kernel = decorator({"contract", "nsz"})
+    module.kernel = module.array_kernel = decorator({"contract", "nsz"})
     module.inlined = decorator({"contract", "nsz"}, inline=True)
     module.exact_kernel = decorator({"nsz"})
     module.exact_inlined = decorator({"nsz"}, inline=True)

@@ -136,7 +136,8 @@ def keep_steps(ws: np.ndarray) -> None:
         put(ws, TAU, lane, kept.tau)
         put(ws, MOMENT, lane, rate_of(kept.y, s, c).M)
         store(ws, END_STATE, lane, kept.y)
-        store(ws, MAXIMA, lane, kept.m)
+        if kept.event != SHORTEN:
+            store(ws, MAXIMA, lane, kept.m)
 
 
 @kernel
@@ -148,40 +149,42 @@ def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, loca
     int
         RUNNING, or the status with which the simulation ended; time and maxima are left in the lane.
     """
-    y = load(ws, END_STATE, lane)
+    mine = ws[lane:]
+    y = load(mine, END_STATE, 0)
     if not is_finite(y):
         return Status.UNSTABLE.value
-    if field(ws, ATTEMPTS_LEFT, lane) <= 0.0:
+    if field(mine, ATTEMPTS_LEFT, 0) <= 0.0:
         return Status.STEP_BUDGET.value
-    put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
-    event, tau, h = field(ws, EVENT, lane), field(ws, TAU, lane), field(ws, STEP, lane)
+    put(mine, ATTEMPTS_LEFT, 0, field(mine, ATTEMPTS_LEFT, 0) - 1.0)
+    event, tau, h = field(mine, EVENT, 0), field(mine, TAU, 0), field(mine, STEP, 0)
     if event == SHORTEN:
+        put(mine, STEP, 0, tau * h)
         return RUNNING
-    c, g, m = load(ws, CONSTANTS, lane), load(ws, FACTORS, lane), load(ws, MAXIMA, lane)
+    c, g, m = load(mine, CONSTANTS, 0), load(mine, FACTORS, 0), load(mine, MAXIMA, 0)
     kept = Kept(event, tau, y, m)
     decided = decide(
-        field(ws, TIME, lane),
+        field(mine, TIME, 0),
         h,
-        load(ws, STATE, lane),
+        load(mine, STATE, 0),
         kept,
-        field(ws, BARRIER, lane),
-        field(ws, HORIZON, lane),
+        field(mine, BARRIER, 0),
+        field(mine, HORIZON, 0),
         ending,
         c,
     )
-    put(ws, TIME, lane, decided.t)
-    put(ws, BARRIER, lane, decided.barrier)
-    put(ws, HORIZON, lane, decided.horizon)
-    put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), decided.horizon - decided.t))
+    put(mine, TIME, 0, decided.t)
+    put(mine, BARRIER, 0, decided.barrier)
+    put(mine, HORIZON, 0, decided.horizon)
+    put(mine, STEP, 0, min(field(mine, STEP_FULL, 0), decided.horizon - decided.t))
     if decided.status == Status.LIMIT.value:
-        store(ws, MAXIMA, lane, at_limit(m, decided.t, g.limit))
+        store(mine, MAXIMA, 0, at_limit(m, decided.t, g.limit))
     if event > NONE and decided.status == RUNNING:
-        y, modes = change_mode(int(event), y, field(ws, MOMENT, lane), load(ws, MODES, lane), c)
+        y, modes = change_mode(int(event), y, field(mine, MOMENT, 0), load(mine, MODES, 0), c)
         switches, factors = enter_modes(modes, readings, g.limit, locate_yield, c)
-        store(ws, MODES, lane, modes)
-        store(ws, SWITCHES, lane, switches)
-        store(ws, FACTORS, lane, factors)
-    store(ws, STATE, lane, y)
+        store(mine, MODES, 0, modes)
+        store(mine, SWITCHES, 0, switches)
+        store(mine, FACTORS, 0, factors)
+    store(mine, STATE, 0, y)
     return decided.status
 
 
@@ -192,10 +195,12 @@ def start_steps(ws: np.ndarray) -> None:
         c, s = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane)
         y, k_end = load(ws, STATE, lane), load(ws, END, lane)
         fresh = rate_of(y, s, c)
-        crossed = field(ws, EVENT, lane) > NONE
-        k = fresh if crossed else k_end
-        store(ws, START, lane, k)
-        store(ws, COMPRESSION, lane, compression_at(y, s, c))
+        event = field(ws, EVENT, lane)
+        k = fresh if event > NONE else k_end
+        start = compression_at(y, s, c)
+        if event != SHORTEN:
+            store(ws, START, lane, k)
+            store(ws, COMPRESSION, lane, start)
 
 
 @kernel

@@ -1,186 +1,80 @@
-"""Many designs side by side, one in each lane of the vector registers.
+"""Many designs side by side: their way through the lanes.
 
-Every lane has its own clock. One attempt advances all lanes of a group by a step (`attempt_steps`), and a second loop
-looks at what came out (`take_over_steps`): most steps meet no event and set no peak, and are accepted at once. The few
-that need more wait until they fill a group of their own (`boulder_kernels.lane_events`), and a lane whose simulation
-has ended gets the next design. What a lane computes does not depend on the others, only when it does so.
+All groups of lanes are stepped in turn (`boulder_kernels.lane_steps`). A lane whose step needs more than to be accepted
+hands its design over to a group of events and goes on with another at once: one that returns from there, else the next
+of the table, so that no lane waits. A group of events is worked out when it is full (`boulder_kernels.lane_events`);
+there are two, because designs return from one while the other is being filled. What a lane computes does not depend on
+the others, only when and where it does so.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ._jit import array_kernel, inlined, kernel
-from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
-from .design import constants_of, design_in, is_computable
-from .dormand_prince import step
-from .events import SHORTEN
-from .impact import Control, attempt_budget, ending_of, first_step
+from .after_step import RUNNING
+from .impact import Control, ending_of
 from .lane_events import conclude, start_steps, work_out
-from .outcomes import (
-    STATUS,
-    Outcome,
-    Status,
-    compression_at,
-    empty_outcomes,
-    no_maxima,
-    write_outcome,
-)
+from .lane_steps import attempt_steps, start_lane, take_over_steps, write_lane
+from .outcomes import STATUS, Status, empty_outcomes
 from .readings import Readings
-from .settling import NO_PROOF, boulder_energy
-from .stability import ACCEPTED, MOST_STEPS, RETRY
-from .transitions import initial_modes
+from .stability import MOST_STEPS, RETRY
 from .workspace import (
-    ATTEMPTS_LEFT,
     ATTENTION,
-    BARRIER,
-    COMPRESSION,
-    CONSTANTS,
-    END,
-    END_STATE,
-    EVENT,
+    EVENT_SIZE,
     EVENTS,
-    FACTORS,
     GROUPS,
-    HORIZON,
     LANES,
-    MAXIMA,
-    MODES,
     SIZE,
-    START,
-    STATE,
     STATUS_OF_LANE,
     STEP,
     STEP_FULL,
-    SWITCHES,
-    TAU,
-    TIME,
     WHOLE,
     copy_lane,
     field,
-    load,
     put,
-    store,
 )
 
 EMPTY = -1
 """Row of a lane that holds no design."""
+STEPPED = GROUPS * LANES
+"""Places that are stepped: lanes 0 ... STEPPED - 1. Behind them are those of the two groups of events."""
+BUSY, PENDING, READY, IDLE, SIDE, HANDLED = range(6)
+"""Among the counts of a `Queue`: lanes with a design; designs in the group of events that is being filled, designs in
+the other one that may return, lanes without a design, which of the groups is being filled, 0 or 1, and how many steps
+have been worked out there in all."""
 
 
-@kernel
-def attempt_steps(ws: np.ndarray) -> None:
-    """Advance every lane by its step, in one vectorised loop."""
-    for lane in range(LANES):
-        y_end, k_end = step(
-            load(ws, STATE, lane),
-            load(ws, START, lane),
-            field(ws, STEP, lane),
-            load(ws, SWITCHES, lane),
-            load(ws, CONSTANTS, lane),
-        )
-        store(ws, END_STATE, lane, y_end)
-        store(ws, END, lane, k_end)
+class Queue(NamedTuple):
+    """Where the designs are: arrays of whole numbers."""
+
+    rows: np.ndarray
+    """Row of the design at each place or EMPTY, and in the last place the first row not yet started."""
+    ready: np.ndarray
+    """Places of designs that may return into a lane."""
+    idle: np.ndarray
+    """Lanes without a design."""
+    waiting: np.ndarray
+    """Lanes whose step needs more than to be accepted."""
+    counts: np.ndarray
+    """How many of each, see BUSY."""
 
 
-@kernel
-def take_over_steps(ws: np.ndarray) -> None:
-    """Accept the steps that meet no event, turn nowhere and do not reach the horizon; mark the others."""
-    for lane in range(LANES):
-        c = load(ws, CONSTANTS, lane)
-        s = load(ws, SWITCHES, lane)
-        y, y_end = load(ws, STATE, lane), load(ws, END_STATE, lane)
-        k_end = load(ws, END, lane)
-        start = load(ws, COMPRESSION, lane)
-        passing, end = passes(y, y_end, k_end, load(ws, FACTORS, lane), s, c)
-        t, h, horizon = field(ws, TIME, lane), field(ws, STEP, lane), field(ws, HORIZON, lane)
-        lively = (y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= field(ws, BARRIER, lane))
-        plain = passing & (h < horizon - t) & lively
-        t_next = t + h
-        put(ws, ATTENTION, lane, 0.0 if plain else 1.0)
-        if plain:
-            put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
-            store(ws, STATE, lane, y_end)
-            store(ws, START, lane, k_end)
-            store(ws, COMPRESSION, lane, end)
-            put(ws, TIME, lane, t_next)
-            put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), horizon - t_next))
-            m = passed_maxima(load(ws, MAXIMA, lane), t, h, y, y_end, start, end, s)
-            store(ws, MAXIMA, lane, m)
-
-
-@kernel
-def start_lane(
-    ws: np.ndarray,
-    lane: int,
-    designs: np.ndarray,
-    row: int,
-    readings: Readings,
-    control: Control,
-    longest: float,
-) -> int:
-    """Put a design into a lane.
-
-    Parameters
-    ----------
-    ws, lane
-        The workspace and the lane.
-    designs, row
-        The design, as of `simulate_lanes`.
-    readings, control
-        As of `simulate_lanes`.
-    longest
-        Longest step that has not failed yet [s]; the one asked for at first.
-
-    Returns
-    -------
-    int
-        RUNNING, or the status of a design that needs no integration or allows none.
-    """
-    design = design_in(designs, row)
-    if design.H - design.d <= design.e_bumper:
-        return Status.NO_CONTACT.value
-    c = constants_of(design, readings, 0)
-    if not is_computable(c):
-        return Status.INVALID.value
-    h_full, status = first_step(control, control.theta_limit, c)
-    if status != ACCEPTED:
-        return status
-    h_full = min(h_full, longest)
-    y, modes = initial_state(c), initial_modes(readings, c)
-    switches, factors = enter_modes(modes, readings, control.theta_limit, control.locate_yield, c)
-    store(ws, CONSTANTS, lane, c)
-    store(ws, MODES, lane, modes)
-    store(ws, SWITCHES, lane, switches)
-    store(ws, FACTORS, lane, factors)
-    store(ws, STATE, lane, y)
-    store(ws, START, lane, rate_of(y, switches, c))
-    store(ws, COMPRESSION, lane, compression_at(y, switches, c))
-    store(ws, MAXIMA, lane, no_maxima())
-    put(ws, TIME, lane, 0.0)
-    put(ws, STEP, lane, min(h_full, control.horizon))
-    put(ws, STEP_FULL, lane, h_full)
-    put(ws, ATTEMPTS_LEFT, lane, attempt_budget(h_full, ending_of(control, readings, h_full).longest))
-    put(ws, BARRIER, lane, NO_PROOF)
-    put(ws, HORIZON, lane, control.horizon)
-    return RUNNING
-
-
-@kernel
-def write_lane(ws: np.ndarray, lane: int, status: int, out: np.ndarray, row: int) -> None:
-    """Write the outcome of a lane into its row; a design that failed leaves its row NaN."""
-    t = field(ws, TIME, lane)
-    if status == Status.UNSTABLE.value or status == Status.STEP_BUDGET.value:
-        out[STATUS, row] = status
-    else:
-        t_limit = t if status == Status.LIMIT.value else np.nan
-        write_outcome(out, row, Outcome(status, load(ws, MAXIMA, lane), t_limit, t, 0))
+@inlined
+def lane_of(place: int) -> int:
+    """Lane of the workspace at a place."""
+    if place < STEPPED:
+        return (place // LANES) * SIZE + place % LANES
+    return EVENTS + ((place - STEPPED) // LANES) * EVENT_SIZE + place % LANES
 
 
 @kernel
 def next_design(
     ws: np.ndarray,
-    i: int,
-    rows: np.ndarray,
+    q: Queue,
+    place: int,
     designs: np.ndarray,
     readings: Readings,
     control: Control,
@@ -190,157 +84,166 @@ def next_design(
 
     Parameters
     ----------
-    ws, i
-        The workspace and the number of the lane.
-    rows
-        The row in each lane or EMPTY, and in the last place the first row not yet started.
+    ws, q, place
+        The workspace, the queue, and the place of the lane.
     designs, readings, control, out
-        As of `simulate_lanes`.
+        As of `simulate_lanes`, and its result.
     """
-    lane = lane_of(i)
-    rows[i] = EMPTY
+    lane = lane_of(place)
+    q.rows[place] = EMPTY
     # An empty lane stands still: its steps have no length, and their results are ignored.
     put(ws, STEP, lane, 0.0)
     put(ws, STEP_FULL, lane, 0.0)
-    while rows[i] == EMPTY and rows[-1] < designs.shape[1]:
-        row = rows[-1]
-        rows[-1] += 1
+    while q.rows[place] == EMPTY and q.rows[-1] < designs.shape[1]:
+        row = q.rows[-1]
+        q.rows[-1] += 1
         status = start_lane(ws, lane, designs, row, readings, control, control.h)
         if status == RUNNING:
-            rows[i] = row
+            q.rows[place] = row
         else:
             out[STATUS, row] = status
 
 
 @inlined
-def lane_of(i: int) -> int:
-    """Place of lane i = 0 ... GROUPS * LANES - 1."""
-    return (i // LANES) * SIZE + i % LANES
+def let_return(ws: np.ndarray, q: Queue, other: int, place: int) -> None:
+    """Move a design from its place in a group of events into a lane."""
+    copy_lane(ws, lane_of(other), lane_of(place), 0, ATTENTION)
+    q.rows[place] = q.rows[other]
 
 
-@inlined
-def step_groups(first: np.ndarray, second: np.ndarray, third: np.ndarray, fourth: np.ndarray) -> None:
-    """Attempt a step in all lanes of all groups, and accept those that need no more."""
-    attempt_steps(first)
-    take_over_steps(first)
-    attempt_steps(second)
-    take_over_steps(second)
-    attempt_steps(third)
-    take_over_steps(third)
-    attempt_steps(fourth)
-    take_over_steps(fourth)
-
-
-@inlined
-def find_waiting(ws: np.ndarray, rows: np.ndarray, waiting: np.ndarray) -> int:
-    """List the lanes whose step needs more, and return how many there are."""
-    count = 0
-    for i in range(GROUPS * LANES):
-        if field(ws, ATTENTION, lane_of(i)) != 0.0 and rows[i] != EMPTY:
-            waiting[count] = i
-            count += 1
-    return count
+@kernel
+def hand_over(
+    ws: np.ndarray,
+    q: Queue,
+    place: int,
+    designs: np.ndarray,
+    readings: Readings,
+    control: Control,
+    out: np.ndarray,
+) -> None:
+    """Move a design into the group of events, and let another into its lane; arguments as of `next_design`."""
+    counts = q.counts
+    other = STEPPED + counts[SIDE] * LANES + counts[PENDING]
+    copy_lane(ws, lane_of(place), lane_of(other), 0, SIZE)
+    q.rows[other] = q.rows[place]
+    counts[PENDING] += 1
+    if counts[READY] > 0:
+        counts[READY] -= 1
+        let_return(ws, q, q.ready[counts[READY]], place)
+        return
+    next_design(ws, q, place, designs, readings, control, out)
+    if q.rows[place] == EMPTY:
+        q.idle[counts[IDLE]] = place
+        counts[IDLE] += 1
+        counts[BUSY] -= 1
 
 
 @kernel
 def handle(
-    ws: np.ndarray, events: np.ndarray, waiting: np.ndarray, done: int, size: int, readings: Readings, control: Control
+    ws: np.ndarray,
+    q: Queue,
+    designs: np.ndarray,
+    readings: Readings,
+    control: Control,
+    out: np.ndarray,
 ) -> None:
-    """Work out in the group of events what follows from the steps of some of the lanes that wait.
+    """Work out what follows from the steps in the group of events; arguments as of `next_design`.
 
-    Parameters
-    ----------
-    ws, events
-        The workspace, and the part of it that is the group of events.
-    waiting, done, size
-        The lanes that wait, where in their list to begin, and how many to handle.
-    readings, control
-        As of `simulate_lanes`.
+    As many designs as lanes have left since this was last done, so all that were ready then have returned.
     """
-    for k in range(size):
-        copy_lane(ws, lane_of(waiting[done + k]), EVENTS + k, 0, SIZE)
+    counts = q.counts
+    side, size = counts[SIDE], counts[PENDING]
+    events = ws[EVENTS + side * EVENT_SIZE :]
     work_out(events, size, control.locate_yield)
     for k in range(size):
         ending = ending_of(control, readings, field(events, STEP_FULL, k))
         put(events, STATUS_OF_LANE, k, float(conclude(events, k, readings, ending, control.locate_yield)))
     start_steps(events)
-
-
-@kernel
-def carry_on(
-    ws: np.ndarray,
-    i: int,
-    other: int,
-    rows: np.ndarray,
-    designs: np.ndarray,
-    readings: Readings,
-    control: Control,
-    out: np.ndarray,
-) -> None:
-    """Let a lane go on with what the group of events has worked out for it, or with the next design.
-
-    Parameters
-    ----------
-    ws, i, other
-        The workspace, the number of the lane, and the place of its lane in the group of events.
-    rows, designs, readings, control, out
-        As of `next_design`.
-    """
-    lane, row = lane_of(i), rows[i]
-    status = int(field(ws, STATUS_OF_LANE, other))
-    if status == RUNNING and field(ws, EVENT, other) == SHORTEN:
-        put(ws, STEP, lane, field(ws, TAU, other) * field(ws, STEP, lane))
-        put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, other))
-    elif status == RUNNING:
-        copy_lane(ws, other, lane, SWITCHES, ATTENTION)
-    else:
-        h = field(ws, STEP_FULL, other)
+    for k in range(size):
+        other = STEPPED + side * LANES + k
+        row, h = q.rows[other], field(events, STEP_FULL, k)
+        status = int(field(events, STATUS_OF_LANE, k))
         if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
-            status = start_lane(ws, lane, designs, row, readings, control, RETRY * h)
+            status = start_lane(events, k, designs, row, readings, control, RETRY * h)
         if status != RUNNING:
-            write_lane(ws, other, status, out, row)
-            next_design(ws, i, rows, designs, readings, control, out)
+            write_lane(events, k, status, out, row)
+        elif counts[IDLE] > 0:
+            counts[IDLE] -= 1
+            counts[BUSY] += 1
+            let_return(ws, q, other, q.idle[counts[IDLE]])
+        else:
+            q.ready[counts[READY]] = other
+            counts[READY] += 1
+    counts[HANDLED] += size
+    counts[PENDING] = 0
+    counts[SIDE] = 1 - side
+
+
+@inlined
+def find_waiting(ws: np.ndarray, q: Queue) -> int:
+    """List the lanes whose step needs more, without a branch, and return how many there are."""
+    count = 0
+    for place in range(STEPPED):
+        q.waiting[count] = place
+        count += int((ws[(place // LANES) * SIZE + place % LANES + ATTENTION] != 0.0) & (q.rows[place] != EMPTY))
+    return count
 
 
 @kernel
-def run_lanes(
-    ws: np.ndarray,
-    rows: np.ndarray,
-    waiting: np.ndarray,
-    designs: np.ndarray,
-    readings: Readings,
-    control: Control,
-    out: np.ndarray,
-) -> None:
-    """Simulate every design.
+def step_groups(ws: np.ndarray) -> None:
+    """Attempt a step in all lanes of all groups, and accept those that need no more."""
+    for group in range(GROUPS):
+        lanes = ws[group * SIZE :]
+        attempt_steps(lanes)
+        take_over_steps(lanes)
 
-    Parameters
-    ----------
-    ws, rows, waiting
-        The workspace, the row in each lane and the first not yet started, and room for a list of lanes; all zero.
-    designs, readings, control, out
-        As of `simulate_lanes`, and its result.
-    """
-    first, second, third, fourth = ws[:SIZE], ws[SIZE:], ws[2 * SIZE :], ws[3 * SIZE :]
-    events = ws[EVENTS:]
-    running = 0
-    for i in range(GROUPS * LANES):
-        next_design(ws, i, rows, designs, readings, control, out)
-        running += rows[i] != EMPTY
-    while running > 0:
-        step_groups(first, second, third, fourth)
-        count = find_waiting(ws, rows, waiting)
-        # A lane that waits attempts the same step again meanwhile.
-        together = min(LANES, max(running // GROUPS, 1))
-        done = 0
-        while count - done >= together:
-            size = min(LANES, count - done)
-            handle(ws, events, waiting, done, size, readings, control)
-            for k in range(size):
-                i = waiting[done + k]
-                carry_on(ws, i, EVENTS + k, rows, designs, readings, control, out)
-                running -= rows[i] == EMPTY
-            done += size
+
+@kernel
+def begin(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
+    """Put the first designs into the lanes of an empty workspace; arguments as of `next_design`."""
+    for place in range(STEPPED):
+        next_design(ws, q, place, designs, readings, control, out)
+        if q.rows[place] == EMPTY:
+            q.idle[q.counts[IDLE]] = place
+            q.counts[IDLE] += 1
+        else:
+            q.counts[BUSY] += 1
+
+
+@kernel
+def sweep(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> bool:
+    """Step all lanes once; return whether any design is left. Arguments as of `next_design`."""
+    step_groups(ws)
+    for k in range(find_waiting(ws, q)):
+        hand_over(ws, q, q.waiting[k], designs, readings, control, out)
+        if q.counts[PENDING] == LANES:
+            handle(ws, q, designs, readings, control, out)
+    # Towards the end, when lanes are empty, fewer need to come together.
+    if q.counts[PENDING] >= max(q.counts[BUSY] // GROUPS, 1):
+        handle(ws, q, designs, readings, control, out)
+    return q.counts[BUSY] > 0 or q.counts[PENDING] > 0
+
+
+@kernel
+def sweep_all(
+    ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
+) -> None:
+    """Simulate every design; arguments as of `next_design`."""
+    begin(ws, q, designs, readings, control, out)
+    while sweep(ws, q, designs, readings, control, out):
+        pass
+
+
+@array_kernel
+def empty_queue() -> Queue:
+    """Return the queue before the first design has been started."""
+    return Queue(
+        np.zeros(STEPPED + 2 * LANES + 1, np.int64),
+        np.zeros(LANES, np.int64),
+        np.zeros(STEPPED, np.int64),
+        np.zeros(STEPPED, np.int64),
+        np.zeros(6, np.int64),
+    )
 
 
 @array_kernel
@@ -362,6 +265,5 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
         Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
     """
     out = empty_outcomes(designs.shape[1])
-    rows, waiting = np.zeros(GROUPS * LANES + 1, np.int64), np.zeros(GROUPS * LANES, np.int64)
-    run_lanes(np.zeros(WHOLE), rows, waiting, designs, readings, control, out)
+    sweep_all(np.zeros(WHOLE), empty_queue(), designs, readings, control, out)
     return out

@@ -4,6 +4,9 @@ A loop over lanes is vectorised only where the compiler can see that no store to
 constant offsets shows it; separate arrays do not. A field occupies LANES consecutive places, so that neighbouring
 lanes are neighbours in memory. Several groups of lanes follow each other; a lane is known by the start of its group
 plus its number in it. The functions below are the only ones that know where a field lies.
+
+What works on one lane takes the workspace from that lane on, as whose lane 0 it is known there: places are then
+constants, and no index need be checked for being negative, as one that counts from the end.
 """
 
 from __future__ import annotations
@@ -89,8 +92,10 @@ def _place(name: str) -> int:
 SIZE = _place("boulder")
 """Numbers of one group."""
 EVENTS = GROUPS * SIZE
-"""Where the group of those that need more begins: its lanes are EVENTS ... EVENTS + LANES - 1."""
-WHOLE = EVENTS + LANES * sum(len(record._fields) for record in _ALL.values())
+"""Where the first of the two groups of those that need more begins: its lanes are EVENTS ... EVENTS + LANES - 1."""
+EVENT_SIZE = LANES * sum(len(record._fields) for record in _ALL.values())
+"""Numbers of one of them."""
+WHOLE = EVENTS + 2 * EVENT_SIZE
 """Numbers of all groups."""
 CONSTANTS = _place("constants")
 SWITCHES = _place("switches")
@@ -191,5 +196,6 @@ def _store(ws: Any, place: Any, lane: Any, record: Any) -> Callable[..., Any]:
 @inlined
 def copy_lane(ws: np.ndarray, lane: int, other: int, first: int, end: int) -> None:
     """Copy the numbers of one lane to another, from a place to before another."""
+    source, target = ws[lane:], ws[other:]
     for place in range(first, end, LANES):
-        ws[place + other] = ws[place + lane]
+        target[place] = source[place]

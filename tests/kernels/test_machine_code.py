@@ -11,7 +11,8 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.lane_events import begin_searches, keep_steps, search_on, start_steps
-from boulder_kernels.lanes import attempt_steps, simulate_lanes, take_over_steps
+from boulder_kernels.lane_steps import attempt_steps, take_over_steps
+from boulder_kernels.lanes import simulate_lanes
 from boulder_kernels.workspace import SIZE, WHOLE
 
 from .samples import control, random_designs, table_of
