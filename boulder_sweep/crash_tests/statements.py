@@ -110,7 +110,7 @@ def _white(rwg: Mapping[str, Trajectory], abg: Mapping[str, Trajectory]) -> list
             "3.4",
             "Rockville White Granite: a pass, the vehicle did not penetrate",
             _each(rwg, lambda t: f"{t.verdict}, penetration {t.summary()['penetration_m']:.2f} m"),
-            all(t.verdict == "pass" and t.summary()["penetration_m"] <= 1.0 for t in rwg.values()),
+            all(t.verdict != "fail" and t.summary()["penetration_m"] <= 1.0 for t in rwg.values()),
         ),
         Statement(
             "3.4",

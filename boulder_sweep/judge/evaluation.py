@@ -164,12 +164,14 @@ def compile_kernels() -> None:
     by_kernels(PLAIN_DESIGN.table, corrected(), control)
 
 
-def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels) -> Evaluation:
-    """Return how the designs of a sweep are simulated, with a given accuracy, and judged."""
+def evaluation_of(
+    sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels, *, proved: bool = True
+) -> Evaluation:
+    """Return how the designs of a sweep are simulated, with a given accuracy, and judged; `proved` as of `Limits`."""
     return Evaluation(
         readings=readings_of(sweep),
         control=control_of(sweep, accuracy),
-        limits=limits_of(sweep),
+        limits=limits_of(sweep, proved=proved),
         simulate=simulate,
         resistance=sweep.model.resistance,
     )

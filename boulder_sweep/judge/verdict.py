@@ -12,7 +12,7 @@ The rules, worst first; the first that applies decides the row:
    penetration stay below their limits.
 8. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
 9. ``pass``. Where a reading lets forces feed energy, as the printed ones do, nothing can be proved of later times; such
-   rows pass by the maxima up to the longest horizon and carry a flag.
+   rows are undecided by rule 7, unless a comparison of readings asks only what stands to the longest horizon.
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side.
 Where no error was estimated (NaN), rule 8 cannot apply and the verdict is unguarded.
@@ -81,6 +81,8 @@ class Limits(NamedTuple):
     """Crush beyond which a row is flagged [m]."""
     tested_rotation: float = math.radians(TESTED_ROTATION_DEG["corrected"])
     """Rotation beyond which a row is flagged [rad]."""
+    proved: bool = True
+    """Whether a pass must be proved also where the readings allow no proof; without, such rows pass and are flagged."""
 
     @property
     def penetration(self) -> float:
@@ -179,7 +181,8 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
     standing = computed & ~overturned
     penetration = outcomes.x_v_max - designs.bed_offset - designs.table.L
     too_deep = standing & (penetration > limits.penetration)
-    unproved = standing & np.isin(status, (Status.HORIZON, Status.OUTWARD))
+    without_proof = (Status.HORIZON, Status.OUTWARD, *((Status.UNPROVABLE,) if limits.proved else ()))
+    unproved = standing & np.isin(status, without_proof)
     crushed = standing & (outcomes.crush_max > designs.bed_offset)
     overlap = designs.table.H - designs.table.d - designs.table.e_bumper
     slight = standing & (overlap < limits.min_overlap)
@@ -228,8 +231,8 @@ def _with_flags(facts: Facts) -> Facts:
     return facts._replace(validity=flags, words=facts.words | {"validity": named})
 
 
-def limits_of(sweep: Sweep) -> Limits:
-    """Return the limits of a sweep."""
+def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
+    """Return the limits of a sweep; `proved` as of `Limits`."""
     preset = sweep.model.preset
     tested = TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values()))
     criterion = sweep.criterion
@@ -239,6 +242,7 @@ def limits_of(sweep: Sweep) -> Limits:
         min_overlap=criterion.min_overlap_m,
         calibrated_crush=sweep.model.calibrated_crush_m,
         tested_rotation=math.radians(tested),
+        proved=proved,
     )
 
 

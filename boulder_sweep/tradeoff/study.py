@@ -197,7 +197,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
             f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
             "the table of a run says why"
         )
-    limits = limits_of(sweep)
+    limits = limits_of(sweep, proved=False)
     control = control_of(sweep, Accuracy("", Steps(REFERENCE_STEP_S), error_estimate=False))
     presets = {"corrected": corrected(), "as_printed": as_printed()}
     if sweep.model.preset not in presets:

@@ -33,7 +33,7 @@ def passes(found: Need, frame: pd.DataFrame, values: pd.Series, column: str) -> 
     listed = {name: frame[name].to_numpy(dtype=float) for name in INPUT_COLUMNS if name != "impact_height_m"}
     listed[column] = values.to_numpy(dtype=float)
     sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed), model=found.sweep.model)
-    return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS
+    return evaluation_of(sweep, accuracy_of(sweep), proved=False)(sweep.block(0, sweep.n_designs)).verdict == PASS
 
 
 def certify(found: Need) -> int:

@@ -12,7 +12,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
     ("case", "preset", "verdict", "rotation", "displacement"),
     [
         ("rwg", "corrected", "pass", 13.7612, 0.2820),
-        ("rwg", "as_printed", "pass", 7.6940, 0.1505),
+        ("rwg", "as_printed", "undecided", 7.6940, 0.1505),
         ("abg", "corrected", "fail", 157.742, 1.4096),
         ("abg", "as_printed", "fail", 114.258, 1.6555),
     ],
@@ -29,7 +29,7 @@ def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
 
 def test_what_stands_beside_a_pass(sweep):
     case = CONFIGS / "rwg.yaml"
-    _, out, _ = sweep("simulate", case)
+    _, out, _ = sweep("simulate", case, "--set", "vehicle.speed=12.5 m/s")
     assert "a simulation, not a rating by test" in out
     assert "caution" not in out
     _, out, _ = sweep("simulate", case, "--set", "boulder.density=3200 kg/m^3", "-q")

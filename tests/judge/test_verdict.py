@@ -63,7 +63,18 @@ def test_outcome_columns_are_those_of_the_register():
     assert tuple(PENETRATION_LIMITS_M) == RATINGS
 
 
-@pytest.mark.parametrize("status", [Status.SETTLED, Status.BELOW_LIMIT, Status.UNPROVABLE])
+def test_what_cannot_be_proved_is_undecided_unless_readings_are_compared():
+    unprovable = outcome(Status.UNPROVABLE)
+    row = judged(unprovable)
+    assert only(row) == ("undecided", "horizon")
+    assert np.isnan(row["margin"][0])
+    designs = plain_designs(1, L=LENGTH, bed_offset=BED)
+    stands = judge(unprovable, designs, Limits(LIMIT, "P1", proved=False), 0.004)
+    assert only(stands) == ("pass", "")
+    assert only(judge(outcome(Status.HORIZON), designs, Limits(LIMIT, "P1", proved=False), 0.004))[0] == "undecided"
+
+
+@pytest.mark.parametrize("status", [Status.SETTLED, Status.BELOW_LIMIT])
 def test_pass(status):
     row = judged(outcome(status))
     assert only(row) == ("pass", "")
@@ -227,7 +238,7 @@ def plain_reading(row: dict[str, float], status: Status, limit: float) -> tuple[
         return "fail", "penetration"
     if row["crush_max"] > BED:
         return "undecided", "crush"
-    if status in (Status.OUTWARD, Status.HORIZON):
+    if status in (Status.OUTWARD, Status.HORIZON, Status.UNPROVABLE):
         return "undecided", "horizon"
     distances = limit - penetration, BED - row["crush_max"]
     if LIMIT - row["theta_max"] < row["theta_error"] or min(distances) < row["x_error"]:

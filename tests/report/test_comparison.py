@@ -9,11 +9,11 @@ from tests.report.conftest import GRID
 
 @pytest.fixture(scope="module")
 def slower(tmp_path_factory):
-    """Result of the same grid in another order of axes, with one height less, one more, and a slower truck."""
+    """Result of the same grid in another order of axes, with one height less, one more, and a printed arm."""
     folder = tmp_path_factory.mktemp("slower")
     other = GRID.replace("width: [1.5, 1.9] m", "width: [1.9, 1.5] m").replace("2.0 m, to: 3.6 m", "2.2 m, to: 3.8 m")
     (folder / "grid.yaml").write_text(other)
-    sweep = boulder_sweep.load(folder / "grid.yaml", ["model.readings=as_printed"])
+    sweep = boulder_sweep.load(folder / "grid.yaml", ["model.readings={preset: corrected, impact_arm: printed}"])
     boulder_sweep.run(sweep, folder / "out")
     return folder / "out"
 

@@ -65,7 +65,7 @@ function judge(outcomes, row, inputs, rules) {
   else if (penetration > rules.penetration) [verdict, reason] = ["fail", "penetration"];
   else if (crush > inputs.bed_offset_m) [verdict, reason] = ["undecided", "crush"];
   else if (overlap < rules.min_overlap) [verdict, reason] = ["undecided", "override"];
-  else if (ended === status.OUTWARD || ended === status.HORIZON) [verdict, reason] = ["undecided", "horizon"];
+  else if ([status.OUTWARD, status.HORIZON, status.UNPROVABLE].includes(ended)) [verdict, reason] = ["undecided", "horizon"];
   else if (rules.rotation - theta < of("theta_error") || room < of("x_error")) [verdict, reason] = ["undecided", "error"];
   const rated = standing && (verdict !== "undecided" || reason === "error");
 
