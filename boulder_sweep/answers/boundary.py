@@ -25,6 +25,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
+from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.text import one_line
 
@@ -204,7 +205,7 @@ def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
 class _Lines:
     """The lines of a grid along its longest axis, and the place on each where designs begin to pass."""
 
-    def __init__(self, sweep: Sweep, judges: Judges, parallel: joblib.Parallel) -> None:
+    def __init__(self, sweep: Sweep, judges: Judges, parallel: Pool) -> None:
         self.sweep, self.judges, self.parallel = sweep, judges, parallel
         self.shape = sweep.plan.lengths
         self.axis = int(np.argmax(self.shape))

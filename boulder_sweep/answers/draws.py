@@ -12,6 +12,7 @@ from scipy.special import ndtr
 from boulder_sweep.answers.trials import Judges, Rows
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.judged import UNDECIDED
+from boulder_sweep.runner.pool import Pool
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.spread import Spread
@@ -41,7 +42,7 @@ class Draws:
     judges
         How designs are judged.
     parallel
-        Threads.
+        Threads or workers.
     variants
         Equally likely judges, one of which is chosen by the last coordinate of each point; if empty, `judges` is used.
     """
@@ -49,7 +50,7 @@ class Draws:
     rows: Rows
     spread: Spread
     judges: Judges
-    parallel: joblib.Parallel
+    parallel: Pool
     variants: tuple[Judges, ...] = ()
 
     @property
@@ -126,6 +127,6 @@ def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:
     return np.where(judges.holds(judged), np.maximum(found, smallest), np.minimum(found, -smallest))
 
 
-def threads(jobs: int | None) -> joblib.Parallel:
+def threads(jobs: int | None) -> Pool:
     """Return a pool that yields results in order; with one job everything runs in the calling thread."""
-    return joblib.Parallel(n_jobs=jobs or -1, backend="threading", return_as="generator")
+    return Pool(jobs)

@@ -22,6 +22,8 @@ from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.runner.backends import THREADING
+from boulder_sweep.runner.pool import pool
 from boulder_sweep.settings.model import ReadingChoice
 
 if TYPE_CHECKING:
@@ -136,6 +138,8 @@ def need(
     tolerance: str | float | None = None,
     both_readings: bool = True,
     jobs: int | None = None,
+    backend: str = THREADING,
+    scheduler: str | None = None,
     told: Told | None = None,
 ) -> Need:
     """Find the smallest value of an input that passes, for every combination of the others.
@@ -164,6 +168,8 @@ def need(
         Whether to answer for the other preset of readings as well.
     jobs
         Threads; all cores by default. The answers do not depend on it.
+    backend, scheduler
+        Where to search: ``threading``, or ``dask`` and the address of a scheduler, as for `boulder_sweep.run`.
     told
         Called as the search progresses.
 
@@ -200,13 +206,13 @@ def need(
     asked[0].judges.own.warm_up()
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
     tables, simulated, done = [], 0, 0
-    parallel = joblib.Parallel(n_jobs=jobs or -1, backend="threading", return_as="generator")
-    for table, count in parallel(joblib.delayed(_table_of)(asked, start, stop) for start, stop in pieces):
-        tables.append(table)
-        simulated += count
-        done += len(table)
-        if told is not None:
-            told(done, asked[0].count)
+    with pool(jobs, backend, scheduler) as workers:
+        for table, count in workers(joblib.delayed(_table_of)(asked, start, stop) for start, stop in pieces):
+            tables.append(table)
+            simulated += count
+            done += len(table)
+            if told is not None:
+                told(done, asked[0].count)
     from boulder_sweep.answers.tables import joined_tables
 
     table = joined_tables(tables, _metadata(asked[0], least_margin))

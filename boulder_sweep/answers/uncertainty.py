@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import joblib
 import numpy as np
 
 from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chance, Points, chance
-from boulder_sweep.answers.draws import Draws, threads
+from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import share
 from boulder_sweep.answers.sensitivity import drivers, indices
 from boulder_sweep.answers.spread import Spread
@@ -20,6 +19,8 @@ from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.runner.backends import THREADING
+from boulder_sweep.runner.pool import Pool, pool
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,6 +122,8 @@ def uncertainty(
     most: int = 1 << 16,
     rare: bool = False,
     jobs: int | None = None,
+    backend: str = THREADING,
+    scheduler: str | None = None,
     told: Told | None = None,
 ) -> Uncertainty:
     """Estimate the probability of passing for every design of a sweep with uncertain inputs.
@@ -144,6 +147,8 @@ def uncertainty(
         reaches 1e-6 and below.
     jobs
         Threads; all cores by default.
+    backend, scheduler
+        Where to sample: ``threading``, or ``dask`` and the address of a scheduler, as for `boulder_sweep.run`.
     told
         Called as the sampling progresses.
 
@@ -167,16 +172,16 @@ def uncertainty(
     asked.judges.own.warm_up()
     points = Points(len(asked.spread.names), seed)
     tables, done = [], 0
-    parallel = threads(jobs)
-    for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE):
-        tables.append(_rows(asked, points, parallel, start, stop))
-        done += stop - start
-        if told is not None:
-            told(done, sweep.n_designs)
+    few = sweep.n_designs <= MOST_INDEXED
+    with pool(jobs, backend, scheduler) as workers:
+        for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE):
+            tables.append(_rows(asked, points, workers, start, stop))
+            done += stop - start
+            if told is not None:
+                told(done, sweep.n_designs)
+        drawn = [_sensitivity(asked, points, workers, row) for row in range(sweep.n_designs if few else 0)]
     from boulder_sweep.answers.tables import index_table, joined_tables, sample_table
 
-    few = sweep.n_designs <= MOST_INDEXED
-    drawn = [_sensitivity(asked, points, parallel, row) for row in range(sweep.n_designs if few else 0)]
     return Uncertainty(
         sweep,
         joined_tables(tables, asked.metadata()),
@@ -199,7 +204,7 @@ class _Asked:
     most: int
     rare: bool
 
-    def draws(self, start: int, stop: int, parallel: joblib.Parallel) -> Draws:
+    def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
         return Draws(self.sweep.plan.given_rows(start, stop), self.spread, self.judges, parallel)
 
     def metadata(self) -> dict[bytes, bytes]:
@@ -221,7 +226,7 @@ class _Asked:
         return file_metadata(found | {"question": question}, "boulder_sweep.uncertainty")
 
 
-def _rows(asked: _Asked, points: Points, parallel: joblib.Parallel, start: int, stop: int) -> pa.Table:
+def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) -> pa.Table:
     """Return the table of the rows ``[start, stop)``."""
     from boulder_sweep.answers.tables import chance_table
 
@@ -261,7 +266,7 @@ def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Chance:
     )
 
 
-def _sensitivity(asked: _Asked, points: Points, parallel: joblib.Parallel, row: int) -> tuple[Any, Any]:
+def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tuple[Any, Any]:
     """Return the indices of one design, and samples of it."""
     draws = asked.draws(row, row + 1, parallel)
 

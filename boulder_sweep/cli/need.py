@@ -7,7 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option, units_option
+from boulder_sweep.cli.options import cluster_options, json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
@@ -38,6 +38,7 @@ Examples:
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Design chart (.png, .svg or .pdf).")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@cluster_options
 @units_option
 @set_option
 @json_option
@@ -52,6 +53,8 @@ def need(
     tolerance: str | None,
     own_readings: bool,
     jobs: int | None,
+    backend: str,
+    scheduler: str | None,
     out: str | None,
     picture: str | None,
     units: str,
@@ -92,6 +95,8 @@ def need(
             tolerance=tolerance,
             both_readings=not own_readings,
             jobs=jobs,
+            backend=backend,
+            scheduler=scheduler,
             told=told,
         )
     if as_json:

@@ -119,6 +119,26 @@ def talk_options(function: Command) -> Command:
     return command
 
 
+def cluster_options(function: Command) -> Command:
+    """Add ``--backend`` and ``--scheduler``."""
+
+    @click.option(
+        "--backend",
+        type=click.Choice(BACKENDS),
+        default=BACKENDS[0],
+        show_default=True,
+        help="Threads, or a Dask cluster.",
+    )
+    @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, with --backend dask.")
+    @functools.wraps(function)
+    def command(*args: Any, backend: str, scheduler: str | None, **options: Any) -> Any:
+        if scheduler and backend != "dask":
+            raise click.UsageError("--scheduler needs --backend dask")
+        return function(*args, backend=backend, scheduler=scheduler, **options)
+
+    return command
+
+
 def run_options(function: Command) -> Command:
     """Add what is particular to ``sweep run``."""
     path = click.Path()
@@ -126,14 +146,6 @@ def run_options(function: Command) -> Command:
         (
             click.option("-o", "--output", "out", type=path, help="Folder for the table [default: NAME.sweep]."),
             click.option("--jobs", type=click.IntRange(min=1), help="Workers [default: all cores]."),
-            click.option(
-                "--backend",
-                type=click.Choice(BACKENDS),
-                default=BACKENDS[0],
-                show_default=True,
-                help="Threads, or a Dask cluster.",
-            ),
-            click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, with --backend dask."),
             click.option(
                 "--dashboard",
                 metavar="ADDRESS",

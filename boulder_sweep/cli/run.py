@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import RUN_EXAMPLES, json_option, run_options, set_option, talk_options
+from boulder_sweep.cli.options import RUN_EXAMPLES, cluster_options, json_option, run_options, set_option, talk_options
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.places import Place, place_of
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 @click.command(short_help="Simulate every design of a file into one table.", epilog=RUN_EXAMPLES)
 @click.argument("grid", type=click.Path())
 @run_options
+@cluster_options
 @set_option
 @json_option
 @talk_options
@@ -42,8 +43,6 @@ def run(
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite exclude each other")
-    if options["scheduler"] and options["backend"] != "dask":
-        raise click.UsageError("--scheduler needs --backend dask")
     if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
         raise click.UsageError("--dashboard needs --backend dask, and no --scheduler: that one has its own")
     sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)

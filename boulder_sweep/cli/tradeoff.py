@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import json_option, set_option
+from boulder_sweep.cli.options import cluster_options, json_option, set_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -42,10 +42,19 @@ Examples:
     help="Start no new measurement after this many seconds.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
+@cluster_options
 @set_option
 @json_option
 def tradeoff(
-    grid: str, out: str | None, designs: int, seconds: float, quiet: bool, overrides: tuple[str, ...], as_json: bool
+    grid: str,
+    out: str | None,
+    designs: int,
+    seconds: float,
+    quiet: bool,
+    backend: str,
+    scheduler: str | None,
+    overrides: tuple[str, ...],
+    as_json: bool,
 ) -> int:
     """Simulate a sample of GRID by many methods and compare each with a far finer solution.
 
@@ -66,7 +75,8 @@ def tradeoff(
         require_matplotlib()
         make_folder(Path(out))
     with working(quiet, doing="measuring"):
-        found = measure(sweep, designs=designs, seconds=seconds, tell=None if quiet else say)
+        tell = None if quiet else say
+        found = measure(sweep, designs=designs, seconds=seconds, backend=backend, scheduler=scheduler, tell=tell)
     files = [] if out is None else found.write(out)
     if as_json:
         show(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))

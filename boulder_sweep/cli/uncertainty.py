@@ -8,7 +8,7 @@ from dataclasses import asdict
 import click
 
 from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option, units_option
+from boulder_sweep.cli.options import cluster_options, json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
@@ -57,6 +57,7 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
     help="List published spreads with their sources.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
+@cluster_options
 @units_option
 @set_option
 @json_option
@@ -69,6 +70,8 @@ def uncertainty(
     doubts: bool,
     seed: int,
     jobs: int | None,
+    backend: str,
+    scheduler: str | None,
     out: str | None,
     picture: str | None,
     design: int,
@@ -105,6 +108,8 @@ def uncertainty(
             seed=seed,
             rare=rare,
             jobs=jobs,
+            backend=backend,
+            scheduler=scheduler,
             told=told,
         )
     parts = []

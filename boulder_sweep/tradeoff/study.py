@@ -23,6 +23,8 @@ from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps
 from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.judge.verdict import limits_of
+from boulder_sweep.runner.backends import THREADING
+from boulder_sweep.runner.pool import pool
 from boulder_sweep.tradeoff.points import Method, Point, mark_front
 from boulder_sweep.tradeoff.sample import Sample
 
@@ -170,7 +172,15 @@ class Tradeoff:
         return files
 
 
-def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, tell: Told | None = None) -> Tradeoff:
+def measure(
+    sweep: Sweep,
+    *,
+    designs: int = DESIGNS,
+    seconds: float = SECONDS,
+    backend: str = THREADING,
+    scheduler: str | None = None,
+    tell: Told | None = None,
+) -> Tradeoff:
     """Measure speed against accuracy on a sample of a sweep's designs.
 
     Parameters
@@ -181,8 +191,11 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
         Size of the sample. The sample depends on the sweep alone, and so do the errors; the times do not.
     seconds
         No new measurement is started after this much time [s].
+    backend, scheduler
+        Where to measure: ``threading`` for this machine, or ``dask`` for a worker of a cluster, as for
+        `boulder_sweep.run`.
     tell
-        Told what is being measured.
+        Told what is being measured; not by a worker.
 
     Raises
     ------
@@ -191,6 +204,9 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS, t
     """
     begun = time.monotonic()
     sweep.require_values()
+    if backend != THREADING:
+        with pool(1, backend, scheduler) as workers:
+            return next(workers([(measure, (sweep,), {"designs": designs, "seconds": seconds})]))
     sample_designs = sampled_designs(sweep, designs)
     if not sample_designs.size:
         raise NothingToMeasureError(

@@ -1,0 +1,105 @@
+"""Calls of a function on the cores of this machine or on a Dask cluster, for answers that are not rows of a sweep."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
+from boulder_sweep.runner.backends import DASK, THREADING, available_cores, check_backend
+from boulder_sweep.text import one_line
+
+if TYPE_CHECKING:
+    from boulder_sweep.runner.cluster import Cluster
+
+Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+"""Function, arguments and named arguments, as `joblib.delayed` gives them."""
+_CALLS_PER_THREAD = 3
+_LOOK_EVERY_S = 10.0
+"""Time without a result after which is looked whether there are workers [s]."""
+
+
+class Pool:
+    """Yields the results of calls in their order, with a bounded number of calls in progress.
+
+    What is sent to a worker together with a pool gets one that works in the calling thread.
+
+    Parameters
+    ----------
+    jobs
+        Threads; all cores by default. With one job everything runs in the calling thread.
+    cluster
+        Where to work instead.
+    """
+
+    def __init__(self, jobs: int | None, cluster: Cluster | None = None):
+        self._jobs, self._cluster = jobs, cluster
+
+    def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
+        """Make the calls."""
+        if self._cluster is not None:
+            return self._on_cluster(self._cluster, calls)
+        import joblib
+
+        return joblib.Parallel(n_jobs=self._jobs or -1, backend="threading", return_as="generator")(calls)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Pool, (1,)
+
+    def _on_cluster(self, cluster: Cluster, calls: Iterable[Call]) -> Iterator[Any]:
+        """Make the calls on a cluster.
+
+        Raises
+        ------
+        ClusterLostError
+            The scheduler or the workers are gone.
+        """
+        most = _CALLS_PER_THREAD * max(sum(cluster.threads().values()), 1)
+        waiting: deque[Any] = deque()
+        for function, arguments, options in calls:
+            waiting.append(cluster.client.submit(function, *arguments, **options, pure=False))
+            if len(waiting) >= most:
+                yield self._result(cluster, waiting.popleft())
+        while waiting:
+            yield self._result(cluster, waiting.popleft())
+
+    def _result(self, cluster: Cluster, future: Any) -> Any:
+        """Wait for a result; a worker that dies is replaced by another as long as there is one."""
+        while True:
+            try:
+                return future.result(timeout=_LOOK_EVERY_S)
+            except TimeoutError as late:
+                if future.done():
+                    raise BackendError(f"the workers cannot answer this: {one_line(late)}") from late
+                if not cluster.threads():
+                    raise ClusterLostError(f"{cluster.lost_text()}: no worker is left") from None
+            except BoulderSweepError:
+                raise
+            except Exception as problem:
+                if cluster.client.status != "running":
+                    raise ClusterLostError(cluster.lost_text()) from problem
+                raise BackendError(f"the workers cannot answer this: {one_line(problem)}") from problem
+
+
+@contextmanager
+def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = None) -> Iterator[Pool]:
+    """Give a pool on a backend; arguments as of `boulder_sweep.run`.
+
+    Raises
+    ------
+    BackendError
+        The workers are not available.
+    """
+    check_backend(backend, scheduler)
+    if backend != DASK:
+        yield Pool(jobs)
+        return
+    from boulder_sweep.runner.cluster import Cluster
+
+    cluster = Cluster(jobs or available_cores(), scheduler)
+    try:
+        yield Pool(jobs, cluster)
+    finally:
+        cluster.close()

@@ -1,0 +1,44 @@
+"""Questions answered on a cluster: the same answers, bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from boulder_sweep.answers.need import need
+from boulder_sweep.answers.uncertainty import uncertainty
+from boulder_sweep.settings import load
+from boulder_sweep.tradeoff.study import measure
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+DASK = {"backend": "dask", "jobs": 2}
+
+
+def test_need_on_a_cluster():
+    sweep = load(CONFIGS / "site.yaml")
+    assert need(sweep, **DASK).arrow.equals(need(sweep).arrow)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("asked", [{"least": "mass"}, {"probability": 0.95}])
+def test_need_of_other_kinds_on_a_cluster(asked):
+    sweep = load(CONFIGS / ("uncertain_site.yaml" if "probability" in asked else "site.yaml"))
+    assert need(sweep, **asked, **DASK).arrow.equals(need(sweep, **asked).arrow)
+
+
+@pytest.mark.slow
+def test_uncertainty_on_a_cluster():
+    sweep = load(CONFIGS / "uncertain_site.yaml")
+    here, there = uncertainty(sweep, half_width=0.05), uncertainty(sweep, half_width=0.05, **DASK)
+    assert there.arrow.equals(here.arrow)
+    assert there.indices.equals(here.indices)
+
+
+@pytest.mark.slow
+def test_a_tradeoff_measured_by_a_worker():
+    sweep = load(CONFIGS / "m30_sizing.yaml")
+    here, there = measure(sweep, designs=64, seconds=5.0), measure(sweep, designs=64, seconds=5.0, backend="dask")
+    errors = {point.method: point.rotation_max_deg for point in here.points}
+    assert there.points
+    assert all(errors.get(point.method, point.rotation_max_deg) == point.rotation_max_deg for point in there.points)
