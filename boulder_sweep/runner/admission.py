@@ -6,7 +6,7 @@ import threading
 
 
 class Admission:
-    """Counts rows between being handed out and being safe on disk.
+    """Counts rows between being handed out and being staged on disk.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Admission:
             return True
 
     def release(self, rows: int) -> None:
-        """Count rows as safe."""
+        """Count rows as staged."""
         with self._changed:
             self._in_progress -= rows
             self._changed.notify_all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,9 @@ from boulder_sweep.store.writer import OutputFolder, StagedPart
 
 if TYPE_CHECKING:
     from boulder_sweep.runner.computing import Computation
+
+COMMIT_SHARE = 0.02
+"""Share of one processor that writing manifests may take."""
 
 
 class Committer(threading.Thread):
@@ -25,7 +29,7 @@ class Committer(threading.Thread):
     computation
         Encodes merged parts.
     admission
-        Is told which rows are safe.
+        Is told which rows are staged, and so no longer in memory.
     flush
         Stages the rows that are ready when the run is stopped.
     """
@@ -49,6 +53,7 @@ class Committer(threading.Thread):
         self._next = self._end = -1
         self._open_next()
         self._stopped = threading.Event()
+        self._rest_until = 0.0
 
     def put(self, staged: StagedPart) -> None:
         """Hand over a staged part; never waits."""
@@ -66,16 +71,31 @@ class Committer(threading.Thread):
     def run(self) -> None:
         """Commit parts; called by `start`."""
         try:
-            while (item := self._arrived.get()) is not None:
+            while (item := self._next_item()) is not None:
                 self._waiting[item.part.first] = item
-                if self._arrived.empty():  # one manifest for all that have arrived
-                    self._commit()
+                self._admission.release(item.part.rows)
             if self._stopped.is_set():
                 self._waiting |= {item.part.first: item for item in self._flush()}
             self._commit()
             self._merge()
         except BaseException as problem:
             self.problem = problem
+
+    def _next_item(self) -> StagedPart | None:
+        """Wait for a staged part, None for the end; commit meanwhile what has arrived when it is time to.
+
+        The manifest is written as a whole, and grows with the table. So after each commit there is a rest, long
+        enough for the commits to take no more than `COMMIT_SHARE` of a processor; what arrives meanwhile shares the
+        next manifest.
+        """
+        while True:
+            due = self._rest_until - time.monotonic()
+            try:
+                return self._arrived.get(timeout=max(due, 0.0) if self._next in self._waiting else None)
+            except queue.Empty:
+                begun = time.thread_time()
+                self._commit()
+                self._rest_until = time.monotonic() + (time.thread_time() - begun) / COMMIT_SHARE
 
     def _commit(self) -> None:
         """Commit the parts that continue the table."""
@@ -87,7 +107,6 @@ class Committer(threading.Thread):
                 self._open_next()
         if ready:
             self._folder.commit(ready)
-            self._admission.release(sum(staged.part.rows for staged in ready))
 
     def _open_next(self) -> None:
         """Continue with the next range of missing rows."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError
 from boulder_sweep.judge.judged import Judged, not_computed
+from boulder_sweep.runner import committer
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.assembly import Assembly
 from boulder_sweep.runner.backends import check_backend
@@ -239,3 +241,21 @@ def test_a_slow_run_writes_what_it_has_and_an_interrupted_one_flushes():
 def test_backends_that_do_not_exist(arguments, words):
     with pytest.raises(BackendError, match=words):
         check_backend(*arguments)
+
+
+def test_a_large_manifest_is_written_seldom(monkeypatch):
+    """Parts that arrive while it would be too early share the next one; the last ones do not wait."""
+    monkeypatch.setattr(committer, "COMMIT_SHARE", 1e-9)
+    folder = Folder(100, 10)
+    commits = []
+    folder.commit = lambda staged: (commits.append(len(staged)), Folder.commit(folder, staged))
+    writer = Committer(folder, Recorder(good, Rows, {}), Admission(10**9), tuple)
+    writer.start()
+    for first in range(0, 100, 10):
+        writer.put(folder.stage(first, b"", 10, {"pieces": []}))
+        time.sleep(0.02)
+    assert commits == [1]
+    writer.finish()
+    writer.join(10)
+    assert commits == [1, 9]
+    assert writer.problem is None
