@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import against_tests, answers, energy, soil, uplift
+from docs.studies import against_tests, answers, energy, scale, soil, uplift
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -186,6 +186,12 @@ def _wild_families(_: Path) -> str:
 
 
 CONTENTS: dict[str, Callable[[Path], str]] = {
+    "scale-constants": lambda _: scale.constants_table(),
+    "scale-plan": lambda _: scale.plan_table(),
+    "scale-workers": lambda _: scale.workers_table(),
+    "scale-prices": lambda _: scale.price_table(),
+    "scale-limits": lambda _: scale.limits_words(),
+    "scale-questions": scale.questions_table,
     "validation-table": _validation_table,
     "statements": _statements,
     "rigid-wall": _rigid_wall,
