@@ -82,6 +82,10 @@ class RemotePath:
         """The ending of the name, with its dot."""
         return Path(self.name).suffix
 
+    def with_suffix(self, suffix: str) -> RemotePath:
+        """Return the place whose name has another ending."""
+        return self.parent / Path(self.name).with_suffix(suffix).name
+
     @property
     def parent(self) -> RemotePath:
         """The folder."""

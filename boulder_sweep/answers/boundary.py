@@ -25,6 +25,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
+from boulder_sweep.places import Place
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.text import one_line
@@ -99,7 +100,7 @@ class Boundary:
         columns["reason"] = pd.Categorical.from_codes(self.reason, list(REASONS))
         return pd.DataFrame(columns | {"simulated": self.simulated})
 
-    def write(self, path: str | Path) -> Path:
+    def write(self, path: str | Place) -> Place:
         """Write the map to a Parquet file.
 
         Raises

@@ -22,6 +22,7 @@ from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.places import Place
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import pool
 from boulder_sweep.settings.model import ReadingChoice
@@ -102,7 +103,7 @@ class Need:
             "rows": self.arrow.to_pylist(),
         }
 
-    def write(self, path: str | Path) -> Path:
+    def write(self, path: str | Place) -> Place:
         """Write the answers to a Parquet file.
 
         Raises

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import joblib
@@ -19,6 +18,7 @@ from boulder_sweep.answers.questions import Trial, replaced
 from boulder_sweep.answers.search import FAILS, HOLDS, Search, search
 from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
 from boulder_sweep.designs import block_of
+from boulder_sweep.places import Place
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +92,7 @@ class Reserves:
         """Return everything as plain data."""
         return {"name": self.sweep.name, "rows": self.arrow.to_pylist()}
 
-    def write(self, path: str | Path) -> Path:
+    def write(self, path: str | Place) -> Place:
         """Write the table to a Parquet file.
 
         Raises

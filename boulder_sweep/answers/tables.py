@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
@@ -16,6 +17,7 @@ from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.sensitivity import Indices
 from boulder_sweep.columns import DESIGN_ID, INPUTS
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.places import Place, RemotePath, place_of
 from boulder_sweep.store.schema import part_table
 
 if TYPE_CHECKING:
@@ -227,8 +229,8 @@ def joined_tables(tables: Sequence[pa.Table], metadata: Mapping[bytes, bytes]) -
     return table.replace_schema_metadata({PANDAS_ATTRIBUTES: json.dumps(attributes).encode(), **metadata})
 
 
-def write_parquet(table: pa.Table, path: str | Path) -> Path:
-    """Write a table to a Parquet file.
+def write_parquet(table: pa.Table, path: str | Place) -> Place:
+    """Write a table to a Parquet file, by path or URL.
 
     Raises
     ------
@@ -238,33 +240,36 @@ def write_parquet(table: pa.Table, path: str | Path) -> Path:
     target = checked_parquet(path)
     split = [field.name for field in table.schema if field.name != DESIGN_ID.name and pa.types.is_floating(field.type)]
     words = [field.name for field in table.schema if pa.types.is_dictionary(field.type)]
+    content = io.BytesIO()
     try:
         pq.write_table(
             table,
-            target,
+            target if isinstance(target, Path) else content,
             compression="zstd",
             use_dictionary=words,
             use_byte_stream_split=split,
             write_page_checksum=True,
         )
+        if isinstance(target, RemotePath):
+            target.put(content.getbuffer())
     except OSError as problem:
         why = os.strerror(problem.errno) if problem.errno else str(problem)
         raise QuestionError(f"{path} cannot be written: {why}") from problem
     return target
 
 
-def checked_parquet(path: str | Path) -> Path:
-    """Check and return the path of a Parquet file to be written.
+def checked_parquet(path: str | Place) -> Place:
+    """Check and return the path or URL of a Parquet file to be written.
 
     Raises
     ------
     QuestionError
         The name has another ending, or its folder does not exist.
     """
-    target = Path(path)
+    target = place_of(path)
     if target.suffix.lower() != ".parquet":
         raise QuestionError(f"{path}: answers are a Parquet file; its name must end in .parquet")
-    if not target.absolute().parent.is_dir():
+    if isinstance(target, Path) and not target.absolute().parent.is_dir():
         raise QuestionError(f"{path}: the folder {target.absolute().parent} does not exist")
     return target
 

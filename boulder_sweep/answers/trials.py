@@ -101,7 +101,8 @@ class Judges:
 def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
     """Return the evaluations of a sweep.
 
-    Answers compare readings. As printed nothing can be proved; there a design passes that stands to the longest horizon.
+    Answers compare readings. As printed nothing can be proved; there a design passes that stands to the longest
+    horizon.
     """
     accuracy = accuracy_of(sweep)
     own = evaluation_of(sweep, accuracy, proved=False)

@@ -19,6 +19,7 @@ from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.places import Place
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import Pool, pool
 
@@ -84,7 +85,7 @@ class Uncertainty:
             "indices": self.indices.to_pylist(),
         }
 
-    def write(self, path: str | Path) -> list[Path]:
+    def write(self, path: str | Place) -> list[Place]:
         """Write the table to a Parquet file, with indices and samples next to it; return the paths.
 
         Raises

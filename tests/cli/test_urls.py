@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
+
+from boulder_sweep.places import place_of
 
 
 @pytest.fixture
@@ -31,3 +34,12 @@ def test_a_url_with_credentials_is_refused_before_anything_is_done(sweep, possib
     assert (code, out) == (2, "")
     assert err.startswith("error: s3://bucket/out: the URL was given with a user name or password")
     assert "SECRET" not in err
+
+
+def test_answers_are_written_to_a_url(sweep, possible_grid):
+    need = ("need", possible_grid, "-q", "--own-readings", "-o")
+    assert sweep(*need, "memory://answers/least.parquet")[0] == 0
+    assert sweep(*need, "least.parquet")[0] == 0
+    assert place_of("memory://answers/least.parquet").read_bytes() == Path("least.parquet").read_bytes()
+    code, _, err = sweep(*need, "memory://answers/least.csv")
+    assert (code, "must end in .parquet" in err) == (2, True)
