@@ -17,6 +17,7 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, verdict_map
 from boulder_sweep.text import script_data
+from boulder_sweep.views.wording import LAW_WORDS
 
 if TYPE_CHECKING:
     from boulder_sweep.report.answers import Sentence
@@ -124,6 +125,7 @@ def assembled(
         settings=settings,
         lines=setting_lines(settings),
         readings=reading_words(settings),
+        law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),
         data=script_data(data),
         style=(ASSETS / "page.css").read_text(),
         script=script,

@@ -23,6 +23,8 @@ REASON_WORDS = {
 }
 
 
+LAW_WORDS = {"broms": "3 K_p (Broms)", "width_capped": "capped by the width"}
+"""Laws of the soil's resistance that are not the paper's."""
 NOT_A_TEST = "Simulation, not a rating by test"
 
 
@@ -42,11 +44,16 @@ def verdict_line(trajectory: Trajectory) -> str:
 
 def terms_line(settings: Mapping[str, Any]) -> str:
     """Return what a pass means under the settings of a table: limits, readings, and that it is a simulation."""
-    limits, readings = settings["criterion"], settings["model"]["preset"].replace("_", " ")
-    return (
-        f"Pass: rotation up to {limits['max_rotation_deg']:g}° and rating {limits['rating']} · readings {readings}. "
-        f"{NOT_A_TEST}."
-    )
+    limits = settings["criterion"]
+    held = f"rotation up to {limits['max_rotation_deg']:g}° and rating {limits['rating']}"
+    return f"Pass: {held} · {model_words(settings)}. {NOT_A_TEST}."
+
+
+def model_words(settings: Mapping[str, Any]) -> str:
+    """Return the readings of the paper, and the law of the soil's resistance where it is not the paper's."""
+    model = settings["model"]
+    law = LAW_WORDS.get(model.get("resistance", ""), "")
+    return f"readings {model['preset'].replace('_', ' ')}{f', resistance {law}' if law else ''}"
 
 
 def design_line(trajectory: Trajectory, units: str = "si") -> str:
@@ -61,7 +68,7 @@ def design_line(trajectory: Trajectory, units: str = "si") -> str:
             f"boulder {size} {unit} (L × W × H), {value['embedment_depth_m'] / metre:.4g} {unit} deep",
             f"soil {', '.join(soil)}",
             f"{truck}, {speed}",
-            f"readings {trajectory.settings['model']['preset'].replace('_', ' ')}",
+            model_words(trajectory.settings),
         )
     )
     return f"{words}\n{NOT_A_TEST}"

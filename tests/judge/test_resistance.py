@@ -16,6 +16,7 @@ from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.resistance import LAWS, broms, kp_squared, width_capped, with_law
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import PRESETS, RESISTANCES
+from boulder_sweep.views.wording import LAW_WORDS, design_line
 from tests import oracle
 from tests.answers.designs import site
 from tests.judge.plain import plain_designs
@@ -88,3 +89,13 @@ def test_less_resistance_needs_more_depth_and_is_passed_less_often() -> None:
     uncertain = site(site="embedment_depth: 2.2 m", friction="{mean: 40 deg, sd: 2 deg}", height="3.2 m")
     chance = {law: uncertainty(by(law, uncertain)).frame.p_pass.iloc[0] for law in ("kp_squared", "broms")}
     assert chance["broms"] < chance["kp_squared"]
+
+
+def test_pictures_name_a_law_that_is_not_the_papers() -> None:
+    """So do pages, see `tests/report/test_page.py`."""
+    plain, capped = (
+        design_line(simulate(by(law, crash_test("rwg")), horizon_s=0.02)) for law in ("kp_squared", "width_capped")
+    )
+    assert plain.splitlines()[0].endswith("readings corrected")
+    assert capped.splitlines()[0].endswith("readings corrected, resistance capped by the width")
+    assert set(LAW_WORDS) == set(OTHERS)

@@ -10,6 +10,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.report import example, write_explorer, write_report
 from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.views.wording import LAW_WORDS
 from tests.report.conftest import GRID, SETS
 
 pytestmark = pytest.mark.slow  # these need Chromium, which not every machine has
@@ -271,6 +272,7 @@ def test_a_law_of_the_resistance_acts_in_the_simulator_and_is_copied(tmp_path, o
     assert found["max_rotation_deg"] == pytest.approx(theirs["max_rotation_deg"], rel=1e-9)
     assert found["verdict"] == theirs["verdict"] == "fail"
     assert f"resistance: {law}" in page.content()
+    assert f"Ultimate resistance of the soil: {LAW_WORDS[law]}" in page.inner_text("main")
 
 
 def test_print_has_every_section_and_no_switches(report, opened):
