@@ -42,9 +42,10 @@ def curves(panel: str) -> list[figure]:
         Name of the part of the page; the names of figures and sources begin with it.
     """
     motion = ColumnDataSource(
-        {name: [0.0, 1.0] for name in ("time", "rotation", "limit", "boulder", "vehicle", "force", *PARTS)},
+        {name: [0.0, 1.0] for name in ("time", "rotation", "limit", "boulder", "vehicle", "force")},
         name=f"{panel}-motion",
     )
+    energies = ColumnDataSource({name: [0.0, 1.0] for name in ("time", *PARTS)}, name=f"{panel}-energies")
     rotation = _plot(panel, "rotation", [("time", "@time{0.000} s"), ("rotation", "@rotation{0.00}")])
     rotation.line("time", "rotation", source=motion, line_width=2, color=LINES[0])
     rotation.line("time", "limit", source=motion, line_width=2, color=LINES[1], line_dash="dashed")
@@ -63,7 +64,7 @@ def curves(panel: str) -> list[figure]:
     energy.varea_stack(
         list(PARTS),
         x="time",
-        source=motion,
+        source=energies,
         color=[colour for _, colour in PARTS.values()],
         legend_label=[word for word, _ in PARTS.values()],
     )

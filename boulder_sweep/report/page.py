@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from boulder_sweep.report.rows import Rows, Thinned
 
 ASSETS = Path(__file__).with_name("assets")
-SCRIPTS = ("kernel", "verdict", "simulator", "units", "plots", "scene", "maps", "controls", "texts", "page")
+SCRIPTS = ("kernel", "verdict", "simulator", "units", "plots", "scene", "maps", "walker", "controls", "texts", "page")
 """Our own script, in this order."""
 MAIN = (
     "embedment_depth_m",

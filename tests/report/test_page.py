@@ -297,3 +297,41 @@ def test_chosen_designs_are_those_asked_for(result, tmp_path, opened):
     page = opened(write_report(result, tmp_path / "two.html", designs=(7, 200), units="us"))
     assert page.locator("article h3").all_inner_texts() == ["Design 7 (design 7)", "Design 200 (design 200)"]
     assert page.input_value("#units") == "us"
+
+
+def test_the_map_is_walked_and_picked_by_keys(report, opened):
+    page = opened(report)
+    page.focus("#figure-sweep-map")
+    names = page.evaluate("[page.data.rows.labels[across.value], page.data.rows.labels[up.value]]")
+    page.keyboard.press("ArrowUp")
+    first = page.inner_text("#sweep-at")
+    assert all(name in first for name in names)
+    assert re.search(r": (pass|fail|undecided)", first)
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowRight")
+    second = page.inner_text("#sweep-at")
+    assert second != first
+    page.keyboard.press("Enter")
+    verdict = second.rsplit(": ")[-2 if second.count(": ") > 1 else -1]
+    assert page.evaluate("page.simulator.whole(page.design).judged.verdict") == verdict
+    height = float(re.search(r"boulder height ([\d.]+)", second)[1])
+    assert page.evaluate("page.design.boulder_height_m") == pytest.approx(height, rel=1e-3)
+    page.evaluate("(clearTimeout(page.waiting), page.showAround())")
+    page.focus("#figure-live-map")
+    page.keyboard.press("ArrowLeft")
+    before = page.evaluate("page.design.embedment_depth_m")
+    page.keyboard.press("Enter")
+    assert page.evaluate("page.design.embedment_depth_m") < before
+
+
+KINETIC = "page.motions.live.motion.columns.vehicle_kinetic[0]"
+
+
+def test_the_energy_follows_when_the_reader_pauses(explorer, opened):
+    page = opened(explorer)
+    energies = "page.plots.find('live-energies').data.vehicle_kinetic[0]"
+    before = page.evaluate(energies)
+    assert page.evaluate(f"(() => {{ page.take({{ impact_speed_m_s: 9.0 }}); return {energies}; }})()") == before
+    page.wait_for_timeout(1000)
+    assert page.evaluate(energies) == pytest.approx(page.evaluate(KINETIC) / 1000)
+    assert page.evaluate("page.plots.find('live-motion').data.force.length === page.motions.live.motion.time.length")

@@ -3,6 +3,8 @@
 
 const AROUND = 40;
 const SPREAD = 0.25;
+/** Time without a change after which the rest of the page follows the controls [ms]. */
+const PAUSE = 150;
 /** Width of a sheet of A4 between its margins [px]. */
 const PAPER = 680;
 
@@ -30,6 +32,8 @@ class Page {
     this.printing = false;
     /** @type {Record<string, Cell[]>} */
     this.cells = {};
+    /** @type {Record<string, Walker>} */
+    this.walkers = { live: new Walker("live", plots, this.units), sweep: new Walker("sweep", plots, this.units) };
   }
 
   /**
@@ -38,13 +42,28 @@ class Page {
    * @param {Record<string, number>} design
    */
   show(panel, design) {
+    this.showMotion(panel, design);
+    this.showEnergy(panel);
+  }
+
+  /** @param {string} panel */
+  showEnergy(panel) {
+    this.plots.drawEnergy(panel, this.motions[panel].motion, this.units, this.data.parts, this.data.rules.rotation);
+  }
+
+  /**
+   * Show all of a design but where the energy goes.
+   * @param {string} panel
+   * @param {Record<string, number>} design
+   */
+  showMotion(panel, design) {
     const { judged: found, motion, inputs } = this.simulator.whole(design);
     this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found);
     const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
     table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
     const flags = String(found.validity ?? "").split(";").filter((name) => name !== "");
     byId(`${panel}-flags`).replaceChildren(...flags.map((name) => element("li", this.data.rules.tested.meanings[name])));
-    this.plots.draw(panel, motion, this.units, this.data.parts, this.data.rules.rotation);
+    this.plots.draw(panel, motion, this.units, this.data.rules.rotation);
     this.motions[panel] = { scene: this.scene(inputs), motion };
     const slider = byId(`${panel}-time`);
     slider.max = Math.max(motion.time.length - 1, 0);
@@ -104,13 +123,16 @@ class Page {
     return line;
   }
 
-  /** Simulate the design of the controls, at once; the designs around it, as soon as the reader pauses. */
+  /** Simulate the design of the controls, at once; its energy and the designs around it, as soon as the reader pauses. */
   update() {
-    this.show("live", this.design);
+    this.showMotion("live", this.design);
     this.controls.show(this.simulator.completed(this.design).inputs);
     byId("yaml").value = yamlOf(this.data, this.design);
     clearTimeout(this.waiting);
-    this.waiting = setTimeout(() => this.showAround(), 150);
+    this.waiting = setTimeout(() => {
+      this.showEnergy("live");
+      this.showAround();
+    }, PAUSE);
   }
 
   /** Simulate designs over two inputs around the one of the controls. */
@@ -132,8 +154,10 @@ class Page {
     }));
     this.cells = { ...this.cells, live: cells };
     const of = (/** @type {string} */ name) => /** @type {Input} */ (this.inputs.find((one) => one.name === name));
-    drawCells(this.plots, "live", cells, { x: of(across).label, y: of(up).label }, { x: of(across).unit, y: of(up).unit },
-      this.units, this.data.colours, { x: this.design[across], y: this.design[up] });
+    const [labels, units] = [{ x: of(across).label, y: of(up).label }, { x: of(across).unit, y: of(up).unit }];
+    const here = { x: this.design[across], y: this.design[up] };
+    drawCells(this.plots, "live", cells, labels, units, this.units, this.data.colours, here);
+    this.walkers.live.over(cells, labels, units, here);
     this.legend("live", cells);
     const passing = found.filter((one) => one.verdict === "pass").length;
     byId("live-words").textContent =
@@ -147,8 +171,9 @@ class Page {
     for (const control of byId("held").children) control.hidden = [across, up].includes(control.dataset.name);
     const cells = tableCells(rows, this.codes, across, up, this.held);
     this.cells = { ...this.cells, sweep: cells };
-    drawCells(this.plots, "sweep", cells, { x: rows.labels[across], y: rows.labels[up] },
-      { x: rows.units[across], y: rows.units[up] }, this.units, this.data.colours, null);
+    const [labels, units] = [{ x: rows.labels[across], y: rows.labels[up] }, { x: rows.units[across], y: rows.units[up] }];
+    drawCells(this.plots, "sweep", cells, labels, units, this.units, this.data.colours, null);
+    this.walkers.sweep.over(cells, labels, units, null);
     this.legend("sweep", cells);
     const passing = cells.filter((cell) => cell.name === "pass").length;
     byId("sweep-words").textContent = `${passing.toLocaleString("en-US")} of the ${cells.length.toLocaleString("en-US")} designs shown pass.`;
@@ -258,6 +283,11 @@ class Page {
     this.update();
   }
 
+  /** @param {string} panel @param {Cell} cell whose design is to be simulated */
+  pick(panel, cell) {
+    this.take({ ...(panel === "sweep" ? this.data.rows.given : {}), ...cell.pick() });
+  }
+
   /** Let the reader do what there is to do. */
   listen() {
     const { data } = this;
@@ -276,11 +306,10 @@ class Page {
       source.selected.properties.indices.change.connect(() => {
         const [picked] = source.selected.indices;
         if (picked === undefined) return;
-        const cell = this.cells[panel][picked];
         source.selected.indices = [];
-        const held = panel === "sweep" ? data.rows.given : {};
-        this.take({ ...held, ...cell.pick() });
+        this.pick(panel, this.cells[panel][picked]);
       });
+      this.walkers[panel].listen((cell) => this.pick(panel, cell));
     }
     byId("reset").addEventListener("click", () => this.take(data.start));
     byId("add").addEventListener("click", () => {

@@ -64,30 +64,51 @@ class Plots {
    * @param {string} panel
    * @param {Motion} motion
    * @param {Units} units
-   * @param {string[]} parts of the energy
    * @param {number} limit of the rotation [rad]
    */
-  draw(panel, motion, units, parts, limit) {
+  draw(panel, motion, units, limit) {
     const { columns } = motion;
     /** @param {string} name @param {string} unit */
     const shown = (name, unit) => columns[name].map((value) => value / units.size(unit));
     this.fill(`${panel}-motion`, {
-      time: motion.time.map((t) => Number(t.toPrecision(12))),
+      time: motion.time,
       rotation: columns.theta_b.map((value) => value * DEGREES),
       limit: columns.theta_b.map(() => limit * DEGREES),
       boulder: shown("x_b", "m"),
       vehicle: shown("x_v", "m"),
       force: shown("F_v", "N"),
-      ...Object.fromEntries(parts.map((part) => [part, shown(part, "J")])),
     });
-    const over = columns.theta_b.findIndex((value) => Math.abs(value) >= limit);
-    for (const kind of ["rotation", "displacement", "force", "energy"]) {
-      const beyond = this.find(`${panel}-${kind}-beyond`);
-      [beyond.left, beyond.right] = over < 0 ? [0, 0] : [motion.time[over], motion.time.at(-1)];
-    }
+    this.shade(panel, motion, limit, ["rotation", "displacement", "force"]);
     this.title(`${panel}-rotation`, "time [s]", "rotation [°]");
     this.title(`${panel}-displacement`, "time [s]", units.title("displacement", "m"));
     this.title(`${panel}-force`, "time [s]", units.title("contact force", "N"));
+  }
+
+  /**
+   * Draw where the energy of one design goes, the figure that takes longest.
+   * @param {string} panel
+   * @param {Motion} motion
+   * @param {Units} units
+   * @param {string[]} parts of the energy
+   * @param {number} limit of the rotation [rad]
+   */
+  drawEnergy(panel, motion, units, parts, limit) {
+    const shown = parts.map((part) => [part, motion.columns[part].map((value) => value / units.size("J"))]);
+    this.fill(`${panel}-energies`, { time: motion.time, ...Object.fromEntries(shown) });
+    this.shade(panel, motion, limit, ["energy"]);
     this.title(`${panel}-energy`, "time [s]", units.title("energy", "J"));
+  }
+
+  /**
+   * Shade the time after the limit, where the model no longer holds.
+   * @param {string} panel
+   * @param {Motion} motion
+   * @param {number} limit of the rotation [rad]
+   * @param {string[]} kinds of figures
+   */
+  shade(panel, motion, limit, kinds) {
+    const over = motion.columns.theta_b.findIndex((value) => Math.abs(value) >= limit);
+    const [left, right] = over < 0 ? [0, 0] : [motion.time[over], motion.time.at(-1)];
+    for (const kind of kinds) this.find(`${panel}-${kind}-beyond`).setv({ left, right });
   }
 }

@@ -45,7 +45,8 @@ class SideView {
     this.shape("first", [[0, -s.depth], [s.length, -s.depth], [s.length, s.height - s.depth], [0, s.height - s.depth]]);
     this.shape("boulder", [place(0, 0), place(s.length, 0), place(s.length, s.height), place(0, s.height)]);
     this.line("limit", [s.line, 0], [s.line, 2.5]);
-    this.text("limit", s.line + 0.08, 2.5, `${s.rating}: limit of the cargo bed`);
+    this.text("limit", s.line + 0.08, 2.5, `${s.rating}: limit`);
+    this.text("limit", s.line + 0.08, 2.18, "of the cargo bed");
     this.truck(s, x_v, motion.time.length > 0 ? at("v_v") : s.speed, at("F_v"));
 
     const peak = Math.max(0, ...(motion.columns.F_v ?? []));
