@@ -51,7 +51,7 @@ NOTES = {
     "always": "≤, ≥: passes throughout the searched range, up to this end of it",
     "never": "never: passes nowhere in the searched range",
     "not_monotone": "*: fails again further on; column passes_within (-o) lists all passing ranges",
-    "blocked_by_overlap": "blocked: does not pass, up to where the truck would pass or ride over the boulder",
+    "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
 }
 SHORT = {"as_printed": "printed", "corrected": "corrected"}
 

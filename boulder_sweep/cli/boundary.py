@@ -13,7 +13,7 @@ from boulder_sweep.cli.output import show
 EXAMPLES = """\b
 Examples:
   sweep boundary configs/m30_sizing.yaml --plot map.png
-  sweep boundary configs/m30_sizing.yaml -o map.parquet --set model.soil='{elements: 200}'
+  sweep boundary configs/m30_sizing.yaml -o map.parquet
 """
 
 

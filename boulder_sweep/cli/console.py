@@ -85,8 +85,8 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
         f"pass   is {NOT_A_RATING}",
         f"firm?  sample of {sample}: {exact}",
         f"       verdicts changed by the other reading of the paper {changed['reading']:.1%},",
-        f"       by 1 deg of friction angle {changed['friction_angle']:.1%}, 5 % of speed {changed['speed']:.1%}, "
-        f"{OTHER_LAW[firmness.get('other_resistance', 'broms')]} {changed['resistance']:.1%}",
+        f"       by 1 deg of friction angle {changed['friction_angle']:.1%}, 5 % of speed {changed['speed']:.1%},",
+        f"       {OTHER_LAW[firmness.get('other_resistance', 'broms')]} {changed['resistance']:.1%}",
     ]
     if firmness["passes"]:
         shares = {name: count / firmness["passes"] for name, count in flags.items()}

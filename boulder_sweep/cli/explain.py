@@ -67,6 +67,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
 
 def why_lines(found: Explanation) -> list[str]:
     """Return what decided a row, and how near it came to every limit."""
+    from boulder_sweep.judge.validity import BY_FLAG
     from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
     from boulder_sweep.views.wording import REASON_WORDS
 
@@ -94,5 +95,6 @@ def why_lines(found: Explanation) -> list[str]:
     if row["rotation_error_deg"] is not None:
         lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
     if row.get("validity"):
-        lines.append(f"  outside what the model was tested on: {row['validity'].replace(';', ', ')}")
+        lines.append("  outside what the model was tested on (docs/validity.md):")
+        lines += [f"    {name}: {BY_FLAG[name].meaning}" for name in row["validity"].split(";")]
     return lines

@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 EXAMPLES = """\b
 Examples:
   sweep fit-vehicle docs/examples/rigid_wall_pulse.csv --mass "6800 kg"
-  sweep fit-vehicle pulse.csv --mass "15000 lb" --speed "30 mph" --plot fit.png
+  sweep fit-vehicle pulse.csv --mass "15000 lb" --plot fit.png
 
 \b
 The first line of PULSE names what its columns hold, with units:
   time [ms], displacement [mm], velocity [m/s], acceleration [g]
-One of the three beside time is enough. Time counts from first touch; earlier rows are left out. An acceleration
-is negative while the vehicle slows down; where it is not, name the column deceleration. Empty cells are gaps.
+One of the three beside time is enough. Time counts from first touch; earlier
+rows are left out. An acceleration is negative while the vehicle slows down;
+where it is not, name the column deceleration. Empty cells are gaps.
 """
 
 
@@ -71,10 +72,10 @@ def lines(fit: VehicleFit) -> list[str]:
     for name, misfit in fit.misfits.items():
         rows.append((f"misfit of {name}", f"{misfit.share:.1%} of its range (root mean square)"))
     settings = (
-        f"vehicle:  {{mass: {wall.mass_kg:.6g} kg, spring: {wall.spring_N_m / 1e3:.6g} kN/m, "
-        f"damper: {wall.damper_N_s_m / 1e3:.6g} kN*s/m, speed: ...}}"
+        f"vehicle: {{mass: {wall.mass_kg:.6g} kg, speed: ...,",
+        f"          spring: {wall.spring_N_m / 1e3:.6g} kN/m, damper: {wall.damper_N_s_m / 1e3:.6g} kN*s/m}}",
     )
-    return [*(f"{name:<24}{text}" for name, text in rows), "", settings]
+    return [*(f"{name:<24}{text}" for name, text in rows), "", *settings]
 
 
 def _quantity(option: str, text: str, unit: str) -> float:

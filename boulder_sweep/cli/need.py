@@ -13,8 +13,8 @@ from boulder_sweep.cli.output import say, show
 EXAMPLES = """\b
 Examples:
   sweep need configs/site.yaml
-  sweep need configs/site.yaml --margin '25 %' -o depths.parquet --plot depths.png
-  sweep need configs/site.yaml --least friction_angle --set site.embedment_depth='2.3 m'
+  sweep need configs/site.yaml --margin '25 %' --plot depths.png
+  sweep need configs/site.yaml --least height -o heights.parquet
   sweep need configs/uncertain_site.yaml --probability 0.95
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """

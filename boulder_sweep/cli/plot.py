@@ -17,7 +17,7 @@ Examples:
   sweep plot m30-sizing.sweep
   sweep plot m30-sizing.sweep -o map.png --at boulder_width_m=1.8
   sweep plot map.parquet --units us
-  sweep plot m30-sizing.sweep --across boulder_width_m --at embedment_ratio=0.6
+  sweep plot m30-sizing.sweep --across boulder_width_m
 """
 COLUMN = "COLUMN"
 

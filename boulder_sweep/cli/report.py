@@ -17,6 +17,7 @@ Examples:
   sweep report m30-sizing.sweep
   sweep report m30-sizing.sweep --design 4711 --design 104960 -o site.html
   sweep report m30-sizing.sweep --units us
+  sweep report chances.parquet
 """
 
 
@@ -35,13 +36,15 @@ Examples:
 def report(out: str, page: str | None, designs: tuple[int, ...], units: str) -> int:
     """Write the result in OUT as one HTML file: the answer, the map, and the simulator, which runs in the page.
 
+    OUT is the folder of a run, or a file of `sweep uncertainty -o`, whose probabilities of passing then stand first.
+
     The file needs no network and no server: it opens from disk in any browser, and whoever gets it can change a
     design and see the impact simulated anew.
     """
     from boulder_sweep.report import write_report
 
     folder = place_of(out)
-    target = Path(page) if page else beside(folder, ".html")
+    target = Path(page) if page else beside(place_of(out.removesuffix(".parquet")), ".html")
     command = shlex.join(["sweep", *sys.argv[1:]])
     written = write_report(folder, target, designs=designs, units=units, command=command)
     show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")

@@ -86,5 +86,6 @@ def _cautions(values: dict[str, Any]) -> list[str]:
     """Return the remarks that go with the result."""
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
 
-    lines = [f"caution: {words} (docs/validity.md)" for words in meanings(values["validity"] or "")]
+    lines = [f"caution: {words}" for words in meanings(values["validity"] or "")]
+    lines += ["see docs/validity.md"] if lines else []
     return [*lines, f"pass: {NOT_A_RATING}"] if values["verdict"] == "pass" else lines

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ from boulder_sweep.cli.options import cluster_options, json_option, set_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
     from boulder_sweep.tradeoff.study import Tradeoff
 
 EXAMPLES = """\b
@@ -84,7 +87,7 @@ def tradeoff(
     if found.points:
         _show(found)
     for sentence in found.recommendation():
-        show(sentence)
+        show(*textwrap.wrap(sentence, 80))
     for method in found.left_out:
         show(f"left out for time: {method.readings}, {method.soil}, {method.steps}")
     for file in files:
@@ -93,19 +96,39 @@ def tradeoff(
 
 
 def _show(found: Tradeoff) -> None:
-    """Print the table, whole whatever the terminal's width."""
-    from rich.box import SIMPLE
+    """Print the table: all of it where the terminal is wide enough, else the columns that matter most."""
     from rich.console import Console
-    from rich.table import Table
 
-    table = Table(box=SIMPLE, title=None, pad_edge=False)
-    for name in ("readings", "soil", "step"):
+    wide = Console(width=1000)
+    width = Console().width
+    table = _table(found, whole=True)
+    whole = wide.measure(table).maximum <= width
+    if not whole:
+        table = _table(found, whole=False)
+    Console(width=max(width, wide.measure(table).maximum)).print(table)
+    show("* none with these readings is both cheaper and more accurate (rotation, 99 %)")
+    if not whole:
+        show("y: yield located; a wider terminal shows more columns, and -o writes all of them")
+    for readings, error in found.reference_deg.items():
+        show(f"{readings}: against steps of {found.reference_step_ms:g} ms, known to {error:.0e} deg")
+    show("")
+
+
+def _table(found: Tradeoff, *, whole: bool) -> RichTable:
+    """Return the methods as a table; not whole, it fits a terminal of 80 columns."""
+    from rich.box import SIMPLE
+    from rich.table import Table as RichTable
+
+    table = RichTable(box=SIMPLE if whole else None, title=None, pad_edge=False, padding=(0, 2 if whole else 1, 0, 0))
+    for name in ("readings", "soil", "step") if whole else ("readings\nand soil", "step"):
         table.add_column(name, no_wrap=True)
-    for name in (
-        *("us per\ndesign", "rotation\nrms [deg]", "\n99 %", "\nmax", "movement\nrms [mm]", "\n99 %", "\nmax"),
-        *("error\ncovered", "verdicts\nflipped", "un-\ndecided", "of\ndesigns"),
-    ):
-        table.add_column(name, justify="right", no_wrap=True)
+    heads = ["us per\ndesign", "rotation\nrms [deg]", "\n99 %", "\nmax", "movement\nrms [mm]", "\n99 %", "\nmax"]
+    heads += ["error\ncovered", "verdicts\nflipped", "un-\ndecided", "of\ndesigns"]
+    shown = range(len(heads)) if whole else (0, 2, 3, 5, 7, 8)
+    if not whole:
+        heads[2], heads[3], heads[5] = "rotation\n99 % [deg]", "\nmax", "movement\n99 % [mm]"
+    for k in shown:
+        table.add_column(heads[k], justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     before = ("", 0, False, False)
     for point in found.points:
@@ -113,12 +136,12 @@ def _show(found: Tradeoff) -> None:
         group = (method.readings, method.soil_elements, method.error_estimate, method.locate_yield)
         if group != before and before[0]:
             table.add_section()
+        words = (method.readings, method.soil) if whole else (method.readings if group != before else "",)
+        if not whole and group != before and method.soil_elements:
+            words = (method.soil,)
         before = group
         metres = (point.displacement_rms_m, point.displacement_p99_m, point.displacement_max_m)
-        table.add_row(
-            method.readings,
-            method.soil,
-            method.steps,
+        cells = [
             f"{point.cpu_us:.3g}" if point.cpu_us < 1000 else f"{point.cpu_us:,.0f}",
             *(f"{v:.1e}" for v in (point.rotation_rms_deg, point.rotation_p99_deg, point.rotation_max_deg)),
             *(f"{1e3 * v:.1e}" for v in metres),
@@ -126,12 +149,8 @@ def _show(found: Tradeoff) -> None:
             str(point.flips),
             str(point.undecided),
             f"{point.designs:,}",
-            point.accuracy + (" *" if point.pareto else ""),
-        )
-    wide = Console(width=1000)
-    console = Console(width=max(Console().width, wide.measure(table).maximum))
-    console.print(table)
-    console.print("* no other method with these readings is both cheaper and more accurate (rotation, 99 %)")
-    for readings, error in found.reference_deg.items():
-        console.print(f"{readings}: against steps of {found.reference_step_ms:g} ms, known to {error:.0e} deg")
-    console.print()
+        ]
+        last = point.accuracy + (" *" if point.pareto else "")
+        steps = method.steps if whole else method.steps.replace(", yield located", " y")
+        table.add_row(*words, steps, *(cells[k] for k in shown), last)
+    return table

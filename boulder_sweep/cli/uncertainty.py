@@ -14,8 +14,8 @@ from boulder_sweep.cli.output import say, show
 EXAMPLES = """\b
 Examples:
   sweep uncertainty configs/uncertain_site.yaml
-  sweep uncertainty configs/uncertain_site.yaml -o chances.parquet --plot chances.png
-  sweep uncertainty configs/rwg.yaml --rare --set soil.friction_angle='{mean: 43.2 deg, cov: 5 %}'
+  sweep uncertainty configs/uncertain_site.yaml --plot chances.png
+  sweep uncertainty configs/uncertain_site.yaml --rare -o chances.parquet
   sweep uncertainty configs/uncertain_site.yaml --doubts
   sweep uncertainty --published
 """

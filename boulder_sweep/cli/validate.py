@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +23,11 @@ Examples:
   sweep validate --measured my_test.csv --case my_test.yaml -o validation
 
 \b
-The first line of a --measured file names what its columns hold, with units, time among them:
-  time [ms], rotation [deg], boulder_displacement [mm], vehicle_displacement [m]
-The boulder's displacement is that of its own centre of mass. Empty cells are gaps in a track.
+The first line of a --measured file names its columns, with units:
+  time [ms], rotation [deg], boulder_displacement [mm],
+  vehicle_displacement [m]
+The boulder's displacement is that of its own centre of mass.
+Empty cells are gaps in a track.
 """
 
 
@@ -58,7 +61,11 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         text = [found.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
     if out is not None:
         text += ["", *(f"written  {file}" for file in content["files"])]
-    show(*([json.dumps(content)] if as_json else text))
+    if as_json:
+        show(json.dumps(content))
+    else:
+        words = (line for part in text for line in part.split("\n"))
+        show(*(own for line in words for own in (textwrap.wrap(line, 80) if line.startswith("note:") else [line])))
     return 0 if found.holds else 1
 
 

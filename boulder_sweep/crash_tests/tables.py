@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
+
+WIDTH = 80
+"""Columns of a terminal."""
 
 
 @dataclass
@@ -32,12 +37,18 @@ class Table:
         lines = [self.head, tuple("---" for _ in self.head), *self.rows]
         return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
-    def text(self) -> str:
-        """Return the table for a terminal: columns as wide as they must be, numbers to the right."""
+    def text(self, width: int = WIDTH) -> str:
+        """Return the table for a terminal, numbers to the right, no line longer than `width`.
+
+        Words are wrapped where a column must be narrower; if that is not enough, rows and columns change places.
+        """
         lines = [self.head, *self.rows]
-        widths = [max(len(line[k]) for line in lines) for k in range(len(self.head))]
         right = [all(_is_number(row[k]) for row in self.rows) for k in range(len(self.head))]
-        return "\n".join(_line(line, widths, right) for line in lines)
+        if (widths := _widths(lines, width)) is None:
+            lines = list(zip(*lines, strict=True))
+            right = [False] + [True] * len(self.rows)
+            widths = _widths(lines, width) or [max(map(len, column)) for column in zip(*lines, strict=True)]
+        return "\n".join(text for line in lines for text in _lines(line, widths, right))
 
 
 def number(value: float, digits: int, none: str = "-") -> str:
@@ -45,9 +56,25 @@ def number(value: float, digits: int, none: str = "-") -> str:
     return none if value != value else f"{value:.{digits}f}"
 
 
-def _line(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> str:
-    padded = [cell.rjust(w) if r else cell.ljust(w) for cell, w, r in zip(cells, widths, right, strict=True)]
-    return "  ".join(padded).rstrip()
+def _widths(lines: Sequence[Sequence[str]], width: int) -> list[int] | None:
+    """Return the widths of columns, the widest ones narrowed until all fit; None where their words are too long."""
+    columns = list(zip(*lines, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    least = [max(len(word) for cell in column for word in [*cell.split(), ""]) for column in columns]
+    while sum(widths) + 2 * (len(widths) - 1) > width:
+        spare = [own - word for own, word in zip(widths, least, strict=True)]
+        if not any(spare):
+            return None
+        widths[max(range(len(widths)), key=lambda k: (spare[k] > 0, widths[k]))] -= 1
+    return widths
+
+
+def _lines(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> Iterator[str]:
+    """Yield the lines of a row, its cells wrapped."""
+    wrapped = (textwrap.wrap(cell, w, break_on_hyphens=False) for cell, w in zip(cells, widths, strict=True))
+    for parts in zip_longest(*wrapped, fillvalue=""):
+        padded = [part.rjust(w) if r else part.ljust(w) for part, w, r in zip(parts, widths, right, strict=True)]
+        yield "  ".join(padded).rstrip()
 
 
 def _is_number(cell: str) -> bool:

@@ -11,6 +11,9 @@ from boulder_sweep.judge.validity import BY_FLAG
 from boulder_sweep.report.rows import NOT_YET, SOIL, Rows
 from boulder_sweep.views.wording import REASON_WORDS
 
+SAFE = 0.95
+"""Probability of passing from which on a design is called safe here."""
+
 
 class Quantity(NamedTuple):
     """A number in a sentence, in a unit of the table; the page shows it in the reader's."""
@@ -52,7 +55,10 @@ def answer_of(rows: Rows) -> Answer:
     counts, total = rows.counts(), len(rows.codes)
     passing = rows.having("pass")
     n = int(passing.sum())
-    sentences: list[Sentence] = [(f"{n:,} of {total:,} designs pass ({_share(n, total)}).",)]
+    uncertain = _uncertain(rows)
+    means = ", at the means of their uncertain inputs" if uncertain else ""
+    sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
+    sentences.append((f"{n:,} of {total:,} designs pass ({_share(n, total)}){means}.",))
     if NOT_YET in counts:
         sentences.append((f"The run is not finished: {counts[NOT_YET]:,} designs are not computed yet.",))
     others = [f"{count:,} {_in_words(name)}" for name, count in counts.items() if name not in ("pass", NOT_YET)]
@@ -64,7 +70,8 @@ def answer_of(rows: Rows) -> Answer:
         most = "; ".join(f"{count:,} with {BY_FLAG[name].meaning}" for count, name in commonest[:3])
         sentences.append((f"{flagged:,} of those that pass lie outside what the model was tested on: {most}.",))
     if n == 0:
-        return Answer((*sentences, ("No design passes.",)), ())
+        none = "No design passes at the means." if uncertain else "No design passes."
+        return Answer((*sentences, (none,)), tuple(own for _, own in uncertain if own))
     soils = tuple(place for place, name in enumerate(rows.axes) if name in SOIL and rows.shape[place] > 1)
     found = [_least(rows, passing, soils, what) for what in ("mass", "depth")]
     if soils and not passing.all(axis=soils).any():
@@ -72,13 +79,41 @@ def answer_of(rows: Rows) -> Answer:
         sentences.append((f"No boulder passes in all {number} soils; the least ones below pass in their own.",))
     for sentence, _ in found:
         sentences.append(sentence)
-    named: dict[int, Named] = {}
+    named = {own.number: own for _, own in uncertain if own}
     for _, one in found:
         known = named.get(one.number)
         named[one.number] = (
             one if known is None else Named(f"{known.title}, {one.title[0].lower()}{one.title[1:]}", one.number)
         )
     return Answer(tuple(sentences), tuple(named.values()))
+
+
+def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
+    """Say how probable it is that designs pass, and name the lightest of the safe ones; nothing of a run."""
+    chances = rows.chances()
+    if chances is None:
+        return []
+    if len(chances) == 1:
+        row = rows.row(0)
+        driver = row["p_pass_driver"]
+        most = f", decided most by {driver.replace('.', ' ').replace('_', ' ')}" if driver else ""
+        interval = f"{row['p_pass_low']:.1%} to {row['p_pass_high']:.1%}"
+        return [((f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}.",), Named("The design", 0))]
+    safe = chances >= SAFE
+    first = f"{int(safe.sum()):,} of {len(chances):,} designs pass with a probability of {SAFE:.0%} or more"
+    if not safe.any():
+        best = int(chances.argmax())
+        largest = f"{first}; the largest is {chances[best]:.1%} (design {best:,})."
+        return [((largest,), Named("Design with the largest probability of passing", best))]
+    mass = np.where(safe, np.broadcast_to(rows.mass(), rows.shape).ravel(), np.inf)
+    number = int(mass.argmin())
+    depth = float(np.broadcast_to(rows.depth(), rows.shape).ravel()[number])
+    sentence: Sentence = (
+        f"{first}. The lightest of them: ",
+        *(Quantity(float(mass[number]), "kg"), " of rock, "),
+        *(Quantity(depth, "m"), f" deep (design {number:,}, P(pass) = {chances[number]:.1%})."),
+    )
+    return [(sentence, Named(f"Lightest boulder that passes with a probability of {SAFE:.0%}", number))]
 
 
 def _in_words(name: str) -> str:

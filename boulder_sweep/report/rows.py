@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.places import Place
+from boulder_sweep.report.chances import ChanceFile
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.reader import read_row
@@ -46,7 +48,7 @@ class Rows:
     ----------
     folder : Place
         Where they are.
-    finished : FinishedRows
+    finished : FinishedRows or ChanceFile
         Those that were there when they were read.
     names : tuple of str
         What a code stands for: verdict and reason, ``fail: overturns``; the last is for rows not computed yet.
@@ -65,7 +67,7 @@ class Rows:
     """
 
     folder: Place
-    finished: FinishedRows
+    finished: FinishedRows | ChanceFile
     names: tuple[str, ...]
     codes: np.ndarray
     flags: dict[str, int]
@@ -121,7 +123,14 @@ class Rows:
         IndexError
             The table does not have this row (yet).
         """
-        return read_row(self.folder, number).to_pylist()[0]
+        found = self.finished.row(number) if isinstance(self.finished, ChanceFile) else read_row(self.folder, number)
+        return found.to_pylist()[0]
+
+    def chances(self) -> np.ndarray | None:
+        """Return the probability of passing of every design, shape (rows,); None for the result of a run."""
+        if not isinstance(self.finished, ChanceFile):
+            return None
+        return next(self.finished.tables(["p_pass"])).column("p_pass").to_numpy()
 
 
 def read_rows(folder: Place) -> Rows:
@@ -132,7 +141,7 @@ def read_rows(folder: Place) -> Rows:
     StoreError
         There is no result in the folder, or it is damaged.
     """
-    finished = FinishedRows(folder)
+    finished = ChanceFile(folder) if isinstance(folder, Path) and folder.is_file() else FinishedRows(folder)
     settings = finished.identity["settings"]
     order, given = settings["order"], settings["inputs"]
     sets = {} if order == "table" else dict(_sets(settings))

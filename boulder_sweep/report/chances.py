@@ -1,0 +1,67 @@
+"""A file of `sweep uncertainty` in place of the folder of a run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from boulder_sweep.errors import ReportError
+from boulder_sweep.store.provenance import PREFIX
+from boulder_sweep.text import one_line
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+CHANCES = ("p_pass", "p_pass_low", "p_pass_high", "p_pass_driver")
+
+
+class ChanceFile:
+    """The rows of such a file, read as those of a run are (`boulder_sweep.store.finished.FinishedRows`).
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    ReportError
+        It cannot be read, or another command wrote it.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            self._table = pq.read_table(path)
+        except (OSError, pa.ArrowException) as problem:
+            raise ReportError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+        entries = {
+            key.decode().removeprefix(PREFIX): value
+            for key, value in (self._table.schema.metadata or {}).items()
+            if key.startswith(PREFIX.encode())
+        }
+        if "settings" not in entries or not set(CHANCES) <= set(self._table.column_names):
+            raise ReportError(f"{path} is neither the folder of a run nor a file that `sweep uncertainty` wrote")
+        parsed = ("settings", "readings", "control", "accuracy", "versions")
+        self.identity = {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
+        self.rows = self.rows_done = len(self._table)
+
+    def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
+        """Yield all rows, or some of their columns, at once."""
+        yield self._table if columns is None else self._table.select(list(columns))
+
+    def row(self, number: int) -> pa.Table:
+        """Return one row.
+
+        Raises
+        ------
+        IndexError
+            There is no such row.
+        """
+        if not 0 <= number < self.rows:
+            raise IndexError(f"the file has {self.rows:,} designs, numbered from 0; there is no {number}")
+        return self._table.slice(number, 1)

@@ -1,0 +1,81 @@
+"""No command writes a line that is wider than a terminal of 80 columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from boulder_sweep.cli.main import COMMANDS
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SITE = CONFIGS / "site.yaml"
+US = ("--units", "us")
+WORDS = {
+    "new": ("made.yaml", "--yes"),
+    "run": (SITE,),
+    "check": (CONFIGS / "m30_sizing.yaml",),
+    "need": (SITE, *US),
+    "uncertainty": (CONFIGS / "uncertain_site.yaml", "--half-width", "0.2", "--doubts", *US),
+    "which": (SITE, *US),
+    "boundary": (SITE,),
+    "simulate": (SITE, "--design", "11"),
+    "explore": (SITE, "-o", "page.html"),
+    "status": ("site.sweep", "--verify"),
+    "plot": ("site.sweep",),
+    "report": ("site.sweep",),
+    "export": ("site.sweep", "-o", "site.csv"),
+    "compare": ("site.sweep", "other.sweep"),
+    "explain": ("site.sweep", "11"),
+    "tradeoff": (SITE, "--designs", "8", "--seconds", "0.5"),
+    "validate": (),
+    "fit-vehicle": ("pulse.csv", "--mass", "6800 kg"),
+}
+"""A plain use of every command."""
+PULSE = "time_s,acceleration_m_s2\n" + "".join(
+    f"{t / 1000:.3f},{-153 * (t / 60) * (2 - t / 60):.3f}\n" for t in range(121)
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with two results and a pulse."""
+    from boulder_sweep import load, run
+
+    folder = tmp_path_factory.mktemp("width")
+    run(load(SITE), folder / "site.sweep")
+    run(load(SITE, ["vehicle.speed=40 mph"]), folder / "other.sweep")
+    (folder / "pulse.csv").write_text(PULSE)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def narrow(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("webbrowser.open", lambda _: True)
+    monkeypatch.setattr("boulder_sweep.cli.output._columns", lambda: 80)  # as if stderr were a terminal
+
+
+def wide(text):
+    return [line for line in text.splitlines() if len(line) > 80]
+
+
+def test_every_command_is_here():
+    assert list(WORDS) == [command.name for command in COMMANDS]
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_help(sweep, name):
+    code, out, err = sweep(name, "--help")
+    assert (code, err) == (0, "")
+    assert wide(out) == []
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_output(sweep, name):
+    words = ("--overwrite",) if name == "run" else ()
+    code, out, err = sweep(name, *WORDS[name], *words)
+    assert code == 0, err
+    assert wide(out) == []
+    assert [line for line in wide(err) if " " in line.strip()] == [], "only a path may be longer"
