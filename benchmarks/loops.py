@@ -7,10 +7,9 @@ import numpy as np
 
 from boulder_kernels import Constants, Control, Readings
 from boulder_kernels.lane_steps import attempt_steps, take_over_steps
-from boulder_kernels.lanes import BUSY, HANDLED, STEPPED, begin, empty_queue, sweep
+from boulder_kernels.lanes import BUSY, HANDLED, STEPPED, begin, empty_queue, empty_workspace, sweep
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.soil import Kinematics, closed_form, element_sums
-from boulder_kernels.workspace import WHOLE
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 
@@ -29,7 +28,7 @@ def simulate_and_count(
         Steps attempted by all lanes; those by lanes that held a design; those that needed more than to be accepted.
     """
     out = empty_outcomes(designs.shape[1])
-    ws, q = np.zeros(WHOLE), empty_queue()
+    ws, q = empty_workspace(), empty_queue()
     attempts, in_use = 0, 0
     begin(ws, q, designs, readings, control, out)
     going = q.counts[BUSY] > 0

@@ -123,7 +123,7 @@ def passes(
     end = compression_of(y_end, sin, versin, switches, c)
     k = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
     arm = signed_arm(sin, versin, c)
-    gaps = gaps_of(k.A, k.slope_x, y_end.theta_b, y_end.omega_b, end.u, k_end.M, arm, g)
+    gaps = gaps_of(k.A, k.slope_x, y_end.theta_b, y_end.omega_b, end.u, k_end.M, arm, g, c)
     plain = (
         (gaps.contact >= 0.0)
         & (gaps.rotation >= 0.0)

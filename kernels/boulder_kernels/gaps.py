@@ -37,6 +37,8 @@ LIMIT = 7
 
 NEVER = 1e300
 """Gap of an event that cannot happen in the present mode."""
+UNSOUGHT = 2.0
+"""In place of the sign of a displacement beyond the ultimate resistance, where its event is not looked for."""
 CONTACT_ROUNDING = 1e-15
 """Compressions below this share of the distance the truck would cover in a second are rounding, which would make a
 truck and a boulder that move together separate and touch again and again."""
@@ -45,32 +47,26 @@ truck and a boulder that move together separate and touch again and again."""
 class GapFactors(NamedTuple):
     """What the gaps of a mode are made of; all of them are constant while the mode lasts."""
 
-    contact_0: float
     contact: float
-    """Of the compression u."""
+    """Of the compression u: 1 where the truck touches, -1 where it has come off."""
     rotation_0: float
     rotation_abs_M: float
     """Of the modulus of the net moment M."""
     rotation_theta: float
     rotation_omega: float
-    couple_0: float
     couple_M: float
     """Of M."""
     couple_abs_M: float
     couple_limit: float
-    """Of the limit of the restoring moment."""
+    """Of the limit of the restoring moment; 0 where the event cannot happen."""
     corner_0: float
     corner_theta: float
-    arm_0: float
     arm: float
-    """Of the signed arm of the weight."""
-    top_0: float
-    top_abs: float
-    """Of the modulus of the displacement at the soil line."""
+    """Of the signed arm of the weight; 0 where the event cannot happen."""
     top: float
-    base_0: float
-    base_abs: float
+    """Of the displacement at the soil line: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
     base: float
+    """The same at the base."""
     limit: float
     """Limit of rotation [rad]."""
 
@@ -104,9 +100,8 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
         Whether a step is cut where the soil at the top or the base reaches its ultimate resistance.
     """
     rotation_0 = rotation_abs_M = rotation_theta = rotation_omega = 0.0
-    couple_0, couple_M, couple_abs_M, couple_limit = NEVER, 0.0, 0.0, 0.0
+    couple_M = couple_abs_M = couple_limit = arm = 0.0
     corner_0, corner_theta = NEVER, 0.0
-    arm_0, arm = NEVER, 0.0
     contact = 1.0 if modes.touching else -1.0
     turning = modes.turning
     if turning == SEATED:
@@ -121,44 +116,38 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
             rotation_omega = -1.0
         else:
             rotation_omega = 1.0
-            arm_0, arm = 0.0, modes.arm
-            couple_0, couple_limit = 0.0, -1.0
+            arm, couple_limit = modes.arm, -1.0
             if turning == HELD:
                 couple_abs_M, couple_limit = -1.0, 1.0
             elif turning == LIMITED_FORWARD:
                 couple_M = 1.0
             else:
                 couple_M = -1.0
-    top_0, top_abs, top = NEVER, 0.0, 0.0
-    base_0, base_abs, base = NEVER, 0.0, 0.0
-    if locate_yield:
-        top = float(modes.yielded_top)
-        top_0, top_abs = (c.x_yield, -1.0) if modes.yielded_top == 0 else (-c.x_yield, 0.0)
-        base = float(modes.yielded_base)
-        base_0, base_abs = (c.x_yield, -1.0) if modes.yielded_base == 0 else (-c.x_yield, 0.0)
+    top = float(modes.yielded_top) if locate_yield else UNSOUGHT
+    base = float(modes.yielded_base) if locate_yield else UNSOUGHT
     return GapFactors(
-        contact_0=CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v),
         contact=contact,
         rotation_0=rotation_0,
         rotation_abs_M=rotation_abs_M,
         rotation_theta=rotation_theta,
         rotation_omega=rotation_omega,
-        couple_0=couple_0,
         couple_M=couple_M,
         couple_abs_M=couple_abs_M,
         couple_limit=couple_limit,
         corner_0=corner_0,
         corner_theta=corner_theta,
-        arm_0=arm_0,
         arm=arm,
-        top_0=top_0,
-        top_abs=top_abs,
         top=top,
-        base_0=base_0,
-        base_abs=base_abs,
         base=base,
         limit=theta_stop,
     )
+
+
+@inlined
+def yield_gap(displacement: float, sign: float, c: Constants) -> float:
+    """Gap of the soil's ultimate resistance where it is displaced [m], by the sign as of `GapFactors`."""
+    gap = c.x_yield - abs(displacement) if sign == 0.0 else sign * displacement - c.x_yield
+    return NEVER if sign == UNSOUGHT else gap
 
 
 @inlined
@@ -171,6 +160,7 @@ def gaps_of(
     M: float,
     arm: float,
     g: GapFactors,
+    c: Constants,
 ) -> Gaps:
     """Gaps of all events.
 
@@ -186,18 +176,18 @@ def gaps_of(
         Net moment of soil and truck [N m].
     arm
         Signed arm of the weight, as of `signed_arm` [N m].
-    g
-        Factors of the present modes.
+    g, c
+        Factors of the present modes, and constants of the design.
     """
-    base = A - slope_x
+    couple = g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm)
     return Gaps(
-        g.contact_0 + g.contact * u,
+        CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v) + g.contact * u,
         g.rotation_0 + g.rotation_abs_M * abs(M) + g.rotation_theta * theta_b + g.rotation_omega * omega_b,
-        g.couple_0 + g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm),
+        couple if g.couple_limit != 0.0 else NEVER,
         g.corner_0 + g.corner_theta * theta_b,
-        g.arm_0 + g.arm * arm,
-        g.top_0 + g.top_abs * abs(A) + g.top * A,
-        g.base_0 + g.base_abs * abs(base) + g.base * base,
+        g.arm * arm if g.arm != 0.0 else NEVER,
+        yield_gap(A, g.top, c),
+        yield_gap(A - slope_x, g.base, c),
         g.limit - abs(theta_b),
     )
 
@@ -208,4 +198,4 @@ def gaps_at(y: State, M: float, g: GapFactors, c: Constants) -> Gaps:
     sin, versin = sine_versine(y.theta_b)
     u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
-    return gaps_of(k.A, k.slope_x, y.theta_b, y.omega_b, u, M, signed_arm(sin, versin, c), g)
+    return gaps_of(k.A, k.slope_x, y.theta_b, y.omega_b, u, M, signed_arm(sin, versin, c), g, c)

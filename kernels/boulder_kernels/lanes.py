@@ -235,6 +235,14 @@ def sweep_all(
 
 
 @array_kernel
+def empty_workspace() -> np.ndarray:
+    """Return the workspace before the first design has been started, its vectors on whole lines of the fast memory."""
+    ws = np.zeros(WHOLE + LANES)
+    behind = ws.ctypes.data // ws.itemsize % LANES
+    return ws[LANES - behind :]
+
+
+@array_kernel
 def empty_queue() -> Queue:
     """Return the queue before the first design has been started."""
     return Queue(
@@ -265,5 +273,5 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
         Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
     """
     out = empty_outcomes(designs.shape[1])
-    sweep_all(np.zeros(WHOLE), empty_queue(), designs, readings, control, out)
+    sweep_all(empty_workspace(), empty_queue(), designs, readings, control, out)
     return out

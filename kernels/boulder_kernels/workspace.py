@@ -30,8 +30,10 @@ LANES = 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
 more of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
 
-KNOWN: dict[str, object] = {"elements": 0} | {name: 0.0 for name in Maxima._fields if name.startswith("t_")}
-"""Fields that are not kept: lanes know the closed form of the soil only, and no times of maxima."""
+KNOWN: dict[str, object] = {"elements": 0, "c_x": 0.0, "c_y": 0.0, "d_N": 0.0}
+KNOWN |= {name: 0.0 for name in Maxima._fields if name.startswith("t_")}
+"""Fields that are not kept: lanes know the closed form of the soil only, and no times of maxima; and no motion depends
+on three lengths from which other constants have been made."""
 
 
 GROUPS = 4
@@ -84,16 +86,20 @@ _EVENT_LAYOUT: dict[str, Any] = {
 _ALL = _LAYOUT | _EVENT_LAYOUT
 
 
+def _size(record: Any) -> int:
+    return LANES * sum(name not in KNOWN for name in record._fields)
+
+
 def _place(name: str) -> int:
     names = list(_ALL)
-    return LANES * sum(len(_ALL[before]._fields) for before in names[: names.index(name)])
+    return sum(_size(_ALL[before]) for before in names[: names.index(name)])
 
 
 SIZE = _place("boulder")
 """Numbers of one group."""
 EVENTS = GROUPS * SIZE
 """Where the first of the two groups of those that need more begins: its lanes are EVENTS ... EVENTS + LANES - 1."""
-EVENT_SIZE = LANES * sum(len(record._fields) for record in _ALL.values())
+EVENT_SIZE = sum(_size(record) for record in _ALL.values())
 """Numbers of one of them."""
 WHOLE = EVENTS + 2 * EVENT_SIZE
 """Numbers of all groups."""
@@ -154,20 +160,27 @@ def put(ws: np.ndarray, place: int, lane: int, value: float) -> None:
     ws[place + lane] = value
 
 
+def _offsets(record: Any) -> dict[str, int]:
+    """Where the fields that are kept of a record lie, from its place on."""
+    kept = (name for name in record._fields if name not in KNOWN)
+    return {name: i * LANES for i, name in enumerate(kept)}
+
+
 def load(ws: np.ndarray, place: int, lane: int) -> Any:
     """Return the record at a place, one of the constants above, for one lane."""
+    record = _RECORDS[place]
+    offsets = _offsets(record)
     numbers = [
-        KNOWN[name] if name in KNOWN else kind(ws[place + i * LANES + lane])
-        for i, (name, kind) in enumerate(get_type_hints(_RECORDS[place]).items())
+        kind(ws[place + offsets[name] + lane]) if name in offsets else KNOWN[name]
+        for name, kind in get_type_hints(record).items()
     ]
-    return _RECORDS[place](*numbers)
+    return record(*numbers)
 
 
 def store(ws: np.ndarray, place: int, lane: int, record: Any) -> None:
     """Write a record at a place, one of the constants above, for one lane."""
-    for i, name in enumerate(record._fields):
-        if name not in KNOWN:
-            ws[place + i * LANES + lane] = record[i]
+    for name, offset in _offsets(type(record)).items():
+        ws[place + offset + lane] = getattr(record, name)
 
 
 # Inside kernels both are written out, field by field, wherever they are called.
@@ -176,20 +189,18 @@ def store(ws: np.ndarray, place: int, lane: int, record: Any) -> None:
 @overload(load, inline="always", prefer_literal=True, strict=False)
 def _load(ws: Any, place: Any, lane: Any) -> Callable[..., Any]:
     record = _RECORDS[place.literal_value]
+    offsets = _offsets(record)
     values = (
-        str(KNOWN[name]) if name in KNOWN else f"{kind.__name__}(ws[place + {i * LANES} + lane])"
-        for i, (name, kind) in enumerate(get_type_hints(record).items())
+        f"{kind.__name__}(ws[place + {offsets[name]} + lane])" if name in offsets else str(KNOWN[name])
+        for name, kind in get_type_hints(record).items()
     )
     return function_of(f"def load(ws, place, lane):\n return Record({', '.join(values)})", Record=record)
 
 
 @overload(store, inline="always", strict=False)
 def _store(ws: Any, place: Any, lane: Any, record: Any) -> Callable[..., Any]:
-    lines = (
-        f" ws[place + {i * LANES} + lane] = record.{name}"
-        for i, name in enumerate(record.instance_class._fields)
-        if name not in KNOWN
-    )
+    offsets = _offsets(record.instance_class)
+    lines = (f" ws[place + {offset} + lane] = record.{name}" for name, offset in offsets.items())
     return function_of("\n".join(("def store(ws, place, lane, record):", *lines)))
 
 
