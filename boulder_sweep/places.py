@@ -97,11 +97,18 @@ class RemotePath:
 
     def exists(self) -> bool:
         """Whether there is a file of this name, or a folder with a file in it."""
-        return bool(self._request(self._filesystem.exists, self._path))
+        return self._mode() != 0
 
     def is_dir(self) -> bool:
         """Whether there is a file below this name."""
-        return bool(self._request(self._filesystem.isdir, self._path))
+        return stat.S_ISDIR(self._mode())
+
+    def _mode(self) -> int:
+        """Return the kind; 0 where there is nothing. Unlike fsspec's own questions it fails where the store does."""
+        try:
+            return self.stat().st_mode
+        except FileNotFoundError:
+            return 0
 
     def stat(self) -> RemoteStat:
         """Return size and kind.

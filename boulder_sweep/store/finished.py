@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import IO, TYPE_CHECKING, Any
 
-from boulder_sweep.places import Place
+from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.store.errors import DamagedError, StoreError
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.manifest import Manifest, Part, load
@@ -126,6 +126,8 @@ class FinishedRows:
                 except FileNotFoundError:
                     continue
                 except OSError as problem:
+                    if isinstance(self._folder, RemotePath):
+                        raise StoreError(f"{self._folder / name} cannot be read: {problem.strerror}") from None
                     raise DamagedError(_damage_text(self._folder, {name: str(problem.strerror)})) from problem
             before, places = places, _Places(load(self._folder))
             if places.manifest.identity != self.identity:

@@ -17,7 +17,7 @@ from typing import IO, Any
 
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.places import Place, RemotePath
-from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError
+from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError, StoreError
 from boulder_sweep.store.files import WRITING_SUFFIX
 from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
 from boulder_sweep.store.lock import LOCK_NAME
@@ -253,8 +253,21 @@ def load(folder: Place) -> Manifest:
 
 
 def _opened(folder: Place) -> IO[bytes]:
-    """Open the file of a manifest."""
-    return BytesIO(newest(folder).content) if isinstance(folder, RemotePath) else (folder / MANIFEST_NAME).open("rb")
+    """Open the file of a manifest.
+
+    Raises
+    ------
+    StoreError
+        An object store does not answer, which says nothing about the manifest.
+    """
+    if not isinstance(folder, RemotePath):
+        return (folder / MANIFEST_NAME).open("rb")
+    try:
+        return BytesIO(newest(folder).content)
+    except FileNotFoundError:
+        raise
+    except OSError as problem:
+        raise StoreError(f"{folder} cannot be read: {problem.strerror}") from None
 
 
 def _no_result(folder: Place) -> str:

@@ -19,6 +19,8 @@ from boulder_sweep.store.errors import FolderInUseError
 from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, LOCK_NAME
 
 _PROBE = "_probe-"
+_PATIENCE_S = 0.3
+"""How long a run that ends waits for a heartbeat that is being sent; its lock is then that of a dead run [s]."""
 
 
 class ObjectLock:
@@ -47,6 +49,7 @@ class ObjectLock:
         self._folder, self._path, self._token = folder, folder / LOCK_NAME, token
         self._lost = False
         self._released = threading.Event()
+        self._beating = threading.Lock()
         there = _record(self._path)
         if there is not None and _is_alive(there):
             raise FolderInUseError(_in_use_text(folder, holder, there))
@@ -56,15 +59,21 @@ class ObjectLock:
             raise FolderInUseError(f"{folder} is being written by {holder}")
         threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
 
-    def is_ours(self) -> bool:
-        """Look whether the lock is still held: another run takes it from one that was silent for long."""
-        try:
-            return (_record(self._path) or {}).get("token") == self._token
-        except OSError:
-            return False
+    def check(self) -> None:
+        """Look whether the lock is still held.
+
+        Raises
+        ------
+        FolderInUseError
+            Another run has taken it, because this one was silent for long.
+        OSError
+            The store does not answer.
+        """
+        self._lost = self._lost or (_record(self._path) or {}).get("token") != self._token
+        self.renew()
 
     def renew(self) -> None:
-        """Check that the lock is still held; its heartbeat is sent by a thread.
+        """Do nothing if the lock was held when the thread that sends heartbeats last looked; cheap, call it often.
 
         Raises
         ------
@@ -79,6 +88,8 @@ class ObjectLock:
         if self._released.is_set():
             return
         self._released.set()
+        if not self._beating.acquire(timeout=_PATIENCE_S):
+            return  # a heartbeat is under way, and would leave a new lock behind
         with suppress(OSError):
             if (_record(self._path) or {}).get("token") == self._token:
                 self._path.unlink(missing_ok=True)
@@ -86,13 +97,14 @@ class ObjectLock:
     def _beat(self) -> None:
         """Renew the lock until it is released or taken."""
         while not self._released.wait(HEARTBEAT_S):
-            with suppress(OSError):
+            with suppress(OSError), self._beating:
+                if self._released.is_set():
+                    return
                 there = _record(self._path)
                 self._lost = there is not None and there.get("token") != self._token
                 if self._lost:
                     return
-                if not self._released.is_set():
-                    self._path.put(self._content())
+                self._path.put(self._content())
 
     def _content(self) -> bytes:
         record = {"token": self._token, "host": socket.gethostname(), "pid": os.getpid(), "time": time.time()}

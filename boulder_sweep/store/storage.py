@@ -210,9 +210,9 @@ class ObjectStorage:
         self._each(self._publish, names)
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove files that may exist."""
-        if self._lock is not None and not self._lock.is_ours():
-            return  # they may be another run's now
+        """Remove files that may exist, unless they are another run's by now."""
+        if self._lock is not None:
+            self._lock.check()
         self._each(lambda name: (self._path / name).unlink(missing_ok=True), names)
 
     def put_manifest(self, encode: Encode) -> None:

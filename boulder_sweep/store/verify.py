@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 
-from boulder_sweep.places import Place
+from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.store.errors import StoreError
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.manifest import Manifest, Merge, Part, load
 
@@ -88,9 +89,18 @@ def wrong_size(path: Place, part: Part) -> str:
     """Describe how the size of a file differs from its record; empty if it does not."""
     try:
         size = path.stat().st_size
-    except OSError:
+    except FileNotFoundError:
+        return "missing"
+    except OSError as problem:
+        _refuse_to_guess(path, problem)
         return "missing"
     return _other_size(size, part)
+
+
+def _refuse_to_guess(path: Place, problem: OSError) -> None:
+    """Raise StoreError where a part is on an object store: what does not answer is not damaged."""
+    if isinstance(path, RemotePath):
+        raise StoreError(f"{path} cannot be read: {problem.strerror}") from None
 
 
 def _other_size(size: int, part: Part) -> str:
@@ -110,6 +120,7 @@ def wrong_content(path: Place, part: Part) -> str:
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as problem:
+        _refuse_to_guess(path, problem)
         return f"cannot be read: {problem.strerror}"
     return "" if digest == part.sha256 else _CHANGED
 

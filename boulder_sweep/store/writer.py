@@ -107,7 +107,8 @@ class OutputFolder:
         except OSError as problem:
             raise self.write_error(problem) from problem
         if not self._open:  # the run was stopped meanwhile
-            self._storage.remove([hidden_name(staged.name)])
+            with suppress(OSError, errors.StoreError):
+                self._storage.remove([hidden_name(staged.name)])
         return staged
 
     def commit(self, staged: Sequence[StagedPart]) -> None:
@@ -121,7 +122,7 @@ class OutputFolder:
         names = [name for name, _ in staged]
         with self._writing() as is_open:
             if not is_open:  # the run was stopped while these parts were written
-                with suppress(OSError):
+                with suppress(OSError, errors.StoreError):
                     self._storage.remove(map(hidden_name, names))
                 return
             self._storage.publish(names)
@@ -241,7 +242,7 @@ class OutputFolder:
         """Remove parts that were staged and not committed."""
         merge = self.manifest.merge
         keep = set(self.manifest.parts) | (set() if merge is None else {merge.name, hidden_name(merge.name)})
-        with suppress(OSError):
+        with suppress(OSError, errors.StoreError):
             self._storage.remove(name for name in self._storage.names() if _is_staged(name) and name not in keep)
 
 

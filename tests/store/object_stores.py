@@ -30,11 +30,12 @@ class Trouble:
     def __init__(self, seed: int, share: float, only_new: bool):
         self.chance = random.Random(seed)
         self.share, self.only_new = share, only_new
-        self.counts = {"refused": 0, "answer lost": 0, "late": 0, "stale list": 0}
+        self.counts = {"not read": 0, "refused": 0, "answer lost": 0, "late": 0, "stale list": 0}
 
     def of(self, *kinds: str) -> str:
         """Choose what happens to a request; empty for nothing."""
-        if self.chance.random() > self.share * (2 if kinds == ("stale list",) else 1):  # there are few lists
+        often = {("stale list",): 2.0, ("not read",): 0.1}.get(kinds, 1.0)  # there are few lists and many readings
+        if self.chance.random() > self.share * often:
             return ""
         kind = self.chance.choice(kinds)
         self.counts[kind] += 1
@@ -56,6 +57,7 @@ class FaultyFileSystem(AbstractFileSystem):
         """Describe an object or what looks like a folder."""
         path = self._strip_protocol(path)
         with self.lock:
+            self._may_fail()
             if path in self.objects:
                 return {"name": path, "size": len(self.objects[path]), "type": "file"}
             if any(name.startswith(f"{path}/") for name in self.objects):
@@ -79,6 +81,7 @@ class FaultyFileSystem(AbstractFileSystem):
         """Return an object."""
         with self.lock:
             self.arrive()
+            self._may_fail()
             try:
                 return self.objects[self._strip_protocol(path)]
             except KeyError:
@@ -109,6 +112,11 @@ class FaultyFileSystem(AbstractFileSystem):
     def rm_file(self, path: str) -> None:
         """Remove an object, if there is one."""
         self._change(lambda: self.objects.pop(self._strip_protocol(path), None), "refused", "answer lost")
+
+    def _may_fail(self) -> None:
+        """Fail to answer a question."""
+        if self.trouble is not None and self.trouble.of("not read"):
+            raise ConnectionError("no answer")
 
     def _change(self, change: Callable[[], Any], *kinds: str) -> None:
         """Make a change, or fail to, or make it and fail to say so, or make it later."""

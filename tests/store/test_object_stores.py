@@ -17,6 +17,7 @@ from boulder_sweep import places
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.store import object_lock, status
 from boulder_sweep.store.errors import (
+    DamagedError,
     FolderInUseError,
     ForeignFilesError,
     NotASweepError,
@@ -29,7 +30,7 @@ from boulder_sweep.store.manifest import is_part_name, load
 from boulder_sweep.store.reader import read_table
 from tests.runner.grids import same_bits
 from tests.store import folders
-from tests.store.object_stores import Trouble, store
+from tests.store.object_stores import FaultyFileSystem, Trouble, store
 
 OUT = "faulty://bucket/out"
 FIRSTS = range(0, folders.ROWS, folders.SIZE)
@@ -174,8 +175,8 @@ def test_no_row_is_lost_or_double_whatever_fails(only_new, monkeypatch):
                 except (StoreError, OSError) as stop:
                     told += f"{stop} {stop.__cause__!r}\n"
             trouble.share = 0.0
-            for _ in range(20):
-                faulty.exists("nothing")
+            while faulty.late:
+                faulty.arrive()
             one_run(out)  # finds everything there, or computes again what a last fault has cost
             assert same_bits(read_table(out), expected), f"seed {seed}"
             assert sorted(load(out).parts) == [name for name in names(out) if is_part_name(name)], f"seed {seed}"
@@ -238,10 +239,52 @@ def test_foreign_files_and_places_without_a_result_are_refused(out):
 
 
 def test_a_store_that_cannot_be_written_is_refused_before_anything_is_computed():
-    with store(Trouble(0, 1.0, True)), pytest.raises(WriteError, match=f"cannot write into {OUT}: TimeoutError"):
+    with (
+        store(Trouble(0, 1.0, True)),
+        pytest.raises(WriteError, match=f"cannot write into {OUT}: (Timeout|Connection)Error: no answer"),
+    ):
         folders.open_folder(place_of(OUT))
+
+
+@pytest.mark.parametrize("resume", [True, False])
+def test_a_store_that_does_not_answer_is_not_taken_for_damaged(out, monkeypatch, resume):
+    """Nothing is removed, and nothing is computed again."""
+    folders.finished_folder(out)
+    before = names(out)
+
+    def denied(self, path, **_):
+        if "rows-" in path:
+            raise PermissionError("not yours")
+        return info(self, path)
+
+    info = FaultyFileSystem.info
+    monkeypatch.setattr(FaultyFileSystem, "info", denied)
+    with pytest.raises(StoreError, match=r"rows-0.* cannot be read: PermissionError: not yours") as refused:
+        folders.open_folder(out, resume=True) if resume else status(OUT)
+    assert not isinstance(refused.value, DamagedError)
+    assert names(out) == before
 
 
 def test_a_refused_run_leaves_no_trace(out):
     folders.open_folder(out).discard()
     assert names(out) == []
+
+
+def test_the_heartbeat_goes_on_until_the_lock_is_released_or_taken(out, monkeypatch):
+    monkeypatch.setattr(object_lock, "HEARTBEAT_S", 0.01)
+    folder = folders.open_folder(out)
+    first = json.loads((out / "_lock").read_bytes())["time"]
+    end = time.monotonic() + 5.0
+    while json.loads((out / "_lock").read_bytes())["time"] == first:
+        assert time.monotonic() < end
+    folder.heartbeat()
+
+    def go_on():
+        while time.monotonic() < end:
+            (out / "_lock").put(json.dumps({"token": "another"}).encode())
+            folder.heartbeat()
+
+    with pytest.raises(FolderInUseError, match="taken over by another run"):
+        go_on()
+    folder.close("stopped")
+    assert json.loads((out / "_lock").read_bytes()) == {"token": "another"}
