@@ -243,7 +243,7 @@ def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> l
 
 def _leading(sweep: Sweep, table: pa.Table, names: Sequence[str], units: str) -> list[Column]:
     """Return the columns that tell rows apart: names of sets, and inputs that vary; the numbers of listed designs."""
-    labels: list[Column] = [((name, ""), _word(name)) for name in sweep.plan.labels]
+    labels: list[Column] = [((name, ""), _word(name)) for name in sweep.plan.labels if name in table.column_names]
     if sweep.table is not None:
         return [*labels, (("design", ""), lambda row: str(row["design_id"]))]
     return labels + [(_head(name, units), _number(name)) for name in names if _varies(table, name)]

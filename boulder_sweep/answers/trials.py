@@ -49,7 +49,7 @@ class Open:
         table = sweep.table
         if table is not None:
             kept = {name: values for name, values in table.columns.items() if name not in self._left_out}
-            table = DesignList(table.file, kept) if kept else None
+            table = DesignList(table.file, kept, table.labels) if kept else None
         axes = tuple(axis for axis in sweep.axes if axis.name not in self._left_out)
         self.sweep = dataclasses.replace(sweep, axes=axes, constants=constants, table=table)
 

@@ -20,6 +20,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import SolverSettings
 from boulder_sweep.store.files import put_file
 from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
+from boulder_sweep.text import printable
 
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
 
@@ -175,8 +176,8 @@ def _facts(
     found = [(f"version of {name}", versions_[name]) for name in PACKAGES if name in versions_]
     found += [("hash of the settings", settings_sha256), ("hash of the kernels", kernels_sha256_)]
     if out is not None:
-        found.append(("table", out))
-    return [*found, ("command", command)] if command else found
+        found.append(("table", printable(out)))
+    return [*found, ("command", printable(command))] if command else found
 
 
 def _written(page: Path, text: str) -> Path:

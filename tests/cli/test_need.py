@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -52,6 +53,24 @@ def test_the_answer_typed_into_the_file_passes(sweep, tmp_path):
         words = ["boulder.height=3 m", "soil.friction_angle=40 deg", f"site.embedment_depth={value} m"]
         options = [part for word in words for part in ("--set", word)]
         assert json.loads(sweep("simulate", CONFIG, *options, "--json")[1])["verdict"] == verdict
+
+
+def test_names_of_listed_designs_stand_with_their_answers(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = CONFIG.read_text().replace("name: site", "name: listed\ntable: t.csv")
+    Path("listed.yaml").write_text(re.sub(r"  (height|friction_angle): .*\n", "", text))
+    Path("t.csv").write_text("site_name,boulder_height_m,friction_angle_deg\nnorth,3.4,40\nsouth,3.0,36\n")
+    code, out, _ = sweep("need", "listed.yaml", "-q", "--own-readings")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()[3:5]] == ["north", "south"]
+    Path("t.csv").write_text("site_name,embedment_depth_m\nnorth,1.9\nsouth,2.0\n")
+    text = re.sub(r"site:\n  embedment_depth: .*\n", "", text)
+    Path("listed.yaml").write_text(
+        text.replace("{from: 2.6 m, to: 3.6 m, step: 0.2 m}", "3.4 m").replace("[36, 40]", "40")
+    )
+    code, out, err = sweep("need", "listed.yaml", "-q", "--own-readings")
+    assert (code, err) == (0, "")
+    assert len(out.splitlines()) == 4
 
 
 def test_rows_that_cannot_be_computed_give_exit_code_3(sweep):
