@@ -16,7 +16,7 @@ import numpy as np
 
 from boulder_sweep.answers.chance import SCRAMBLINGS, Points
 from boulder_sweep.answers.draws import Draws, threads
-from boulder_sweep.answers.spread import Spread
+from boulder_sweep.answers.spread import Spread, uncertain_rows
 from boulder_sweep.answers.trials import Judges, Rows, judges_of
 from boulder_sweep.designs import block_of
 from boulder_sweep.settings.model import PRINTED, SWITCHES, ReadingChoice
@@ -86,7 +86,7 @@ def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = N
     """
     spread = Spread(sweep)
     z = Points(len(spread.names), seed).upto(DRAWN // SCRAMBLINGS).reshape(DRAWN, -1)
-    rows = sweep.plan.given_rows(design, design + 1)
+    rows = uncertain_rows(sweep, sweep.plan.given_rows(design, design + 1), design, design + 1)
     index = np.zeros(DRAWN, dtype=np.int64)
     margins = np.empty((2 ** len(SWITCHES), 2, DRAWN))
     for place, own in enumerate(every_reading(sweep)):

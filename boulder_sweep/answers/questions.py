@@ -11,7 +11,7 @@ from boulder_sweep.answers.chance import SCRAMBLINGS, Chance, Points, chance
 from boulder_sweep.answers.draws import Draws, threads
 from boulder_sweep.answers.keys import Ends, Key, range_of
 from boulder_sweep.answers.search import BEYOND, CELLS, FAILS, FAR, HOLDS, NOT_MONOTONE, Search, search
-from boulder_sweep.answers.spread import Spread
+from boulder_sweep.answers.spread import Spread, uncertain_rows
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
 from boulder_sweep.judge.judged import with_rows
 
@@ -98,7 +98,7 @@ class Question:
 
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
-        rows = self.open.rows(start, stop)
+        rows = uncertain_rows(self.open.sweep, self.open.rows(start, stop), start, stop)
         first, last = self.lattice(rows)
         trial = self.trial(rows)
         found = search(trial.quick, first, last, self.cells)

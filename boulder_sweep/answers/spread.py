@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import betainccinv, betaincinv, ndtr, ndtri
 
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.fields import BY_NAME
 
 if TYPE_CHECKING:
@@ -74,8 +75,32 @@ class Spread:
             if name == PAIR[1] and self.correlation:
                 other = z[:, self.names.index(PAIR[0])]
                 own = self.correlation * other + math.sqrt(1.0 - self.correlation**2) * own
-            found[name] = values_of(spread, np.asarray(given[name], dtype=float), own)
+            found[name] = _drawn(spread, given, np.asarray(given[name], dtype=float), own)
         return found
+
+
+def uncertain_rows(sweep: Sweep, given: Rows, start: int, stop: int) -> Rows:
+    """Return the rows ``[start, stop)`` of a sweep with the places of their named soils and vehicles.
+
+    These are needed where named sets have distributions of their own; `boulder_sweep.designs.block_of` ignores them.
+    """
+    sets = {own.section for own in sweep.distributions.values() if isinstance(own, SetDistributions)}
+    if not sets:
+        return given
+    labels = sweep.block(start, stop).labels
+    return given | {section: np.asarray(labels[section].codes, dtype=float) for section in sets}
+
+
+def _drawn(spread: Distribution | SetDistributions, given: Rows, mean: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Return the values of an input at standard normal numbers; of named sets each from its own distribution."""
+    if not isinstance(spread, SetDistributions):
+        return values_of(spread, mean, z)
+    found = mean.copy()
+    for place, own in enumerate(spread.each):
+        rows = given[spread.section] == place
+        if own is not None and rows.any():
+            found[rows] = values_of(own, mean[rows], z[rows])
+    return found
 
 
 def values_of(spread: Distribution, mean: np.ndarray, z: np.ndarray) -> np.ndarray:

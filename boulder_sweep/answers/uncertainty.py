@@ -13,7 +13,7 @@ from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chance, Points, cha
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import share
 from boulder_sweep.answers.sensitivity import drivers, indices
-from boulder_sweep.answers.spread import Spread
+from boulder_sweep.answers.spread import Spread, uncertain_rows
 from boulder_sweep.answers.subset import subset_simulation
 from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
@@ -206,7 +206,8 @@ class _Asked:
     rare: bool
 
     def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
-        return Draws(self.sweep.plan.given_rows(start, stop), self.spread, self.judges, parallel)
+        rows = uncertain_rows(self.sweep, self.sweep.plan.given_rows(start, stop), start, stop)
+        return Draws(rows, self.spread, self.judges, parallel)
 
     def metadata(self) -> dict[bytes, bytes]:
         """Return the metadata of a file."""

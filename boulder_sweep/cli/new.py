@@ -36,5 +36,5 @@ def new(file: Path, yes: bool) -> int:
         vehicle = click.prompt("Class of the truck", type=click.Choice(list(CLASSES)), default=vehicle, err=True)
         units = click.prompt("Units", type=click.Choice(UNITS), default=units, err=True)
     file.write_text(starter(name, vehicle, "us" if units == "us" else "si", str(file)), encoding="utf-8")
-    show(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep check {file}")
+    show(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep need {file}")
     return 0

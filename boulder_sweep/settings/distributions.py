@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -83,6 +84,35 @@ class Distribution:
         """Return what is given as plain data."""
         named = {"kind": self.kind, "sd": self.sd, "cov": self.cov, "low": self.low, "high": self.high}
         return {name: value for name, value in {**named, "mode": self.mode}.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class SetDistributions:
+    """Spread of one input of named soils or vehicles, each its own.
+
+    Attributes
+    ----------
+    section : str
+        ``soil`` or ``vehicle``; under this name a row carries the place of its set.
+    each : tuple of Distribution or None
+        In the order of the sets; None where a set gives a value.
+    """
+
+    section: str
+    each: tuple[Distribution | None, ...]
+
+    @property
+    def place(self) -> Place:
+        """Where the first of them stands in the file."""
+        return next(own.place for own in self.each if own is not None)
+
+    def words(self, unit: str) -> str:
+        """Return kind and spread of each in words; `unit` is that of the column."""
+        return "; ".join("certain" if own is None else own.words(unit) for own in self.each)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is given as plain data."""
+        return {"sets": [None if own is None else own.to_dict() for own in self.each]}
 
 
 def mean_of_fractile(kind: str, fractile: np.ndarray, sd: float | None, cov: float | None) -> np.ndarray:

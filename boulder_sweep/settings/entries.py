@@ -11,9 +11,10 @@ import numpy as np
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import read_setting
 from boulder_sweep.settings.distribution_reader import read_input
-from boulder_sweep.settings.leaf import Leaf, LeafError, read_single
+from boulder_sweep.settings.distributions import Distribution, SetDistributions
+from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_single
 from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
-from boulder_sweep.settings.tree import Entry, Mapping, Scalar, Sequence
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import DesignList
@@ -111,7 +112,7 @@ class Entries:
         """Read a list of named sets: ``[{name: loose, density: 1700 kg/m^3, ...}, ...]``."""
         before = len(self.problems.problems)
         names: list[str] = []
-        columns: dict[str, list[float]] = {}
+        columns: dict[str, list[Leaf]] = {}
         items = node.items or [Scalar(node.place, "")]
         for item in items:
             if not isinstance(item, Mapping):
@@ -128,7 +129,7 @@ class Entries:
                     continue
                 self.given.add(field.path)
                 try:
-                    columns.setdefault(field.name, []).append(read_single(inner.value, field))
+                    columns.setdefault(field.name, []).append(_one_of_set(inner.value, field))
                 except LeafError as error:
                     for mistake in error.mistakes:
                         self.problems.add(mistake.place, field.path, mistake.message)
@@ -139,7 +140,7 @@ class Entries:
                     self.problems.add(item.place, fields.BY_NAME[name].path, message)
         if len(self.problems.problems) == before:
             self.sets[section] = tuple(names)
-            self.leaves |= {name: Leaf(np.array(values), True, node.place) for name, values in columns.items()}
+            self.leaves |= {name: _axis_of_sets(section, leaves, node.place) for name, leaves in columns.items()}
 
     def _read_set_name(self, section: str, item: Mapping, taken: list[str]) -> str:
         """Return the name of a named set."""
@@ -199,3 +200,26 @@ class Entries:
             return self.root.place
         inner = entry.value.entries.get(key) if isinstance(entry.value, Mapping) else None
         return entry.place if inner is None else inner.place
+
+
+def _one_of_set(node: Node, field: fields.Field) -> Leaf:
+    """Return the value that a named set gives for an input, with its distribution if it has one.
+
+    Raises
+    ------
+    LeafError
+        It is a list or a range, or wrong in itself.
+    """
+    leaf = read_input(node, field)
+    if leaf.distribution is None:
+        return Leaf(np.array([read_single(node, field)]), False, node.place)
+    if leaf.is_axis:
+        raise LeafError([Mistake(node.place, "must have one mean in a named set")])
+    return leaf
+
+
+def _axis_of_sets(section: str, leaves: list[Leaf], place: Place) -> Leaf:
+    """Return the values that the named sets give for an input, as an axis."""
+    each = tuple(own if isinstance(own := leaf.distribution, Distribution) else None for leaf in leaves)
+    spread = SetDistributions(section, each) if any(each) else None
+    return Leaf(np.concatenate([leaf.values for leaf in leaves]), True, place, spread)

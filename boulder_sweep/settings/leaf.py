@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from boulder_sweep.settings.distributions import Distribution
+from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.numbers import NumberError, Quantity, describe, read_count, read_quantity
 from boulder_sweep.settings.problems import Place, did_you_mean, shorten
@@ -34,14 +34,14 @@ class Leaf:
         Whether it was written as a list or range (an axis of the grid) or as one value.
     place : Place
         Where it stands.
-    distribution : Distribution or None
+    distribution : Distribution, SetDistributions or None
         Spread about the values, which are its means; None where the values are certain.
     """
 
     values: np.ndarray
     is_axis: bool
     place: Place
-    distribution: Distribution | None = None
+    distribution: Distribution | SetDistributions | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.designs import DesignBlock, DesignPlan, Label, Source
-from boulder_sweep.settings.distributions import Distribution
+from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import BY_NAME, INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import Problem, SettingsError
@@ -97,7 +97,7 @@ class Sweep:
         Reading of the paper and representation of the soil.
     solver : SolverSettings
         Accuracy or step, and the time simulated.
-    distributions : dict of str to Distribution
+    distributions : dict of str to Distribution or SetDistributions
         Uncertain inputs by column name; their means are the values in `constants` and `axes`.
     correlation : float
         Correlation of friction angle and subgrade reaction, where both are uncertain.
@@ -118,7 +118,7 @@ class Sweep:
     criterion: Criterion = field(default_factory=Criterion)
     model: Model = field(default_factory=Model)
     solver: SolverSettings = field(default_factory=SolverSettings)
-    distributions: dict[str, Distribution] = field(default_factory=dict)
+    distributions: dict[str, Distribution | SetDistributions] = field(default_factory=dict)
     correlation: float = 0.0
     partial_factor: float = 1.0
     notes: tuple[Problem, ...] = ()

@@ -15,7 +15,7 @@ from boulder_sweep.answers.published import PUBLISHED
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.distributions import Distribution
+from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.sweep import DesignList
 
 SITE = Path("configs/site.yaml")
@@ -117,7 +117,9 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
     found = (frame.found == "found").to_numpy()
     rows = {name: values[found] for name, values in unfactored.plan.given_rows(0, unfactored.n_designs).items()}
     rows["embedment_depth_m"] = frame.passes_at.to_numpy()[found]
-    spread = {"friction_angle_deg": Distribution("normal", 1.0, 60.0, cov=0.05)}
+    spread: dict[str, Distribution | SetDistributions] = {
+        "friction_angle_deg": Distribution("normal", 1.0, 60.0, cov=0.05)
+    }
     sweep = Sweep("factor", None, (), {}, DesignList("designs", rows), distributions=spread)
     return uncertainty(sweep, half_width=0.03).frame.p_pass.to_numpy()
 

@@ -71,7 +71,11 @@ def _block(section: str, words: str) -> Schema:
     block: Schema = {"description": words, "additionalProperties": False, "properties": entries}
     if section not in NAMED_SETS:
         return {"type": ["object", "null"], **block}
-    inputs = {field.key: _ref(field.path) for field in INPUTS if field.section == section}
+    inputs = {
+        field.key: {"anyOf": [_ref(field.path), _ref(f"{_named(field.unit)}_distribution")]}
+        for field in INPUTS
+        if field.section == section
+    }
     named = _object({"name": {"type": "string", "pattern": f"^({NAME.pattern})$"}, **inputs}, ("name",))
     return {"type": ["object", "array", "null"], **block, "minItems": 1, "items": named}
 

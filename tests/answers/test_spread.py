@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy import stats
 from scipy.special import ndtr
 
-from boulder_sweep.answers.spread import Spread, values_of
+import boulder_sweep
+from boulder_sweep.answers.spread import Spread, uncertain_rows, values_of
+from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.settings import SettingsError, load_text
 from boulder_sweep.settings.distributions import Distribution
 from tests.answers.designs import site
 
@@ -56,3 +61,55 @@ def test_correlation_of_friction_and_stiffness() -> None:
 def test_certain_inputs_have_no_spread() -> None:
     with pytest.raises(QuestionError, match="no input has a distribution"):
         Spread(site())
+
+
+NAMED = """
+name: named
+boulder: {length: 1.65 m, width: 1.68 m, height: [3.0, 3.4] m, density: 2600 kg/m^3}
+site: {embedment_depth: 2.1 m}
+soil:
+  - {name: certain, density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+  - {name: known,   density: 1860 kg/m^3, friction_angle: {mean: 40 deg, sd: 1 deg}, subgrade_reaction: 60 MN/m^3}
+  - {name: unknown, density: 1860 kg/m^3, friction_angle: {mean: 40 deg, cov: 10 %}, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+def test_every_named_soil_may_have_its_own_distribution() -> None:
+    sweep = load_text(NAMED, Path("named.yaml"))
+    spread = Spread(sweep)
+    rows = uncertain_rows(sweep, sweep.plan.given_rows(0, 6), 0, 6)
+    z = np.full((6, 1), 1.0)
+    drawn = spread.filled(rows, z)["friction_angle_deg"]
+    assert drawn == pytest.approx([40.0, 41.0, 44.0] * 2, abs=1e-3)
+    block_of(spread.filled(rows, z))
+    found = boulder_sweep.uncertainty(sweep, half_width=0.05).frame
+    alone = [
+        boulder_sweep.uncertainty(load_text(one, Path("one.yaml")), half_width=0.05).frame.p_pass.to_numpy()
+        for one in (ALONE.format("{mean: 40 deg, sd: 1 deg}"), ALONE.format("{mean: 40 deg, cov: 10 %}"))
+    ]
+    chances = found.p_pass.to_numpy().reshape(2, 3)
+    assert set(chances[:, 0]) <= {0.0, 1.0}
+    assert np.array_equal(chances[:, 1:].T, np.stack(alone))
+    assert sweep.resolved()["distributions"]["friction_angle_deg"]["sets"][0] is None
+
+
+ALONE = """
+name: one
+boulder: {{length: 1.65 m, width: 1.68 m, height: [3.0, 3.4] m, density: 2600 kg/m^3}}
+site: {{embedment_depth: 2.1 m}}
+soil: {{density: 1860 kg/m^3, friction_angle: {}, subgrade_reaction: 60 MN/m^3}}
+vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}}
+"""
+
+
+def test_a_probability_is_asked_for_in_every_named_soil() -> None:
+    sweep = load_text(NAMED, Path("named.yaml"))
+    frame = boulder_sweep.need(sweep, probability=0.9, both_readings=False).frame
+    depth = frame.least_embedment_depth_m.to_numpy().reshape(2, 3)
+    assert (np.diff(depth[1]) > 0.0).all(), "the less is known, the deeper"
+
+
+def test_a_list_inside_a_named_soil_is_refused() -> None:
+    with pytest.raises(SettingsError, match="must have one mean in a named set"):
+        load_text(NAMED.replace("mean: 40 deg, sd", "mean: [38, 40] deg, sd"), Path("named.yaml"))

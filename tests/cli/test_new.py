@@ -50,7 +50,7 @@ def test_it_writes_once(sweep, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, err = sweep("new", "a b.yaml", "--yes")
     assert (code, err) == (0, "")
-    assert re.fullmatch(r"a b.yaml: \d+ designs. Edit it, then: sweep check a b.yaml\n", out)
+    assert re.fullmatch(r"a b.yaml: \d+ designs. Edit it, then: sweep need a b.yaml\n", out)
     assert load("a b.yaml").name == "a-b"
     before = (tmp_path / "a b.yaml").read_bytes()
     assert sweep("new", "a b.yaml", "--yes") == (4, "", "error: a b.yaml exists already; name another file\n")

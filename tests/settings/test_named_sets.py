@@ -79,7 +79,7 @@ def test_a_partial_factor_reaches_named_sets(load_it, soils):
         ("name: loose", "name: dense sand", "soil.name", "'dense sand' is given twice"),
         ("friction_angle: 32 deg, ", "", "soil.friction_angle", "in every named set, or in none"),
         ("32 deg", "[32, 34] deg", "soil.friction_angle", "takes one value"),
-        ("32 deg", "{mean: 32, sd: 3}", "soil.friction_angle", "takes one value"),
+        ("32 deg", "{mean: [30, 32], sd: 3}", "soil.friction_angle", "must have one mean"),
         ("density: 1700", "densty: 1700", "soil.densty", "did you mean density?"),
         ("density: 1700, ", "", "soil.density", "in every named set, or in none"),
         ("name: loose", "name: loose, correlation: 0.5", "soil.correlation", "is not a key of soil"),
