@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 RATIO = "embedment_ratio"
 DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
-VERDICT, REASON = "verdict", "reason"
+VERDICT, REASON, VALIDITY = "verdict", "reason", "validity"
 MOST_KEPT = 2_000_000
 """Most rows kept: a dozen maps with as many cells as a map may have. Of more, only rows that differ in the picture."""
 _RASTER = 500
@@ -78,16 +79,26 @@ class Kept:
         Inputs over small multiples; None where there is none.
     levels
         Different values of every input, ascending.
+
+    Attributes
+    ----------
+    count, passing : int
+        How many rows there are, and how many of them pass.
+    flags : Counter
+        How many of these have each flag of the column ``validity``; under ``""`` those without any.
+    thinned : bool
+        Whether only rows are left that can be told apart in a picture.
     """
 
     def __init__(self, across: str, up: str, over: Sequence[str | None], levels: Mapping[str, np.ndarray]):
         self.count = self.passing = 0
+        self.flags: Counter[str] = Counter()
         self.thinned = False
         self._ends = {
             name: (levels[name].min(initial=np.inf), levels[name].max(initial=-np.inf)) for name in (across, up)
         }
         self._over = [name for name in over if name is not None]
-        self.columns = list(dict.fromkeys([across, up, *self._over, VERDICT, REASON]))
+        self.columns = list(dict.fromkeys([across, up, *self._over, VERDICT, REASON, VALIDITY]))
         self._parts: list[pd.DataFrame] = []
         self._held = 0
 
@@ -95,7 +106,11 @@ class Kept:
         """Add rows."""
         self.count += len(rows)
         if VERDICT in rows:
-            self.passing += int((rows[VERDICT] == "pass").sum())
+            passes = rows[VERDICT] == "pass"
+            self.passing += int(passes.sum())
+            if VALIDITY in rows:
+                for words, count in rows.loc[passes, VALIDITY].astype(str).value_counts().items():
+                    self.flags.update(dict.fromkeys(str(words).split(";"), int(count)))
         if self._held == 0:
             self._parts = [rows]  # also without any rows, for its columns
         elif len(rows):

@@ -53,6 +53,8 @@ class Slice:
         How many rows the table has, how many of them lie in the plane, and how many of these pass.
     thinned : bool
         Whether there were too many rows to keep them all.
+    flags : dict of str to int
+        How many of those that pass have each flag of the column ``validity``; under ``""`` those without any.
     left_out : dict of str to int
         Of which multiples only some are shown: how many values there are.
     sets : dict of str to sequence of str
@@ -72,6 +74,7 @@ class Slice:
     count: int
     passing: int
     thinned: bool
+    flags: Mapping[str, int] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     sets: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
@@ -174,6 +177,7 @@ def plane(
         count=kept.count,
         passing=kept.passing,
         thinned=kept.thinned,
+        flags=dict(kept.flags),
         left_out=left_out,
         sets=named,
     )

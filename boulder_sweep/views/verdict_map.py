@@ -200,8 +200,21 @@ def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
         for name, value in shown.constants.items()
         if (name, value) not in USUAL
     ]
-    lines = (" · ".join(words), f"All designs: {', '.join(same)}" if same else "", terms)
+    lines = (" · ".join(words), _flagged(shown), f"All designs: {', '.join(same)}" if same else "", terms)
     return "\n".join(textwrap.fill(line, width) for line in lines if line)
+
+
+def _flagged(shown: Slice) -> str:
+    """Return how many of the passes lie outside what the model was tested on, and in what respect."""
+    if not shown.passing or not shown.flags:
+        return ""
+    shares = {name: count / shown.passing for name, count in shown.flags.items()}
+    inside = shares.pop("", 0.0)
+    most = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
+    named = ", ".join(_unbroken(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
+    if not named:
+        return "No pass lies outside what the model was tested on"
+    return f"Of the passes {1.0 - inside:.0%} lie outside what the model was tested on: {named}"
 
 
 def _unbroken(words: str) -> str:

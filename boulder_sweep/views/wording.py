@@ -71,4 +71,11 @@ def design_line(trajectory: Trajectory, units: str = "si") -> str:
             model_words(trajectory.settings),
         )
     )
-    return f"{words}\n{NOT_A_TEST}"
+    flags = str(trajectory.judged.row(0)["validity"] or "")
+    outside = f" · Outside what the model was tested on: {flags_text(flags)}" if flags else ""
+    return f"{words}\n{NOT_A_TEST}{outside}"
+
+
+def flags_text(flags: str) -> str:
+    """Return the flags of one row as words, without the underscores of their names."""
+    return ", ".join(flags.split(";")).replace("_", " ")

@@ -44,6 +44,7 @@ def table() -> pd.DataFrame:
     passes = rows.boulder_height_m * rows.embedment_depth_m / rows.boulder_height_m > 1.4
     rows["verdict"] = pd.Categorical(["pass" if p else "fail" for p in passes])
     rows["reason"] = pd.Categorical(["" if p else "overturns" for p in passes])
+    rows["validity"] = pd.Categorical([""] * len(rows))
     low = rows.boulder_height_m - rows.embedment_depth_m < 0.5
     rows.loc[low & ~passes, "reason"] = "overturns"
     return rows

@@ -19,7 +19,8 @@ from boulder_sweep.settings import load_text
 from boulder_sweep.views.labels import label, value_text
 from boulder_sweep.views.pieces import Kept, Pieces, pieces_of
 from boulder_sweep.views.slices import Slice, plane
-from boulder_sweep.views.verdict_map import CLASSES, classes_of, draw_verdict_map
+from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
+from boulder_sweep.views.wording import terms_line
 
 GRID = """\
 name: small grid
@@ -196,6 +197,7 @@ def test_of_too_many_rows_those_are_kept_that_a_picture_can_tell_apart(monkeypat
         vehicle_mass_kg=6000.0 + 100.0 * rng.integers(0, 20, n),
         verdict=np.where(np.arange(n) < n - 60, "fail", "pass"),
         reason=np.where(np.arange(n) < n - 60, "overturns", ""),
+        validity="",
     )
     shown, _ = drawn(in_pieces(table, 300), monkeypatch, tmp_path / "map.png")
     assert (shown.across, shown.up) == ("boulder_width_m", "vehicle_mass_kg")
@@ -372,7 +374,10 @@ def test_a_file_of_sweep_boundary_is_drawn_as_the_run_is(named_soils: str, capsy
     assert execute(["boundary", "named.yaml", "-q", "-o", "named.parquet"]) == 0
     assert execute(["plot", "named.parquet"]) == 0
     assert "named.png: 27 of 27 designs" in capsys.readouterr().out
-    assert execute(["plot", named_soils, "-o", "run.png"]) == 0
+    settings = boulder_sweep.load("named.yaml").resolved()
+    run = boulder_sweep.read(named_soils).drop(columns="validity")  # a map of a boundary has no flags
+    words = {"title": settings["name"], "terms": terms_line(settings), "sets": settings["labels"]}
+    draw_verdict_map(run, Path("run.png"), **words)
     assert Path("named.png").read_bytes() == Path("run.png").read_bytes()
     boulder_sweep.read(named_soils).to_parquet("other.parquet")
     assert execute(["plot", "other.parquet"]) == 2
@@ -388,3 +393,20 @@ def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None
     drawn = (tmp_path / "chart.svg").read_text()
     assert all(f"<!-- {name} -->" in drawn for name in ("loose", "dense", "gravel"))
     assert "<!-- embedment depth [ft] -->" in drawn
+
+
+def test_the_caption_says_in_what_respect_passes_lie_outside_what_was_tested(table: pd.DataFrame) -> None:
+    flags = np.resize(np.array(["", "width", "width;soil_pair", "width"]), len(table))
+    found = plane(table.assign(validity=pd.Categorical(flags)))
+    shown = found.rows[found.rows.verdict == "pass"].validity.astype(str)
+    assert found.passing == len(shown) > 20
+    assert found.flags == {
+        "": (shown == "").sum(),
+        "width": shown.str.contains("width").sum(),
+        "soil_pair": shown.str.contains("soil_pair").sum(),
+    }
+    caption = _caption(found, "terms", 400, "si").replace("\N{NO-BREAK SPACE}", " ")
+    share = f"{(shown != '').mean():.0%}"
+    assert f"Of the passes {share} lie outside what the model was tested on: width {share}, soil pair " in caption
+    assert "No pass lies outside what the model was tested on" in _caption(plane(table), "terms", 400, "si")
+    assert "tested on" not in _caption(plane(table.drop(columns="validity")), "terms", 400, "si")
