@@ -33,7 +33,7 @@ DESIGNS = 2048
 """Designs of the sample, with the soil in closed form; the steps of `balanced` and their error take 0.1 s."""
 FEWEST_DESIGNS = 1024
 """Smallest sample, if the sweep has this many designs."""
-SHARE = 50
+SHARE = 100
 """The sample is at most one in this many designs, so that it stays a small part of the run."""
 SHORTEST_STEP_S = 1e-3
 """Where steps are shorter, the sample for the numerical error is smaller in proportion."""
