@@ -46,7 +46,7 @@ def measure(rounds: int = ROUNDS) -> Table:
     stacked = np.stack(designs)
     ws, _ = loops.simulate_and_count(stacked, readings, control, 6)
     lanes.attempt_steps(ws)
-    looked_at, scratch = ws.copy(), ws.copy()
+    attempted = ws.copy()
     peak = PeakLoop()
     with_elements = bk.constants_of(design_at(designs, 0), readings, ELEMENTS)
     closed = bk.constants_of(design_at(designs, 0), readings, 0)
@@ -55,8 +55,7 @@ def measure(rounds: int = ROUNDS) -> Table:
         {
             "peak": peak,
             "attempt": lambda: loops.attempt_often(ws, ATTEMPTS),
-            "look": lambda: loops.look_often(scratch, looked_at, ATTEMPTS),
-            "copy": lambda: loops.copy_often(scratch, looked_at, ATTEMPTS),
+            "look": lambda: loops.look_often(attempted, ATTEMPTS),
             "sums": lambda: loops.sum_elements_often(lines, with_elements, SUMS),
             "closed": lambda: loops.integrate_often(lines, closed, CLOSED_FORMS),
         },
@@ -64,7 +63,7 @@ def measure(rounds: int = ROUNDS) -> Table:
     )
     least = {name: min(values) for name, values in times.items()}
     attempt_ns = 1e9 * least["attempt"] / (ATTEMPTS * LANES)
-    look_ns = 1e9 * (least["look"] - least["copy"]) / (ATTEMPTS * LANES)
+    look_ns = 1e9 * least["look"] / (ATTEMPTS * LANES)
     evaluation_ns = attempt_ns / EVALUATIONS_PER_STEP
     sum_ns = 1e9 * least["sums"] / (SUMS * ELEMENTS)
     closed_ns = 1e9 * least["closed"] / CLOSED_FORMS

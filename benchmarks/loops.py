@@ -47,18 +47,10 @@ def attempt_often(ws: np.ndarray, times: int) -> None:
 
 
 @_compiled
-def look_often(ws: np.ndarray, before: np.ndarray, times: int) -> None:
-    """Check the outcome of the same attempt repeatedly; copying the workspace back costs little in comparison."""
+def look_often(ws: np.ndarray, times: int) -> None:
+    """Check and accept the outcome of the same attempt repeatedly; no branch, so its time does not depend on it."""
     for _ in range(times):
-        ws[:] = before
         take_over_steps(ws)
-
-
-@_compiled
-def copy_often(ws: np.ndarray, before: np.ndarray, times: int) -> None:
-    """Do what `look_often` does, without the check."""
-    for _ in range(times):
-        ws[:] = before
 
 
 @_compiled

@@ -224,16 +224,6 @@ def sweep(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, con
     return q.counts[BUSY] > 0 or q.counts[PENDING] > 0
 
 
-@kernel
-def sweep_all(
-    ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
-) -> None:
-    """Simulate every design; arguments as of `next_design`."""
-    begin(ws, q, designs, readings, control, out)
-    while sweep(ws, q, designs, readings, control, out):
-        pass
-
-
 @array_kernel
 def empty_workspace() -> np.ndarray:
     """Return the workspace before the first design has been started, its vectors on whole lines of the fast memory."""
@@ -273,5 +263,8 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
         Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
     """
     out = empty_outcomes(designs.shape[1])
-    sweep_all(empty_workspace(), empty_queue(), designs, readings, control, out)
+    ws, q = empty_workspace(), empty_queue()
+    begin(ws, q, designs, readings, control, out)
+    while sweep(ws, q, designs, readings, control, out):
+        pass
     return out
