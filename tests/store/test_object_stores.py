@@ -158,13 +158,14 @@ def test_a_run_that_was_thought_dead_cannot_change_the_table(only_new, monkeypat
 
 
 @pytest.mark.parametrize("only_new", [True, False])
-def test_no_row_is_lost_or_double_whatever_fails(only_new, monkeypatch):
+@pytest.mark.parametrize(("seeds", "least"), [(1, 1), pytest.param(12, 50, marks=pytest.mark.slow)])
+def test_no_row_is_lost_or_double_whatever_fails(only_new, seeds, least, monkeypatch):
     """Puts that fail, whose answer is lost, or that arrive late; lists that are stale: many times each."""
     monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)  # a lock that arrives late is that of a dead run
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "SECRET-KEY")
     monkeypatch.setattr(places, "_TRIES", 2)
     expected, counts, told = whole(), Counter(), ""
-    for seed in range(12):
+    for seed in range(seeds):
         trouble = Trouble(seed, 0.3, only_new)
         with store(trouble) as faulty:
             out = place_of(OUT)
@@ -181,8 +182,8 @@ def test_no_row_is_lost_or_double_whatever_fails(only_new, monkeypatch):
             assert same_bits(read_table(out), expected), f"seed {seed}"
             assert sorted(load(out).parts) == [name for name in names(out) if is_part_name(name)], f"seed {seed}"
         counts.update(trouble.counts)
-    assert min(counts.values()) >= 50, counts
-    assert told.count("\n") > 20
+    assert min(counts.values()) >= least, counts
+    assert told.count("\n") >= seeds
     assert "SECRET" not in told
 
 
