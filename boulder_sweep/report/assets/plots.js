@@ -1,6 +1,11 @@
 // @ts-check
 "use strict";
 
+/** @param {Iterable<number>} times @returns {number[]} so rounded that the axis ends at 1, not a last bit before it */
+function rounded(times) {
+  return [...times].map((t) => Number(t.toPrecision(12)));
+}
+
 /** Bokeh's figures of the page, found by their names. */
 class Plots {
   /** @param {{docs: any, items: any}} made what Python made */
@@ -71,7 +76,7 @@ class Plots {
     /** @param {string} name @param {string} unit */
     const shown = (name, unit) => columns[name].map((value) => value / units.size(unit));
     this.fill(`${panel}-motion`, {
-      time: motion.time,
+      time: rounded(motion.time),
       rotation: columns.theta_b.map((value) => value * DEGREES),
       limit: columns.theta_b.map(() => limit * DEGREES),
       boulder: shown("x_b", "m"),
@@ -94,7 +99,7 @@ class Plots {
    */
   drawEnergy(panel, motion, units, parts, limit) {
     const shown = parts.map((part) => [part, motion.columns[part].map((value) => value / units.size("J"))]);
-    this.fill(`${panel}-energies`, { time: motion.time, ...Object.fromEntries(shown) });
+    this.fill(`${panel}-energies`, { time: rounded(motion.time), ...Object.fromEntries(shown) });
     this.shade(panel, motion, limit, ["energy"]);
     this.title(`${panel}-energy`, "time [s]", units.title("energy", "J"));
   }
