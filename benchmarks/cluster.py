@@ -96,7 +96,7 @@ def main() -> None:
         time.sleep(IDLE_S)
         idle = (cpu_s(scheduler.pid) - idle) / IDLE_S
         before: dict[str, float] = {}
-        begun = [0.0]
+        begun = [0.0, 0.0]
 
         def spent() -> dict[str, float]:
             return {
@@ -108,7 +108,7 @@ def main() -> None:
         def begin(_: object) -> None:
             if not before:
                 before.update(spent())
-                begun[0] = time.monotonic()
+                begun[:] = time.monotonic(), proxy.bytes
 
         with tempfile.TemporaryDirectory() as folder:
             summary = run(
@@ -125,7 +125,9 @@ def main() -> None:
             process.kill()
             process.wait()
     print(f"{summary.rows:,} designs in {summary.parts} parts, {summary.seconds:.1f} s with {WORKERS} workers")
-    print(f"bytes that pass the scheduler: {proxy.bytes:,}, {proxy.bytes / summary.rows:.3f} for each design")
+    sent = proxy.bytes - begun[1]
+    print(f"bytes that pass the scheduler: {proxy.bytes:,}, {proxy.bytes / summary.rows:.3f} for each design;")
+    print(f"of them while it computes, {seconds:.0f} s of heartbeats included: {sent:,.0f}, {sent / summary.rows:.3f}")
     print(f"CPU time of {'':<14}{'starting':>10}{'computing':>13}{'share':>9}{'of both':>9}")
     both, computing = sum(after.values()), sum(after.values()) - sum(before.values())
     for name, total in after.items():
