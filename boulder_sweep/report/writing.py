@@ -22,6 +22,7 @@ from boulder_sweep.store.files import put_file
 from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
 from boulder_sweep.text import printable
 
+FACTS = ("versions", "settings_sha256", "kernels_sha256")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
 
 
@@ -73,20 +74,27 @@ def write_report(
             "The table was computed by another version of the kernels than the one in this page, "
             "so simulations here may differ from it."
         )
-    text = assembled(
-        title=str(identity["settings"]["name"]),
-        settings=identity["settings"],
-        control=control,
-        readings=readings,
-        start=chosen[0]["inputs"],
-        sentences=answer.sentences,
-        rows=rows,
-        kept=kept,
-        chosen=chosen,
-        facts=_facts(identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)),
-        notes=[*notes, *_general_notes(identity["settings"], control)],
-        units=units,
-    )
+    try:
+        text = assembled(
+            title=str(identity["settings"]["name"]),
+            settings=identity["settings"],
+            control=control,
+            readings=readings,
+            start=chosen[0]["inputs"],
+            sentences=answer.sentences,
+            rows=rows,
+            kept=kept,
+            chosen=chosen,
+            facts=_facts(
+                identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)
+            ),
+            notes=[*notes, *_general_notes(identity["settings"], control)],
+            units=units,
+        )
+    except KeyError as missing:
+        raise ReportError(
+            f"{out} was written by another version, whose settings lack {missing}; run it again"
+        ) from None
     return _written(Path(page), text)
 
 

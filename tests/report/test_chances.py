@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
@@ -75,3 +77,14 @@ def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
         write_report(tmp_path / "text.parquet", tmp_path / "page.html")
     with pytest.raises(ReportError, match="there is no 9"):
         write_report(chances, tmp_path / "page.html", designs=[9])
+
+
+def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> None:
+    table = pq.read_table(chances)
+    metadata = dict(table.schema.metadata)
+    settings = json.loads(metadata[b"boulder_sweep.settings"])
+    del settings["model"]["calibrated_crush_m"]
+    metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
+    with pytest.raises(ReportError, match="another version, whose settings lack 'calibrated_crush_m'"):
+        write_report(tmp_path / "old.parquet", tmp_path / "page.html")
