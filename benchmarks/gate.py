@@ -1,13 +1,16 @@
 """The gate: it fails if a change makes a key path markedly slower.
 
-Run as ``python -m benchmarks.gate``; exit code 1 and a sentence for each path over its threshold. Every path is timed
-in turn with a reference loop that shares no code with the project, and only the ratio counts: it hardly
-depends on the speed or the load of the machine. The thresholds are in ``gate.toml``, with room for other machines.
+Run as ``python -m benchmarks.gate``; exit code 1 and a sentence for each path over its threshold. What depends on no
+clock is counted and compared with the record in ``counts.toml``. The kernels are timed in turn with those before their
+last change, key paths in turn with a reference loop that shares no code with the project, and only the ratios count:
+they hardly depend on the speed or the load of the machine. The thresholds are in ``gate.toml``, with room for other
+machines. ``--record`` renews the record.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 import tomllib
@@ -22,12 +25,16 @@ import boulder_kernels as bk
 from boulder_kernels.design import design_at
 from boulder_kernels.soil import Kinematics
 
+from . import counts, earlier, together
 from .designs import HORIZON, ROTATION_LIMIT, first, sample
 from .loops import sum_elements_often
+from .peak import PeakLoop
 from .report import FOLDER
 from .timing import cpu_seconds, machine, median_ratio
 
 THRESHOLDS = FOLDER / "gate.toml"
+PARTS = ("counts", "reference", "threads", "waiting", "earlier")
+"""The last brings a second package of kernels into the process: Numba then tells the types of arguments more slowly."""
 ROUNDS = 9
 ROWS = 4096
 SCALAR_ROWS = 512
@@ -63,31 +70,46 @@ def reference_work(x: np.ndarray, times: int) -> None:
 
 @dataclass(frozen=True)
 class Finding:
-    """One path over the reference.
+    """One path over what it is compared with.
 
     Parameters
     ----------
     name
         Of the path.
     ratio
-        Median ratio of its CPU time to that of the reference in the same round.
+        Median ratio of its CPU time to that of the reference in the same round, or another ratio.
     threshold
         Largest ratio that passes.
+    of
+        What it is a ratio to.
+    least
+        Smallest ratio that passes.
+    counted
+        Whether it is of counts, which are to be neither larger nor smaller.
     """
 
     name: str
     ratio: float
     threshold: float
+    of: str = "the reference"
+    least: float = 0.0
+    counted: bool = False
 
     @property
     def passes(self) -> bool:
         """Whether the path is fast enough; a ratio of NaN is not."""
-        return self.ratio <= self.threshold
+        return self.least <= self.ratio <= self.threshold
+
+    @property
+    def bounds(self) -> str:
+        """The ratios that pass."""
+        most = f"at most {self.threshold:.3f}" if self.threshold < float("inf") else ""
+        return " and ".join(filter(None, [f"at least {self.least:.3f}" if self.least > 0.0 else "", most]))
 
     def __str__(self) -> str:
         """One line: the path, its ratio, its threshold, and whether it passes."""
-        verdict = "ok" if self.passes else "TOO SLOW"
-        return f"{self.name:<24} {self.ratio:8.3f} of the reference, at most {self.threshold:8.3f}   {verdict}"
+        verdict = "ok" if self.passes else ("CHANGED" if self.counted else "TOO SLOW")
+        return f"{self.name:<36} {self.ratio:8.3f} of {self.of}, {self.bounds}   {verdict}"
 
 
 def paths(folder: Path) -> dict[str, Callable[[], object]]:
@@ -123,7 +145,7 @@ def paths(folder: Path) -> dict[str, Callable[[], object]]:
         "lanes_balanced": lanes("balanced", estimate=True),
         "one_by_one": one_by_one,
         "element_sums": lambda: sum_elements_often(lines, with_elements, SUMS),
-        "whole_run": lambda: run(sweep, folder / "table", overwrite=True),
+        "whole_run": lambda: run(sweep, folder / "table", overwrite=True, jobs=together.THREADS),
     }
 
 
@@ -164,41 +186,141 @@ def judged(
             before = cpu_seconds(reference)
             own[name].append(cpu_seconds(work))
             others[name].append(0.5 * (before + cpu_seconds(reference)))
-    return [Finding(name, median_ratio(own[name], others[name]), thresholds[name]) for name in works]
+    return [Finding(name, _ratio(own[name], others[name]), thresholds[name]) for name in works]
 
 
-def thresholds_of(path: Path = THRESHOLDS) -> dict[str, float]:
+def _ratio(own: list[float], others: list[float]) -> float:
+    """Return the ratio of times measured in turn: the median of the rounds, or of the least times where it is less.
+
+    What other programs take from the caches lengthens either only; without them both statistics give the same.
+    """
+    return min(median_ratio(own, others), min(own) / min(others))
+
+
+def counted(found: counts.Counts, recorded: counts.Recorded, tolerance: float) -> list[Finding]:
+    """Compare counts with the record; one that is missing in the record, or only there, has changed.
+
+    Parameters
+    ----------
+    found
+        Counted now.
+    recorded
+        Counts of the record.
+    tolerance
+        Largest change that passes, as a share.
+    """
+    compiler = "" if recorded.compiler == counts.compiler() else f" with {recorded.compiler}"
+    return [
+        Finding(
+            name,
+            found.get(name, 0) / recorded.counts[name] if name in recorded.counts else float("nan"),
+            1.0 + tolerance,
+            f"the record{compiler}",
+            1.0 - tolerance,
+            counted=True,
+        )
+        for name in dict.fromkeys([*recorded.counts, *found])
+    ]
+
+
+def against_earlier(thresholds: Mapping[str, float], folder: Path) -> list[Finding]:
+    """Time the kernels in turn with those before their last change; nothing where git does not have them."""
+    commit = earlier.commit_before()
+    if commit is None:
+        print("git does not have the kernels before their last change: only the reference is compared with")
+        return []
+    kernels = earlier.kernels_of(commit, folder)
+    if kernels is None:
+        print(f"the kernels of {commit[:9]} are called differently: only the reference is compared with")
+        return []
+    found = earlier.ratios_to(kernels)._asdict()
+    return [Finding(f"{name}, in lanes", ratio, thresholds[name], commit[:9]) for name, ratio in found.items()]
+
+
+def at_once(gain: float, rounds: int = together.ROUNDS) -> list[Finding]:
+    """Time the kernels in two threads and in one, in turn with the loop of multiply-adds; nothing on one core."""
+    if len(os.sched_getaffinity(0)) < together.THREADS:
+        print("only one core: two threads are not compared with one")
+        return []
+    designs, readings, peak = sample(2 * ROWS), bk.corrected(), PeakLoop()
+    control = bk.Control(earlier.LONG_S, HORIZON, ROTATION_LIMIT, 0, False)
+    ratio = together.gain_over(
+        lambda: [bk.simulate_table(designs, readings, control) for _ in range(4)],
+        lambda: [peak() for _ in range(16)],
+        rounds,
+    )
+    return [Finding("two threads over one", ratio, float("inf"), "that of multiply-adds", gain)]
+
+
+def idle(most: float, folder: Path, rounds: int = together.ROUNDS) -> list[Finding]:
+    """Find out how much of the wall time of a whole run nothing is computed."""
+    share = together.idle_share(paths(folder)["whole_run"], rounds)
+    return [Finding("waiting in a whole run", share, most, "its wall time")]
+
+
+def thresholds_of(path: Path = THRESHOLDS, section: str = "largest_ratio") -> dict[str, float]:
     """Read the committed thresholds."""
     with path.open("rb") as stream:
-        return {name: float(value) for name, value in tomllib.load(stream)["largest_ratio"].items()}
+        return {name: float(value) for name, value in tomllib.load(stream)[section].items()}
 
 
 def complaint(findings: list[Finding]) -> str:
     """Return a message about what is too slow and what to do; empty if nothing is."""
-    slow = [finding for finding in findings if not finding.passes]
-    if not slow:
-        return ""
-    names = ", ".join(f"{f.name} ({f.ratio:.3f}, at most {f.threshold:.3f})" for f in slow)
-    return (
-        f"benchmark gate: too slow: {names}. Find the cause with python -m benchmarks.kernel; if the new cost "
-        f"is worth it, raise the threshold in benchmarks/{THRESHOLDS.name} and say why."
-    )
+    slow = [finding for finding in findings if not finding.passes and not finding.counted]
+    changed = [finding for finding in findings if not finding.passes and finding.counted]
+    messages = []
+    if slow:
+        messages.append(
+            f"benchmark gate: too slow: {_named(slow)}. Find the cause with python -m benchmarks.kernel; if the new "
+            f"cost is worth it, raise the threshold in benchmarks/{THRESHOLDS.name} and say why."
+        )
+    if changed:
+        messages.append(
+            f"benchmark gate: counts have changed: {_named(changed)}. If the change is meant, renew the record by "
+            "python -m benchmarks.gate --record and say why."
+        )
+    return "\n".join(messages)
+
+
+def _named(findings: list[Finding]) -> str:
+    return ", ".join(f"{each.name} ({each.ratio:.3f}, {each.bounds})" for each in findings)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.gate", description=__doc__)
     parser.add_argument("--thresholds", type=Path, default=THRESHOLDS, help="another file of thresholds")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="how often each path is timed (default %(default)s)")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="only these parts")
+    parser.add_argument("--record", action="store_true", help="write the counts of now into the record, and no more")
     arguments = parser.parse_args()
+    if arguments.record:
+        counts.write(counts.measured())
+        return 0
     print(machine())
-    with tempfile.TemporaryDirectory(prefix="sweep-gate-") as folder:
-        findings = judged(paths(Path(folder)), thresholds_of(arguments.thresholds), arguments.rounds)
-    for finding in findings:
-        print(finding)
+    findings: list[Finding] = []
+    with tempfile.TemporaryDirectory(prefix="sweep-gate-") as name:
+        for part in arguments.only:
+            found = _findings(part, arguments.thresholds, arguments.rounds, Path(name))
+            for finding in found:
+                print(finding, flush=True)
+            findings += found
     problem = complaint(findings)
     if problem:
         print(problem, file=sys.stderr)
     return 1 if problem else 0
+
+
+def _findings(part: str, file: Path, rounds: int, folder: Path) -> list[Finding]:
+    """Findings of one of the `PARTS`."""
+    if part == "counts":
+        return counted(counts.measured(), counts.read(), thresholds_of(file, "counts")["largest_change"])
+    if part == "earlier":
+        return against_earlier(thresholds_of(file, "earlier"), folder)
+    if part == "reference":
+        return judged(paths(folder), thresholds_of(file), rounds)
+    if part == "threads":
+        return at_once(thresholds_of(file, "threads")["least_gain"], rounds)
+    return idle(thresholds_of(file, "waiting")["whole_run"], folder, rounds)
 
 
 if __name__ == "__main__":

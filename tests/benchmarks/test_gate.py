@@ -2,13 +2,17 @@
 
 import itertools
 import re
+import subprocess
+import threading
+import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
-from benchmarks import gate
+from benchmarks import counts, earlier, gate, together
 
 
 def nothing() -> None:
@@ -73,7 +77,7 @@ def test_command_fails_with_a_message(
     monkeypatch.setattr(gate, "paths", lambda folder: {"lanes_fast": nothing})
     too_low = tmp_path / "low.toml"
     too_low.write_text("[largest_ratio]\nlanes_fast = 0.1\n")
-    monkeypatch.setattr("sys.argv", ["gate", "--thresholds", str(too_low)])
+    monkeypatch.setattr("sys.argv", ["gate", "--only", "reference", "--thresholds", str(too_low)])
     assert gate.main() == 1
     printed = capsys.readouterr()
     assert re.search(r"lanes_fast .*TOO SLOW", printed.out)
@@ -85,5 +89,113 @@ def test_command_fails_with_a_message(
 
 def test_thresholds_are_committed_as_numbers() -> None:
     with gate.THRESHOLDS.open("rb") as stream:
-        values = tomllib.load(stream)["largest_ratio"].values()
-    assert all(value > 0.0 for value in values)
+        sections = tomllib.load(stream)
+    assert all(value > 0.0 for values in sections.values() for value in values.values())
+
+
+def test_a_count_may_change_by_two_per_cent_and_none_may_come_or_go() -> None:
+    recorded = counts.Recorded(counts.compiler(), {"kept": 1000, "grown": 1000, "shrunk": 1000, "gone": 10})
+    found = {"kept": 1019, "grown": 1021, "shrunk": 979, "new": 5}
+    complaint = gate.complaint(gate.counted(found, recorded, 0.02))
+    assert re.findall(r"(\w+) \(", complaint) == ["grown", "shrunk", "gone", "new"]
+    assert "python -m benchmarks.gate --record" in complaint
+    assert gate.complaint(gate.counted(dict(recorded.counts), recorded, 0.02)) == ""
+
+
+def test_another_compiler_is_named_beside_its_counts() -> None:
+    (finding,) = gate.counted({"steps": 10}, counts.Recorded("numba 0.1", {"steps": 10}), 0.02)
+    assert "of the record with numba 0.1" in str(finding)
+    assert finding.passes
+
+
+def test_the_record_is_read_as_it_was_written(tmp_path: Path) -> None:
+    written = {"flops of a step, machine code": 1158, "calls of all, lanes": 7}
+    counts.write(written, tmp_path / "counts.toml")
+    assert counts.read(tmp_path / "counts.toml") == counts.Recorded(counts.compiler(), written)
+    assert "flops of a step, machine code" in counts.read().counts
+
+
+def test_instructions_are_those_of_kernels_without_their_wrappers() -> None:
+    assembly = """
+\t.globl\t_ZN15boulder_kernels4soilE
+_ZN15boulder_kernels4soilE:
+\t.cfi_startproc
+\tvmovupd\t(%rax), %zmm0
+.LBB0_1:
+\tvaddpd\t%zmm0, %zmm1, %zmm0
+\tretq
+_ZN7cpython15boulder_kernels4soilE:
+\tpushq\t%rbp
+NRT_decref:
+\tretq
+"""
+    assert counts.instructions(assembly) == 3
+
+
+def git(folder: Path, *words: str) -> str:
+    settings = ("-c", "user.name=n", "-c", "user.email=e", "-c", "commit.gpgsign=false")
+    command = ["git", *settings, *words]
+    return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def test_the_kernels_compared_with_are_those_before_the_last_change(tmp_path: Path) -> None:
+    kernels = tmp_path / earlier.SOURCES
+    kernels.mkdir(parents=True)
+    git(tmp_path, "init", "-q")
+    commits = []
+    for name, text in ((kernels / "step.py", "1"), (kernels / "step.py", "2"), (tmp_path / "README", "3")):
+        name.write_text(text)
+        git(tmp_path, "add", "-A")
+        git(tmp_path, "commit", "-q", "-m", text)
+        commits.append(git(tmp_path, "rev-parse", "HEAD"))
+    assert earlier.commit_before(tmp_path) == commits[0]
+    (kernels / "step.py").write_text("4")
+    assert earlier.commit_before(tmp_path) == commits[2]
+
+
+def test_without_a_history_nothing_is_compared(tmp_path: Path) -> None:
+    assert earlier.commit_before(tmp_path) is None
+
+
+def test_costs_of_steps_and_of_events_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels whose step costs three times as much as before, and whose events cost the same."""
+
+    def simulation(kernels: object, designs: object, step_s: float) -> Timed:
+        return Timed(3.0 if kernels is earlier.bk else 1.0, step_s)
+
+    monkeypatch.setattr(earlier, "_simulation", simulation)
+    monkeypatch.setattr(earlier, "cpu_seconds", lambda work: 5.0 + work.step_cost * 0.01 / work.step_s)
+    found = earlier.ratios_to("before", rounds=3)
+    assert found.step == pytest.approx(3.0)
+    assert found.events == pytest.approx(1.0)
+    assert 1.0 < found.design < 3.0
+
+
+class Timed(NamedTuple):
+    """A simulation that takes as long as it says."""
+
+    step_cost: float
+    step_s: float
+
+    def __call__(self) -> None:
+        """Do nothing."""
+
+
+def test_work_that_sleeps_is_told_from_work_that_computes() -> None:
+    def compute() -> None:
+        until = time.process_time() + 0.05
+        while time.process_time() < until:
+            pass
+
+    assert together.idle_share(lambda: time.sleep(0.05), rounds=3) > 0.8
+    assert together.idle_share(compute, rounds=3) < 0.2
+
+
+def test_threads_that_wait_for_each_other_gain_nothing() -> None:
+    lock = threading.Lock()
+
+    def alone() -> None:
+        with lock:
+            time.sleep(0.02)
+
+    assert together.gain_over(alone, lambda: time.sleep(0.02), rounds=3) < 0.7
