@@ -11,7 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from boulder_sweep.runner.cluster import _Done
+from boulder_sweep.runner.remote import Done
 from boulder_sweep.store.manifest import Manifest, Part, load, part_name, save
 from boulder_sweep.store.storage import DiskStorage
 from boulder_sweep.store.writer import ROWS_PER_PART, StagedPart
@@ -41,9 +41,9 @@ def part(number: int) -> StagedPart:
     return StagedPart(part_name(first, first + ROWS_PER_PART, 10**12), record)
 
 
-def answer(number: int) -> _Done:
+def answer(number: int) -> Done:
     """Return what a task of two parts returns."""
-    return _Done([part(2 * number), part(2 * number + 1)], [])
+    return Done([part(2 * number), part(2 * number + 1)], [])
 
 
 def of_the_scheduler() -> dict[str, float]:

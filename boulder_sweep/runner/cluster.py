@@ -11,18 +11,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 from uuid import uuid4
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
-from boulder_sweep.places import place_of
-from boulder_sweep.runner.computing import Computation, EncodedPart, failed_rows
-from boulder_sweep.runner.estimate import blocks
+from boulder_sweep.runner.computing import Computation, failed_rows
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
+from boulder_sweep.runner.remote import Done, Work, compute, fingerprint, other_versions_text, parts_of, received
 from boulder_sweep.store.files import hidden_name
-from boulder_sweep.store.lock import LOCK_NAME
-from boulder_sweep.store.storage import storage_of
-from boulder_sweep.store.writer import OutputFolder, StagedPart, stage
+from boulder_sweep.store.writer import OutputFolder, StagedPart
 from boulder_sweep.text import one_line
 
 CONNECT_S = 10.0
@@ -35,11 +32,6 @@ _QUIET_S = 10.0
 _TASKS_PER_THREAD = 2
 _TRIES = 3
 _LOOPBACK = "127.0.0.1:0"
-_prepared: set[str] = set()
-_preparing = threading.Lock()
-"""Which runs this process, a worker, is ready for."""
-
-Fingerprint = tuple[dict[str, str], str, str]
 
 
 class Cluster:
@@ -148,26 +140,6 @@ class _Task:
     """Whether the bytes come back through the scheduler, because the worker cannot write into the folder."""
 
 
-@dataclass(frozen=True)
-class _Work:
-    """What every task of a run has in common; sent to the cluster once."""
-
-    name: str
-    computation: Computation
-    rows_per_block: int
-    rows_per_part: int
-    folder: str
-    table_rows: int
-    fingerprint: Fingerprint
-
-
-class _Done(NamedTuple):
-    """What a worker returns."""
-
-    staged: list[StagedPart]
-    relayed: list[EncodedPart]
-
-
 class ClusterWorkers(threading.Thread):
     """Computes ranges of rows on a cluster and puts messages into a queue, at last `Ended`.
 
@@ -231,7 +203,7 @@ class ClusterWorkers(threading.Thread):
     def _work(self) -> None:
         """Keep some tasks in flight until all are done."""
         manifest = self._folder.manifest
-        work = _Work(
+        work = Work(
             uuid4().hex,
             self._computation,
             self._rows_per_block,
@@ -240,7 +212,7 @@ class ClusterWorkers(threading.Thread):
             manifest.rows,
             fingerprint(),
         )
-        shared = self._cluster.client.submit(_received, work, pure=False)
+        shared = self._cluster.client.submit(received, work, pure=False)
         looked = result = time.monotonic()
         self._look_at_workers()
         more = True
@@ -276,7 +248,7 @@ class ClusterWorkers(threading.Thread):
 
     def _submit(self, shared: Any, task: _Task) -> None:
         """Hand a task to the scheduler."""
-        future = self._cluster.client.submit(_compute, shared, task.start, task.stop, task.relayed, pure=False)
+        future = self._cluster.client.submit(compute, shared, task.start, task.stop, task.relayed, pure=False)
         self._in_flight[future] = task
         future.add_done_callback(self._arrived.put)
 
@@ -284,14 +256,14 @@ class ClusterWorkers(threading.Thread):
         """Pass a result on, or retry."""
         task = self._in_flight.pop(future)
         if future.status == "finished":
-            done: _Done = future.result()
+            done: Done = future.result()
             self._accept(task, done)
         elif future.status == "error":
             self._retry(task, future.exception())
         else:  # cancelled, as all are when the connection breaks
             raise ClusterLostError(self._cluster.lost_text())
 
-    def _accept(self, task: _Task, done: _Done) -> None:
+    def _accept(self, task: _Task, done: Done) -> None:
         """Pass on the parts that a worker has written, or write those that it sent."""
         for part in done.relayed:
             done.staged.append(self._folder.stage(part.first, part.content, part.rows, part.verdicts))
@@ -299,13 +271,13 @@ class ClusterWorkers(threading.Thread):
         for staged in here:
             self.messages.put(Computed(staged.part.rows))
             self.messages.put(staged)
-        if len(here) < len(_parts(task.start, task.stop, self._folder.manifest.rows_per_part)):
+        if len(here) < len(parts_of(task.start, task.stop, self._folder.manifest.rows_per_part)):
             if not task.relayed:
                 self.messages.put(Note("a worker does not share the output folder: its rows pass the scheduler"))
             there = {staged.part.first for staged in here}
             self._again += [
                 _Task(start, stop, task.tries + 1, relayed=True)
-                for start, stop in _parts(task.start, task.stop, self._folder.manifest.rows_per_part)
+                for start, stop in parts_of(task.start, task.stop, self._folder.manifest.rows_per_part)
                 if start not in there
             ]
 
@@ -328,7 +300,7 @@ class ClusterWorkers(threading.Thread):
             part = self._computation.encoded(
                 task.start, [failed_rows(1, "every worker that computed this design died")]
             )
-            self._accept(task, _Done([], [part]))
+            self._accept(task, Done([], [part]))
 
     def _look_at_workers(self) -> None:
         """Notice workers that came and went."""
@@ -347,58 +319,6 @@ class ClusterWorkers(threading.Thread):
             self.messages.put(Note(f"no worker left; waiting {NO_WORKER_S:.0f} s for another"))
         elif now - self._without_worker_since > NO_WORKER_S:
             raise ClusterLostError(_no_worker_text(self._cluster.address))
-
-
-def fingerprint() -> Fingerprint:
-    """Return versions and hashes of the code that computes here."""
-    from boulder_sweep.store.provenance import kernels_sha256, rules_sha256, versions
-
-    return versions(), kernels_sha256(), rules_sha256()
-
-
-def _received(work: _Work) -> _Work:
-    """Hold the work on a worker, from which the others fetch it; repeated if that worker is lost."""
-    return work
-
-
-def _compute(work: _Work, start: int, stop: int, relayed: bool) -> _Done:
-    """Compute, encode and stage some rows on a worker, part by part."""
-    _prepare(work)
-    folder = place_of(work.folder)
-    done = _Done([], [])
-    if not relayed and not (folder / LOCK_NAME).exists():
-        return done
-    storage = storage_of(folder)
-    for begin, end in _parts(start, stop, work.rows_per_part):
-        pieces = [work.computation.judged(*rows) for rows in blocks(iter([(begin, end)]), work.rows_per_block)]
-        part = work.computation.encoded(begin, pieces)
-        if relayed:
-            done.relayed.append(part._replace(content=bytes(part.content)))
-        else:
-            done.staged.append(stage(storage, work.table_rows, part.first, part.content, part.rows, part.verdicts))
-    return done
-
-
-def _prepare(work: _Work) -> None:
-    """Compare versions and load or compile the kernels, once in the process of a worker.
-
-    Raises
-    ------
-    BackendError
-        Rows computed here could differ from those of the others.
-    """
-    with _preparing:
-        if work.name not in _prepared:
-            if fingerprint() != work.fingerprint:
-                raise BackendError(_other_versions_text("a worker"))
-            work.computation.warm_up()
-            _prepared.add(work.name)
-
-
-def _parts(start: int, stop: int, size: int) -> list[tuple[int, int]]:
-    """Cut rows [start, stop) at the ends of parts."""
-    ends = [*range(start - start % size + size, stop, size), stop]
-    return list(zip([start, *ends[:-1]], ends, strict=True))
 
 
 def _wait_for_a_worker(client: Any, address: str) -> None:
@@ -427,7 +347,7 @@ def _check_versions(client: Any) -> None:
         elif tuple(there) != here:
             different.append(address)
     if different:
-        raise BackendError(_other_versions_text(f"the workers {', '.join(different)}"))
+        raise BackendError(other_versions_text(f"the workers {', '.join(different)}"))
 
 
 def _no_worker_text(address: str | None) -> str:
@@ -435,14 +355,6 @@ def _no_worker_text(address: str | None) -> str:
     if address is None:
         return "the Dask worker of this process has ended"
     return f"the Dask scheduler at {address} has no worker; start one with: dask worker {address}"
-
-
-def _other_versions_text(who: str) -> str:
-    """Say that versions differ."""
-    return (
-        f"{who} and this machine have different versions of boulder-sweep, Python or NumPy; install the same "
-        f"versions everywhere"
-    )
 
 
 def _silenced_loggers() -> dict[str, int]:

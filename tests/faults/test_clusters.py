@@ -17,6 +17,7 @@ from distributed import LocalCluster
 
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
+from boulder_sweep.runner import remote
 from boulder_sweep.runner.computing import Computation
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
@@ -140,17 +141,17 @@ def test_an_adaptive_cluster_starts_workers_for_a_run(tmp_path):
 def test_a_worker_makes_itself_ready_once_and_refuses_other_versions():
     calls = []
     computation = Computation(None, None, {}, lambda: (time.sleep(0.05), calls.append(1)))
-    work = backend._Work("a run", computation, 10, 10, "", 10, backend.fingerprint())
-    threads = [threading.Thread(target=backend._prepare, args=(work,)) for _ in range(4)]
+    work = remote.Work("a run", computation, 10, 10, "", 10, remote.fingerprint())
+    threads = [threading.Thread(target=remote.prepare, args=(work,)) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
     assert len(calls) == 1
-    versions, _, rules = backend.fingerprint()
+    versions, _, rules = remote.fingerprint()
     other = replace(work, name="another", fingerprint=(versions, "0" * 64, rules))
     with pytest.raises(BackendError, match="a worker and this machine have different versions"):
-        backend._prepare(other)
+        remote.prepare(other)
     assert len(calls) == 1
 
 
@@ -169,7 +170,7 @@ def test_the_dashboard_is_named_and_answers(tmp_path):
 
 def test_workers_that_do_not_share_the_folder_send_their_parts(tmp_path, monkeypatch):
     """Their bytes are written here, and are the same."""
-    monkeypatch.setattr(backend, "LOCK_NAME", "a file that no worker sees")
+    monkeypatch.setattr(remote, "LOCK_NAME", "a file that no worker sees")
     rows, how = 3000, {"rows_per_part": 1000, "simulate": plausible}
     summary = run(grid_of(rows), tmp_path / "out", backend="dask", jobs=2, **how)
     assert any("does not share the output folder" in note for note in summary.notes)
