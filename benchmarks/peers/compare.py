@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 import boulder_kernels as bk
+from boulder_kernels.table import simulate_rows
 
 from ..designs import HORIZON, ROTATION_LIMIT
 from ..timing import timed
@@ -21,6 +22,7 @@ KERNEL_STEPS_S = (0.016, 0.014, 0.012, 0.010, 0.008, 0.006, 0.004, 0.002, 0.001)
 LONGEST_S = 20.0
 """A solver that takes longer than this for one tolerance is not tried at a finer one."""
 MODULES = {
+    "c_solver": "a C compiler",
     "scipy_solvers": "scipy",
     "numbalsoda_solvers": "numbalsoda",
     "diffrax_solvers": "diffrax",
@@ -64,13 +66,21 @@ class Measured:
         return best
 
 
-def measure_kernels(problem: Problem) -> Measured:
-    """Measure the lanes of this project; their sample is the whole problem."""
-    measured = Measured("boulder-sweep, lanes", problem.size, in_steps=True)
-    bk.simulate_table(problem.designs, READINGS, bk.Control(0.01, HORIZON, ROTATION_LIMIT, 0, False))
+def measure_kernels(problem: Problem, *, in_lanes: bool = True) -> Measured:
+    """Measure this project in lanes, or by its single impact, one design after the other; on the whole problem."""
+    name = "boulder-sweep, lanes" if in_lanes else "boulder-sweep, single impact, events located"
+    measured = Measured(name, problem.size, in_steps=True)
+    designs = np.stack(problem.designs)
+
+    def simulate(control: bk.Control) -> bk.OutcomeTable:
+        if in_lanes:
+            return bk.simulate_table(problem.designs, READINGS, control)
+        out = simulate_rows(designs, READINGS, control)
+        return bk.OutcomeTable(out[0].astype(np.int8), *out[1:])
+
+    simulate(bk.Control(0.01, HORIZON, ROTATION_LIMIT, 0, False))
     for step in KERNEL_STEPS_S:
-        control = bk.Control(step, HORIZON, ROTATION_LIMIT, 0, False)
-        out, seconds = timed(partial(bk.simulate_table, problem.designs, READINGS, control), 5)
+        out, seconds = timed(partial(simulate, bk.Control(step, HORIZON, ROTATION_LIMIT, 0, False)), 5)
         # If only one of two solutions stops at the limit, the error is the distance of the other to the limit.
         measured.points.append((step, seconds / problem.size, problem.largest_error_deg(out.theta_max)))
     return measured
@@ -95,9 +105,9 @@ def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measured
     enough = 0
     for tolerance in solver.tolerances:
         begun = time.process_time()
-        states = solve(tolerance)
+        found = solve(tolerance)
         seconds = time.process_time() - begun
-        error = own.largest_error_deg(peaks(own, states))
+        error = own.largest_error_deg(found if found.ndim == 1 else peaks(own, found))
         measured.points.append((tolerance, seconds / own.size, error))
         enough = enough + 1 if error <= ACCURACY_DEG else 0
         if enough > finer:
@@ -116,7 +126,7 @@ def measure_all(problem: Problem) -> tuple[list[Measured], list[str]]:
     measured, missing
         The solvers, this project's lanes first; packages that could not be imported, with the reason.
     """
-    measured, missing = [measure_kernels(problem)], []
+    measured, missing = [measure_kernels(problem), measure_kernels(problem, in_lanes=False)], []
     for module, package in MODULES.items():
         try:
             solvers = importlib.import_module(f"benchmarks.peers.{module}").SOLVERS

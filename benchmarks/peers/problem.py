@@ -81,7 +81,7 @@ class Solver:
         Number of designs it gets; slow solvers get fewer.
     prepare
         Returns, for the problem, the function that solves it at a tolerance, compiled if need be. The function
-        returns the states, shape (n, 65, 6).
+        returns the states, shape (n, 65, 6), or the largest rotations [rad], shape (n,).
     tolerances
         Relative tolerances (or steps) to try, the loosest first.
     in_steps
