@@ -56,5 +56,5 @@ def test_open_readings_need_another_depth() -> None:
     assert open_.passes_at != closed.passes_at
     assert depths[0] < open_.passes_at
     assert open_.p_pass >= 0.9
-    with pytest.raises(QuestionError, match="for a probability"):
+    with pytest.raises(QuestionError, match="--open-readings needs --probability"):
         need(site(), open_readings=True)
