@@ -95,6 +95,9 @@ class Cluster:
         try:
             _wait_for_a_worker(client, scheduler)
             _check_versions(client)
+        except TimeoutError as silence:
+            client.close(timeout=2)
+            raise ClusterLostError(f"the connection to the Dask scheduler at {scheduler} was lost") from silence
         except BaseException:
             client.close(timeout=2)
             raise
@@ -340,7 +343,9 @@ def _wait_for_a_worker(client: Any, address: str) -> None:
 def _check_versions(client: Any) -> None:
     """Refuse workers whose rows could differ from those of this machine; one that leaves meanwhile does not matter."""
     here, different = fingerprint(), []
-    for address, there in client.run(fingerprint, on_error="return").items():
+    # What `client.run` does, but for the limit of time: a scheduler may hang just now.
+    found = client.sync(client._run, fingerprint, on_error="return", callback_timeout=CONNECT_S)
+    for address, there in found.items():
         if isinstance(there, Exception):
             if not isinstance(there, OSError):
                 raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")
