@@ -49,8 +49,8 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     from boulder_sweep.views.wording import terms_line
 
     require_matplotlib()
+    source = _of_map(out) if _is_map(Path(out)) else _of_run(out)
     target = checked_kind(picture or beside(place_of(out.removesuffix(".parquet")), ".png"))
-    source = _of_map(out) if Path(out).is_file() else _of_run(out)
     if source.rows_done == 0:
         raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
     settings = source.settings
@@ -75,6 +75,13 @@ class _Source(NamedTuple):
     settings: dict[str, Any]
     rows_done: int
     rows: int
+
+
+def _is_map(out: Path) -> bool:
+    """Whether this may be a file of `sweep boundary`: a Parquet file that is not part of the result of a run."""
+    from boulder_sweep.store.manifest import is_part_name
+
+    return out.suffix == ".parquet" and out.is_file() and not is_part_name(out.name)
 
 
 def _of_run(out: str) -> _Source:

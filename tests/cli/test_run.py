@@ -6,7 +6,7 @@ import shlex
 
 import pytest
 
-from boulder_sweep.cli import console
+from boulder_sweep.cli import progress
 from boulder_sweep.runner.summary import progress_of
 from boulder_sweep.text import duration_text
 
@@ -213,8 +213,8 @@ def test_one_design_is_not_called_designs(sweep, possible_grid):
 
 def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkeypatch):
     times = iter([0.0, 1.0, 11.0, 11.0, 12.0, 30.0, 30.0])
-    monkeypatch.setattr(console.time, "monotonic", lambda: next(times))
-    with console.progress(quiet=False, notes=console.Notes()) as show:
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(times))
+    with progress.progress(quiet=False, notes=progress.Notes()) as show:
         for done in (100, 200, 300, 400):
             show(progress_of(0, done, 1000, done / 50))
     lines = capsys.readouterr().err.splitlines()
