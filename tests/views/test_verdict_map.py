@@ -382,7 +382,8 @@ def test_a_file_of_sweep_boundary_is_drawn_as_the_run_is(named_soils: str, capsy
     boulder_sweep.read(named_soils).to_parquet("other.parquet")
     assert execute(["plot", "other.parquet"]) == 2
     assert "neither the folder of a run nor a file that `sweep boundary` wrote" in capsys.readouterr().err
-    assert execute(["plot", "named.yaml"]) == 2
+    Path("text.parquet").write_text("no table")
+    assert execute(["plot", "text.parquet"]) == 2
     assert "cannot be read as a Parquet file" in capsys.readouterr().err
 
 
