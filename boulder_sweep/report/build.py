@@ -1,8 +1,8 @@
 """Build the kernel of the page: ``python -m boulder_sweep.report.build``.
 
-Numba compiles the entry points to LLVM's intermediate code, llvmlite emits it for WebAssembly, and zig (from PyPI)
-links it with the few functions of the C library that it calls. What is built is kept among the sources and shipped, so
-that users need neither zig nor the time. It carries a hash of everything it came from.
+Numba compiles the entry points to LLVM code, llvmlite compiles that for WebAssembly, and zig (from PyPI) links it with
+the few C library functions that it calls. The result is kept among the sources and shipped, so that users need not
+build it. It carries a hash of its sources.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ PORTABLE = {
     "NUMBA_LOOP_VECTORIZE": "0",
     "NUMBA_SLP_VECTORIZE": "0",
 }
-"""Settings of Numba under which the intermediate code has nothing of this machine's processor in it."""
+"""Numba settings under which the LLVM code does not depend on this machine's processor."""
 MATHEMATICS = {"sqrt", "tan", "atan2", "hypot"}
-"""Functions of the C library that the kernels call."""
+"""C library functions that the kernels call."""
 
 
 COUNTING = re.compile(r"^(define .*@NRT_(?:incref|decref)\(.*)$[\s\S]*?^\}$", re.MULTILINE)
-"""Functions that count references."""
+"""Reference-counting functions."""
 
 
 def sources_hash() -> str:
@@ -48,19 +48,19 @@ def sources_hash() -> str:
 
 
 def stamp_of(module: bytes) -> str:
-    """Return the hash that a built kernel carries; empty where it has none."""
+    """Return the hash in a built kernel; empty if it has none."""
     _, found, behind = module.rpartition(_section(STAMP, b"")[2:])
     return behind[:64].decode() if found else ""
 
 
 def intermediate_code() -> str:
-    """Compile the entry points to LLVM's intermediate code for WebAssembly.
+    """Compile the entry points to LLVM code for WebAssembly.
 
     Raises
     ------
     RuntimeError
-        The code depends on this machine: the compiler was set up before this function could do it, or a structure in
-        memory holds addresses, whose length WebAssembly has otherwise.
+        The code depends on this machine: Numba was imported before it could be configured, or a structure in memory
+        holds addresses, whose length differs in WebAssembly.
     """
     import llvmlite.binding as llvm
     import numba
@@ -68,7 +68,7 @@ def intermediate_code() -> str:
     from boulder_sweep.report import entry_points
 
     if {name: os.environ.get(name) for name in PORTABLE} != PORTABLE:
-        raise RuntimeError("Numba must be set up for any machine before it is imported")
+        raise RuntimeError("Numba must be configured for a generic processor before it is imported")
     modules = []
     for name, arguments in entry_points.EXPORTS.items():
         function = getattr(entry_points, name)
@@ -77,7 +77,7 @@ def intermediate_code() -> str:
         code = compiled.library.get_llvm_str()
         code = re.sub(r"^target triple = .*$", f'target triple = "{TRIPLE}"', code, flags=re.MULTILINE)
         code = re.sub(r"^target datalayout = .*$", f'target datalayout = "{LAYOUT}"', code, flags=re.MULTILINE)
-        # Arrays here are only views of the page's memory: nothing counts their references.
+        # Arrays are only views of the page's memory, so no references need to be counted.
         code = re.sub(
             r"^(define .*@NRT_(?:incref|decref)\(.*)$[\s\S]*?^\}$", r"\1\n ret void\n}", code, flags=re.MULTILINE
         )
@@ -92,7 +92,7 @@ def intermediate_code() -> str:
 
 
 def _keep_only(module: Any, names: Collection[str]) -> None:
-    """Remove from a module all that the named functions do without, and look at what is left.
+    """Remove everything that the named functions do not need from a module, and check the rest.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def _keep_only(module: Any, names: Collection[str]) -> None:
     strange = {name for name in called if not name.startswith("llvm.")} - MATHEMATICS
     structures = [line for line in str(module).splitlines() if re.search(r"alloca [\[{].*\bptr\b", line)]
     if strange or structures:
-        raise RuntimeError(f"this code cannot be had for WebAssembly: it needs {sorted(strange)} and {structures}")
+        raise RuntimeError(f"this code cannot be compiled for WebAssembly: it needs {sorted(strange)} and {structures}")
 
 
 def built() -> bytes:
@@ -145,13 +145,13 @@ def built() -> bytes:
 
 
 def _section(name: str, content: bytes) -> bytes:
-    """Return a section of a WebAssembly module that runtimes pass over; name and content in less than 128 bytes."""
+    """Return a custom section of a WebAssembly module, which runtimes ignore; name and content under 128 bytes."""
     inner = bytes([len(name)]) + name.encode() + content
     return bytes([0, len(inner)]) + inner
 
 
 def main() -> None:
-    """Build the kernel in a process of its own settings and put it in its place."""
+    """Build the kernel in a process with its own settings and put it in place."""
     if any(os.environ.get(name) != value for name, value in PORTABLE.items()):
         with tempfile.TemporaryDirectory() as cache:
             environment = os.environ | PORTABLE | {"BOULDER_SWEEP_CACHE_DIR": cache}

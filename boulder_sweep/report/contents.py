@@ -87,7 +87,7 @@ def page_data(
         "finer": [
             {"h": finer.h, "locate_yield": float(finer.locate_yield)}
             for finer in finer_controls(control._replace(elements=0))
-            if not finer.patient
+            if not finer.last_resort
         ],
         "parts": list(PARTS),
         "colours": COLOURS,

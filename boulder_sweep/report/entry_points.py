@@ -1,8 +1,8 @@
 """What the page calls: the kernels behind two functions over pointers to doubles.
 
-WebAssembly knows no NamedTuple, so designs and settings come as plain numbers in a fixed order, and this module alone
-knows it. `outcomes` does the work of ``sweep run``, one design after the other in place of lanes, and `history` that of
-``sweep simulate``.
+WebAssembly has no named tuples, so designs and settings are passed as plain numbers in a fixed order, which only this
+module knows. `outcomes` does the work of ``sweep run``, one design after another instead of in lanes, and `history`
+that of ``sweep simulate``.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
 DESIGN = Design._fields
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
 SETTINGS = (*Readings._fields, *Control._fields)
-"""How it is simulated, in this order; a truth is 0 or 1."""
+"""Settings of the simulation, in this order; booleans are 0 or 1."""
 SETTINGS_COUNT = len(SETTINGS)
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
@@ -47,7 +47,7 @@ HISTORY = (
 )
 """Columns of a time history, in this order; m, rad, N, J. The parts of the energy as in `EnergyLedger`."""
 ENERGY = HISTORY.index("vehicle_kinetic")
-"""Place of the first part of the energy."""
+"""Index of the first energy."""
 _DOUBLES = types.CPointer(types.float64)
 EXPORTS = {
     "outcomes": (_DOUBLES, types.int32, _DOUBLES, _DOUBLES, _DOUBLES),
@@ -58,13 +58,13 @@ EXPORTS = {
 
 @inlined
 def readings_from(s: np.ndarray) -> Readings:
-    """Return the readings, which stand first among the settings."""
+    """Return the readings, the first of the settings."""
     return Readings(s[0] > 0.0, s[1] > 0.0, s[2] > 0.0, s[3] > 0.0, s[4] > 0.0)
 
 
 @inlined
 def control_from(s: np.ndarray, halved: bool) -> Control:
-    """Return the control, which stands behind them, its step halved or not."""
+    """Return the control, which follows the readings, with its step or half of it."""
     return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved, s[13], False)
 
 
@@ -82,7 +82,7 @@ def outcomes_from(t: np.ndarray) -> OutcomeTable:
 
 @array_kernel
 def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at: Any) -> None:
-    """Simulate n designs, and estimate their errors where the settings say so.
+    """Simulate n designs, and estimate their errors if the settings ask for it.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at:
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
     estimate_errors(coarse, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)
     for row in range(n):
-        # A simulation that goes on beyond the limit does not tell by its status that it got there.
+        # The status of a simulation that continues beyond the limit does not say that it reached it.
         if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
             fine.theta_error[row] = fine.x_error[row] = np.inf
 
@@ -181,7 +181,7 @@ def history(
             break
         mode = modes_of(y, record.turning[i], record.touching[i], c)
         rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(mode, readings, c), c)
-        # Printed separation: the spring goes on pulling the truck after release, so it holds energy all along.
+        # Printed separation: the spring keeps pulling the truck after release, so it always holds energy.
         pulls = mode.touching or not readings.separation_released
         stored = stored_energies(y, design.m_v, pulls, readings.restoring_gravity, c)
         drag, damper, restoring, pull = (

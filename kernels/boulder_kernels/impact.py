@@ -66,9 +66,9 @@ class Control(NamedTuple):
     longest_horizon: float = 0.0
     """Simulated time [s] up to which a design goes on that reaches the horizon without proof that it stays below its
     limits; not beyond the horizon where it is shorter, or where nothing stops at the limit."""
-    patient: bool = False
+    last_resort: bool = False
     """Whether a design that needs more steps than are allowed is simulated all the same, see
-    `boulder_kernels.patience`."""
+    `boulder_kernels.last_resort`."""
 
 
 class Record(NamedTuple):
@@ -219,7 +219,7 @@ def simulate_by_steps(
 ) -> Outcome:
     """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate_design`."""
     ending = ending_of(control, readings, h_apart)
-    budget = float(MOST_STEPS) if control.patient else attempt_budget(h_apart, ending.longest)
+    budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
     h_full = h_touching
     y, modes = initial_state(c), initial_modes(readings, c)
     switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)

@@ -8,8 +8,8 @@ from ._jit import array_kernel, kernel
 from .design import DesignTable, design_in
 from .impact import Control, no_record, simulate_design
 from .lanes import simulate_lanes
+from .last_resort import simulate_last_resort
 from .outcomes import OutcomeTable, Status, empty_outcomes, write_outcome
-from .patience import simulate_patiently
 from .readings import Readings
 
 SAFETY = 3.0
@@ -32,19 +32,19 @@ def simulate_rows(designs: np.ndarray, readings: Readings, control: Control) -> 
 
 
 @array_kernel
-def simulate_rows_patiently(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
-    """The same for designs that need more steps than are allowed, see `boulder_kernels.patience`."""
+def simulate_rows_last_resort(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
+    """The same for designs that need more steps than are allowed, see `boulder_kernels.last_resort`."""
     out = empty_outcomes(designs.shape[1])
     for row in range(designs.shape[1]):
-        write_outcome(out, row, simulate_patiently(design_in(designs, row), readings, control, no_record()))
+        write_outcome(out, row, simulate_last_resort(design_in(designs, row), readings, control, no_record()))
     return out
 
 
 def simulate_once(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate every design of a table once: in lanes where they can be, else one by one."""
     simulate = simulate_lanes if control.elements == 0 and control.stop_at_limit else simulate_rows
-    if control.patient:
-        simulate = simulate_rows_patiently
+    if control.last_resort:
+        simulate = simulate_rows_last_resort
     out = simulate(np.stack(table), readings, control)
     return OutcomeTable(out[0].astype(np.int8), *out[1:])
 

@@ -212,10 +212,10 @@ def test_one_design_is_not_called_designs(sweep, possible_grid):
 
 
 def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkeypatch):
-    now = 0.0
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    clock = {"now": 0.0}
+    monkeypatch.setattr(progress.time, "monotonic", lambda: clock["now"])
     with progress.progress(quiet=False, notes=progress.Notes()) as show:
-        for now, done in ((1.0, 100), (11.0, 200), (12.0, 300), (30.0, 400)):
+        for clock["now"], done in ((1.0, 100), (11.0, 200), (12.0, 300), (30.0, 400)):
             show(progress_of(0, done, 1000, done / 50))
     lines = capsys.readouterr().err.splitlines()
     assert lines == [

@@ -12,7 +12,7 @@ from boulder_sweep.columns import OUTCOME_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.evaluation import Evaluation, by_kernels
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.refinement import MOST_STEPS, PATIENT_STEPS, finer_controls, reported_step_s
+from boulder_sweep.judge.refinement import LAST_RESORT_STEPS, MOST_STEPS, finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import Limits
 from tests.judge.plain import plain_designs
 
@@ -29,13 +29,13 @@ def test_steps_get_shorter_down_to_the_budget() -> None:
     steps = [control.h for control in finer]
     assert steps == sorted(steps, reverse=True)
     assert steps[-1] == pytest.approx(CONTROL.horizon / MOST_STEPS)
-    assert all(control.locate_yield and not control.patient for control in finer)
-    assert last.patient
-    assert last.h == CONTROL.horizon / PATIENT_STEPS
+    assert all(control.locate_yield and not control.last_resort for control in finer)
+    assert last.last_resort
+    assert last.h == CONTROL.horizon / LAST_RESORT_STEPS
     assert list(finer_controls(CONTROL._replace(h=1e-6))) == [last._replace(h=1e-6)]
     sums = list(finer_controls(CONTROL._replace(elements=5000)))
     assert len(sums) < len(steps)
-    assert not any(control.patient for control in sums)
+    assert not any(control.last_resort for control in sums)
 
 
 def test_a_design_that_is_too_stiff_for_its_steps_is_decided_by_finer_ones() -> None:

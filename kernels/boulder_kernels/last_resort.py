@@ -53,7 +53,7 @@ def longest_step(theta_limit: float, c: Constants) -> float:
 
 
 @kernel
-def simulate_patiently(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
+def simulate_last_resort(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
 
     Parameters

@@ -17,11 +17,11 @@ from .samples import design_of, inputs_of, same_bits, table_of
 
 CORRECTED = bk.corrected()
 LIMIT = float(np.radians(20.0))
-PATIENT = Control(5e-4, 1.0, LIMIT, 0, True, locate_yield=True, patient=True)
+LAST_RESORT = Control(5e-4, 1.0, LIMIT, 0, True, locate_yield=True, last_resort=True)
 WALL = design_of(oracle.RWG)._replace(rho_b=1e10)
 
 
-def simulated(design: Design, control: Control = PATIENT) -> bk.OutcomeTable:
+def simulated(design: Design, control: Control = LAST_RESORT) -> bk.OutcomeTable:
     return bk.simulate_table(table_of([design]), CORRECTED, control)
 
 
@@ -29,7 +29,7 @@ def simulated(design: Design, control: Control = PATIENT) -> bk.OutcomeTable:
 def test_a_spring_that_relaxes_at_once_leaves_the_damper(k_v: float) -> None:
     """Against a boulder that does not move: m_v x_v'' = -c_v x_v'."""
     design = WALL._replace(k_v=k_v, c_v=2e4)
-    assert simulated(design, PATIENT._replace(patient=False)).status[0] == Status.WEAK_DAMPER
+    assert simulated(design, LAST_RESORT._replace(last_resort=False)).status[0] == Status.WEAK_DAMPER
     found = simulated(design)
     tau = design.m_v / design.c_v
     assert found.x_v_max[0] == pytest.approx(design.v_0 * tau * (1.0 - exp(-1.0 / tau)), rel=2e-3)
@@ -41,7 +41,7 @@ def test_a_stiff_spring_throws_a_light_truck_back() -> None:
     """A blow of microseconds, half an oscillation; then the truck coasts."""
     design = WALL._replace(m_v=1e-3, k_v=1e10, c_v=1e12)
     found = simulated(design)
-    assert simulated(design, PATIENT._replace(patient=False)).status[0] == Status.STIFF_VEHICLE
+    assert simulated(design, LAST_RESORT._replace(last_resort=False)).status[0] == Status.STIFF_VEHICLE
     assert found.x_v_max[0] == pytest.approx(design.v_0 * sqrt(design.m_v / design.k_v), rel=1e-4)
     assert found.F_v_max[0] == pytest.approx(design.v_0 * sqrt(design.k_v * design.m_v), rel=1e-4)
     assert pi * sqrt(design.m_v / design.k_v) < 1e-6
@@ -49,17 +49,17 @@ def test_a_stiff_spring_throws_a_light_truck_back() -> None:
 
 def test_what_the_steps_do_not_suffice_for_keeps_its_refusal() -> None:
     hard = design_of(oracle.RWG)._replace(beta=1e9, rho_b=1e-3, rho_s=1e-3, L=0.1)
-    for patient in (False, True):
-        found = simulated(hard, PATIENT._replace(patient=patient, error_estimate=False))
+    for last_resort in (False, True):
+        found = simulated(hard, LAST_RESORT._replace(last_resort=last_resort, error_estimate=False))
         assert found.status[0] == Status.STIFF_SOIL
         assert np.isnan(found.theta_max[0])
 
 
 def test_a_design_that_is_not_refused_is_simulated_as_ever() -> None:
     table = table_of([design_of(oracle.RWG), design_of(oracle.ABG)])
-    once = bk.simulate_table(table, CORRECTED, PATIENT._replace(patient=False))
-    for patient, plain in zip(bk.simulate_table(table, CORRECTED, PATIENT), once, strict=True):
-        assert same_bits(patient, plain) or np.allclose(patient, plain, rtol=1e-12, equal_nan=True)
+    once = bk.simulate_table(table, CORRECTED, LAST_RESORT._replace(last_resort=False))
+    for again, plain in zip(bk.simulate_table(table, CORRECTED, LAST_RESORT), once, strict=True):
+        assert same_bits(again, plain) or np.allclose(again, plain, rtol=1e-12, equal_nan=True)
 
 
 IMPLICIT = (422, 312, 571, 1344, 1719, 2093, 2646, 3275, 3575, 75, 2141, 2751, 3480)
@@ -73,7 +73,7 @@ def test_the_same_as_an_implicit_integrator() -> None:
     for row in IMPLICIT:
         design = design_at(designs, row)
         found = simulated(design)
-        assert simulated(design, PATIENT._replace(patient=False)).status[0] > Status.INVALID, row
+        assert simulated(design, LAST_RESORT._replace(last_resort=False)).status[0] > Status.INVALID, row
         known = oracle.simulate(
             inputs_of(design),
             oracle.CORRECTED,
