@@ -205,6 +205,8 @@ def need(
     sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings else [sweep]
     asked = [_question(one, key, between, judges_of(one, least_margin), probability, seed, variants) for one in sweeps]
     asked[0].judges.own.warm_up()
+    if told is not None:
+        told(0, asked[0].count)
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
     tables, simulated, done = [], 0, 0
     with pool(jobs, backend, scheduler) as workers:

@@ -134,6 +134,8 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None)
     sweep.require_values()
     judges = judges_of(sweep)
     judges.own.warm_up()
+    if told is not None:
+        told(0, sweep.n_designs)
     tables, done = [], 0
     pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
     for table in threads(jobs)(joblib.delayed(_table)(sweep, judges, start, stop) for start, stop in pieces):

@@ -171,6 +171,8 @@ def uncertainty(
         raise QuestionError(f"--rare takes up to {MOST_INDEXED} designs; this file has {sweep.n_designs:,}")
     asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most, rare)
     asked.judges.own.warm_up()
+    if told is not None:
+        told(0, sweep.n_designs)
     points = Points(len(asked.spread.names), seed)
     tables, done = [], 0
     few = sweep.n_designs <= MOST_INDEXED

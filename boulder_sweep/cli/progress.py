@@ -56,7 +56,9 @@ def _remembered(kernels: Kernels) -> Path:
 def working(
     quiet: bool, kernels: Kernels | None = "table", doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[int, int], None] | None]:
-    """Give a function that shows how many of how many are done; None where nothing is to be shown.
+    """Give a function that shows how many of how many are done, called with 0 once the kernels are compiled.
+
+    It is None where nothing is to be shown.
 
     Parameters
     ----------
@@ -76,7 +78,13 @@ def working(
         begun = time.monotonic()
 
         def told(done: int, total: int) -> None:
-            seconds = max(time.monotonic() - begun, 1e-9)
+            nonlocal begun
+            now = time.monotonic()
+            if done == 0:  # what went before was compiling, and does not count as simulation
+                begun = now
+                if not sys.stderr.isatty():
+                    return
+            seconds = max(now - begun, 1e-9)
             left = seconds / done * (total - done) if done else None
             shown(Progress(done, total, seconds, done / seconds, left))
 
@@ -88,6 +96,8 @@ def progress(
     quiet: bool, notes: Notes, kernels: Kernels | None = "table", doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[Progress], None] | None]:
     """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere.
+
+    Nothing is compiled here: commands refuse what they must before they compile, and act on signals while they do.
 
     Parameters
     ----------
@@ -103,27 +113,18 @@ def progress(
         return
     cold, begun = cold_start(kernels), time.monotonic()
     if sys.stderr.isatty():
-        with _bar(notes, cold, doing) as (task, show):
-            _compile(kernels, cold)
-            task(doing)
+        with _bar(notes, cold, doing) as show:
             yield show
     else:
         if cold:
             say(cold)
-        _compile(kernels, cold)
         yield _PlainLines(notes, of)
-    if cold and kernels == "design":
-        _remember(kernels, time.monotonic() - begun)
+    if cold and kernels is not None:
+        from boulder_sweep.judge.evaluation import warm_up_s
 
-
-def _compile(kernels: Kernels | None, cold: str | None) -> None:
-    """Compile the kernels for tables, so that their time does not count as simulation; the others are soon compiled."""
-    if cold and kernels == "table":
-        from boulder_sweep.judge.evaluation import compile_kernels
-
-        begun = time.monotonic()
-        compile_kernels()
-        _remember(kernels, time.monotonic() - begun)
+        seconds = time.monotonic() - begun if kernels == "design" else warm_up_s()
+        if seconds is not None:
+            _remember(kernels, seconds)
 
 
 def _remember(kernels: Kernels, seconds: float) -> None:
@@ -165,10 +166,8 @@ class _PlainLines:
 
 
 @contextmanager
-def _bar(
-    notes: Notes, cold: str | None, doing: str
-) -> Iterator[tuple[Callable[[str], None], Callable[[Progress], None]]]:
-    """Show a bar; give what changes the words beside it, and what shows progress."""
+def _bar(notes: Notes, cold: str | None, doing: str) -> Iterator[Callable[[Progress], None]]:
+    """Show a bar; give the function that shows progress."""
     # rich is for terminals only. It honours NO_COLOR by itself.
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
@@ -184,6 +183,6 @@ def _bar(
                 bars.console.print(f"note: {printable(note)}", markup=False, highlight=False)
             left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
             numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
-            bars.update(task, total=now.rows, completed=now.rows_done, numbers=numbers)
+            bars.update(task, description=doing, total=now.rows, completed=now.rows_done, numbers=numbers)
 
-        yield lambda words: bars.update(task, description=words), show
+        yield show

@@ -7,13 +7,14 @@ that cannot be computed are not simulated; they come back with their reason.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, corrected, simulate_table
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
@@ -132,7 +133,9 @@ class Evaluation:
 
     def warm_up(self) -> None:
         """Load or compile the kernels by simulating one step of a plain design."""
+        begun = time.monotonic()
         self.simulate(PLAIN_DESIGN.table, self.readings, self.control._replace(horizon=self.control.h))
+        _warm_ups_s.append(time.monotonic() - begun)
 
 
 PLAIN_DESIGN = Designs(
@@ -156,12 +159,12 @@ PLAIN_DESIGN = Designs(
     bed_offset=np.array([2.9]),
 )
 """One usual design."""
+_warm_ups_s: list[float] = []
 
 
-def compile_kernels() -> None:
-    """Compile the kernels that simulate tables, or load their compiled code, by one step of a plain design."""
-    control = Control(h=0.01, horizon=0.01, theta_limit=math.radians(20.0), elements=0, error_estimate=False)
-    by_kernels(PLAIN_DESIGN.table, corrected(), control)
+def warm_up_s() -> float | None:
+    """Return how long the last warm-up of this process took [s]; None where there was none."""
+    return _warm_ups_s[-1] if _warm_ups_s else None
 
 
 def evaluation_of(

@@ -20,9 +20,8 @@ from boulder_kernels import OutcomeTable, Readings, as_printed, corrected
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import NothingToMeasureError
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps
-from boulder_sweep.judge.evaluation import control_of, readings_of
+from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.pilot import sampled_designs
-from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import pool
 from boulder_sweep.tradeoff.points import Method, Point, mark_front
@@ -213,8 +212,9 @@ def measure(
             f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
             "the table of a run says why"
         )
-    limits = limits_of(sweep, proved=False)
-    control = control_of(sweep, Accuracy("", Steps(REFERENCE_STEP_S), error_estimate=False))
+    evaluation = evaluation_of(sweep, Accuracy("", Steps(REFERENCE_STEP_S), error_estimate=False), proved=False)
+    limits, control = evaluation.limits, evaluation.control
+    evaluation.warm_up()
     presets = {"corrected": corrected(), "as_printed": as_printed()}
     if sweep.model.preset not in presets:
         presets = {sweep.model.preset: readings_of(sweep), **presets}

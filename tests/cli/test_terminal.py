@@ -52,7 +52,7 @@ def test_a_cold_start_shows_a_bar_with_what_it_waits_for(possible_grid, tmp_path
     code = (
         "import sys, time; from boulder_sweep.cli import main, progress; import boulder_sweep.judge.evaluation as e;"
         "progress.cold_start = lambda kernels: 'compiling kernels, once on this machine, about 2 s';"
-        "e.compile_kernels = lambda: time.sleep(1.0); progress._remember = lambda *_: None;"
+        "e.Evaluation.warm_up = lambda self: time.sleep(1.0); progress._remember = lambda *_: None;"
         "main.main(sys.argv[1:])"
     )
     ended, _, shown = _on_a_terminal(["run", "grid.yaml", *GRID_OF_THOUSANDS], command=[sys.executable, "-c", code])

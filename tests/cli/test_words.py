@@ -9,7 +9,8 @@ import boulder_sweep
 from boulder_sweep import simulate
 from boulder_sweep.cli import progress
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.judge.evaluation import compile_kernels
+from boulder_sweep.judge.accuracy import Accuracy, Steps
+from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 
 
 def test_explain_tells_what_decided_and_how_near(sweep, possible_grid):
@@ -57,6 +58,16 @@ def test_every_command_that_compiles_says_so_first(sweep, words, monkeypatch, tm
     assert list(remembered) == ["design" if words[0] == "simulate" else "table"]
 
 
+@pytest.mark.parametrize(
+    "words", [("need", SITE, "--least", "phi"), ("uncertainty", SITE), ("boundary", SITE, "--set", "soil.density=1 lb")]
+)
+def test_a_wrong_question_is_refused_before_anything_is_compiled(sweep, words, monkeypatch):
+    compiled = []
+    monkeypatch.setattr(Evaluation, "warm_up", compiled.append)
+    assert sweep(*words)[0] == 2
+    assert not compiled
+
+
 def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatch, tmp_path):
     folder = tmp_path / "kernels-1"
     folder.mkdir()
@@ -71,7 +82,7 @@ def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatc
 
 
 def test_compiled_kernels_are_those_that_are_looked_for():
-    compile_kernels()
+    evaluation_of(crash_test("rwg"), Accuracy("", Steps(0.01), error_estimate=False)).warm_up()
     simulate(crash_test("rwg"))
     assert progress.cold_start("table") is None
     assert progress.cold_start("design") is None
