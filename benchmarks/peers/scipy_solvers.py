@@ -29,7 +29,7 @@ class PaperForces:
 
     def __init__(self, c: Constants, designs: DesignTable, row: int) -> None:
         design = design_at(designs, row)
-        alpha = element_depth(np.arange(1, c.elements + 1), c.d, c.elements)
+        alpha = np.array([element_depth(i, c.d, c.elements) for i in range(1, c.elements + 1)])
         d_n = alpha - c.z_0
         self.c = c
         self.R = np.hypot(c.l_n, d_n)
