@@ -16,6 +16,7 @@ from boulder_sweep.cli.output import say, show
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
+    from boulder_sweep.tradeoff.points import Method
     from boulder_sweep.tradeoff.study import Tradeoff
 
 EXAMPLES = """\b
@@ -88,8 +89,9 @@ def tradeoff(
         _show(found)
     for sentence in found.recommendation():
         show(*textwrap.wrap(sentence, 80))
-    for method in found.left_out:
-        show(f"left out for time: {method.readings}, {method.soil}, {method.steps}")
+    if found.left_out:
+        ways = len(found.points) + len(found.left_out)
+        show(f"left out for time: {len(found.left_out)} of {ways} methods (--json lists them)")
     for file in files:
         show(f"written  {file}")
     return 0
@@ -120,13 +122,13 @@ def _table(found: Tradeoff, *, whole: bool) -> RichTable:
     from rich.table import Table as RichTable
 
     table = RichTable(box=SIMPLE if whole else None, title=None, pad_edge=False, padding=(0, 2 if whole else 1, 0, 0))
-    for name in ("readings", "soil", "step") if whole else ("readings\nand soil", "step"):
+    for name in ("readings", "soil", "step") if whole else ("readings\nand soil", "step\n[ms]"):
         table.add_column(name, no_wrap=True)
     heads = ["us per\ndesign", "rotation\nrms [deg]", "\n99 %", "\nmax", "movement\nrms [mm]", "\n99 %", "\nmax"]
     heads += ["error\ncovered", "verdicts\nflipped", "un-\ndecided", "of\ndesigns"]
     shown = range(len(heads)) if whole else (0, 2, 3, 5, 7, 8)
     if not whole:
-        heads[2], heads[3], heads[5] = "rotation\n99 % [deg]", "\nmax", "movement\n99 % [mm]"
+        heads[2], heads[5], heads[8] = "rotation\n99 % [deg]", "movement\n99 % [mm]", "\nflips"
     for k in shown:
         table.add_column(heads[k], justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
@@ -151,6 +153,12 @@ def _table(found: Tradeoff, *, whole: bool) -> RichTable:
             f"{point.designs:,}",
         ]
         last = point.accuracy + (" *" if point.pareto else "")
-        steps = method.steps if whole else method.steps.replace(", yield located", " y")
+        steps = method.steps if whole else _short(method)
         table.add_row(*words, steps, *(cells[k] for k in shown), last)
     return table
+
+
+def _short(method: Method) -> str:
+    """Steps of a method in a narrow column [ms]."""
+    steps = f"{method.step_ms:g}+{0.5 * method.step_ms:g}" if method.error_estimate else f"{method.step_ms:g}"
+    return f"{steps} y" if method.locate_yield else steps

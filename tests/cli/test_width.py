@@ -27,7 +27,7 @@ WORDS = {
     "export": ("site.sweep", "-o", "site.csv"),
     "compare": ("site.sweep", "other.sweep"),
     "explain": ("site.sweep", "11"),
-    "tradeoff": (SITE, "--designs", "8", "--seconds", "0.5"),
+    "tradeoff": (SITE, "--designs", "8", "--seconds", "1e9"),
     "validate": (),
     "fit-vehicle": ("pulse.csv", "--mass", "6800 kg"),
 }
@@ -54,6 +54,7 @@ def narrow(folder, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("webbrowser.open", lambda _: True)
+    monkeypatch.setattr("boulder_sweep.tradeoff.sample._SHORTEST_TIMING_S", 1e-9)  # the width is the same
     monkeypatch.setattr("boulder_sweep.cli.output._columns", lambda: 80)  # as if stderr were a terminal
 
 
