@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from ._jit import exact_kernel, function_of
+from ._jit import exact_inlined, exact_kernel, function_of
 from .readings import Readings
 
 G = 9.80665
@@ -261,27 +261,23 @@ def yield_displacement(design: Design) -> float:
     return per_depth / spring_per_depth(design)
 
 
-@exact_kernel
-def constants_of(design: Design, readings: Readings, elements: int) -> Constants:
-    """Constants of the motion of one design (Eqs 1-16, 24-28).
+@exact_inlined
+def constants_with(
+    design: Design, readings: Readings, elements: int, soil: SoilMass, K_soil: float, R_soil: float, x_yield: float
+) -> Constants:
+    """Constants of the motion of one design in a soil of which mass, spring, drag and yield are known.
 
     Parameters
     ----------
-    design
-        The design, SI.
-    readings
-        Which formulas are read as printed.
-    elements
-        Number N of soil elements, or 0 for the closed form.
-
-    Returns
-    -------
-    Constants
-        Non-finite or non-positive where the design is impossible: see `is_computable`.
+    design, readings, elements
+        As of `constants_of`.
+    soil
+        The soil lumped on the boulder.
+    K_soil, R_soil, x_yield
+        As of `Constants`.
     """
     d = design.d
     m_b = boulder_mass(design)
-    soil = soil_mass(design, elements)
     m_eff = m_b + soil.mass
     c_x = (soil.mass * design.L + m_b * 0.5 * design.L) / m_eff
     c_y = (soil.first + m_b * 0.5 * design.H) / m_eff
@@ -310,9 +306,9 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
         z_0,
         d,
         elements,
-        spring_per_depth(design) * d * d,
-        design.rho_s * design.W * d,
-        yield_displacement(design),
+        K_soil,
+        R_soil,
+        x_yield,
         h,
         c_x if readings.contact_left_face else -c_x,
         design.k_v,
@@ -323,6 +319,36 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
         C_sin,
         d_N,
         theta_corner,
+    )
+
+
+@exact_kernel
+def constants_of(design: Design, readings: Readings, elements: int) -> Constants:
+    """Constants of the motion of one design (Eqs 1-16, 24-28).
+
+    Parameters
+    ----------
+    design
+        The design, SI.
+    readings
+        Which formulas are read as printed.
+    elements
+        Number N of soil elements, or 0 for the closed form.
+
+    Returns
+    -------
+    Constants
+        Non-finite or non-positive where the design is impossible: see `is_computable`.
+    """
+    d = design.d
+    return constants_with(
+        design,
+        readings,
+        elements,
+        soil_mass(design, elements),
+        spring_per_depth(design) * d * d,
+        design.rho_s * design.W * d,
+        yield_displacement(design),
     )
 
 

@@ -193,7 +193,12 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     """
     if design.H - design.d <= design.e_bumper:
         return failed(Status.NO_CONTACT.value)
-    c = constants_of(design, readings, control.elements)
+    return simulate_with(constants_of(design, readings, control.elements), readings, control, record)
+
+
+@kernel
+def simulate_with(c: Constants, readings: Readings, control: Control, record: Record) -> Outcome:
+    """Simulate one impact of known constants; see `simulate_design`, which also asks whether the truck hits at all."""
     if not is_computable(c):
         return failed(Status.INVALID.value)
     theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN

@@ -19,10 +19,14 @@ points along the depth, and the drag one.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba.extending import overload
 
 from ._jit import inlined, kernel, summing_kernel
 from .design import Constants
+from .layered import LayeredConstants, SoilElements
 
 TINY = 1e-30
 """Stands in for a slope of zero, so that a break point at infinity is clamped and not 0/0."""
@@ -156,12 +160,33 @@ def closed_form(k: Kinematics, c: Constants) -> Reaction:
     return Reaction(-pressed, k.lever_d * pressed_r + k.q * pressed)
 
 
+@summing_kernel
+def reaction_of_elements(k: Kinematics, soil: SoilElements) -> Reaction:
+    """Sum force and moment over elements with values of their own (Eqs 19-21, 26, 28, 36)."""
+    F = M = 0.0
+    for n in range(soil.ratio.size):
+        ratio = soil.ratio[n]
+        spring = soil.stiffness[n] * (k.A - k.slope_x * ratio)
+        v = k.B - k.slope_v * ratio
+        pressed = min(max(spring, -soil.ultimate[n]), soil.ultimate[n]) + soil.drag[n] * v * abs(v)
+        F -= pressed
+        M += pressed * (k.lever_d * ratio + k.q)
+    return Reaction(F, M)
+
+
 @inlined
-def soil_reaction(k: Kinematics, c: Constants) -> Reaction:
-    """Force and moment of the soil: element sums where the design asks for N, else the closed form."""
+def uniform_reaction(k: Kinematics, c: Constants) -> Reaction:
+    """Force and moment of a uniform soil: element sums where the design asks for N, else the closed form."""
     if c.elements > 0:
         return element_sums(k, c)
     return closed_form(k, c)
+
+
+def soil_reaction(k: Kinematics, c: Any) -> Reaction:
+    """Force and moment of the soil that the constants describe, see `LayeredConstants`."""
+    if isinstance(c, LayeredConstants):
+        return reaction_of_elements(k, c.soil)
+    return uniform_reaction(k, c)
 
 
 class Potential(NamedTuple):
@@ -223,23 +248,49 @@ def summed_potential(A: float, slope_x: float, c: Constants) -> Potential:
     return Potential(share * V, share * V_A, share * V_X)
 
 
+@kernel
+def potential_of_elements(A: float, slope_x: float, soil: SoilElements) -> Potential:
+    """Elastic energy of elements with values of their own, as convex as that of each; see `closed_potential`."""
+    V = V_A = V_X = 0.0
+    for n in range(soil.ratio.size):
+        ratio = soil.ratio[n]
+        displacement = A - slope_x * ratio
+        stiffness, ultimate = soil.stiffness[n], soil.ultimate[n]
+        over = max(abs(displacement) - ultimate / stiffness, 0.0)
+        pressed = min(max(stiffness * displacement, -ultimate), ultimate)
+        V += 0.5 * stiffness * (displacement * displacement - over * over)
+        V_A += pressed
+        V_X -= ratio * pressed
+    return Potential(V, V_A, V_X)
+
+
 @inlined
-def soil_potential(A: float, slope_x: float, c: Constants) -> Potential:
-    """Elastic energy of the soil by the same representation as the forces, a convex function of both displacements."""
+def uniform_potential(A: float, slope_x: float, c: Constants) -> Potential:
+    """Elastic energy of a uniform soil by the same representation as the forces."""
     if c.elements > 0:
         return summed_potential(A, slope_x, c)
     return closed_potential(A, slope_x, c)
 
 
-@kernel
-def soil_energy(k: Kinematics, c: Constants) -> float:
-    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces."""
-    return soil_potential(k.A, k.slope_x, c).V
+def soil_potential(A: float, slope_x: float, c: Any) -> Potential:
+    """Elastic energy of the soil by the same representation as the forces, a convex function of both displacements."""
+    if isinstance(c, LayeredConstants):
+        return potential_of_elements(A, slope_x, c.soil)
+    return uniform_potential(A, slope_x, c)
 
 
 @kernel
-def drag_power(k: Kinematics, c: Constants) -> float:
-    """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
+def power_of_elements(k: Kinematics, soil: SoilElements) -> float:
+    """Power that the drag of elements with values of their own takes out of the motion [W]."""
+    total = 0.0
+    for n in range(soil.ratio.size):
+        total += soil.drag[n] * abs(k.B - k.slope_v * soil.ratio[n]) ** 3
+    return total
+
+
+@kernel
+def uniform_drag_power(k: Kinematics, c: Constants) -> float:
+    """Power that the drag of a uniform soil takes out of the motion [W] (Eqs 34-36)."""
     if c.elements > 0:
         h_e = c.d / c.elements
         total = 0.0
@@ -252,3 +303,40 @@ def drag_power(k: Kinematics, c: Constants) -> float:
     if k.B * (k.B - k.slope_v) >= 0.0:
         return c.R_soil * 0.25 * (top + base) * (top * top + base * base)
     return c.R_soil * 0.25 * (top**4 + base**4) / (top + base)
+
+
+def drag_power(k: Kinematics, c: Any) -> float:
+    """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
+    if isinstance(c, LayeredConstants):
+        return power_of_elements(k, c.soil)
+    return uniform_drag_power(k, c)
+
+
+# Inside kernels the three are chosen when they are compiled, by the type of the constants.
+
+
+@overload(soil_reaction, inline="always", strict=False)
+def _soil_reaction(k: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is LayeredConstants:
+        return lambda k, c: reaction_of_elements(k, c.soil)
+    return lambda k, c: uniform_reaction(k, c)
+
+
+@overload(soil_potential, inline="always", strict=False)
+def _soil_potential(A: Any, slope_x: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is LayeredConstants:
+        return lambda A, slope_x, c: potential_of_elements(A, slope_x, c.soil)
+    return lambda A, slope_x, c: uniform_potential(A, slope_x, c)
+
+
+@overload(drag_power, inline="always", strict=False)
+def _drag_power(k: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is LayeredConstants:
+        return lambda k, c: power_of_elements(k, c.soil)
+    return lambda k, c: uniform_drag_power(k, c)
+
+
+@kernel
+def soil_energy(k: Kinematics, c: Constants) -> float:
+    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces."""
+    return soil_potential(k.A, k.slope_x, c).V
