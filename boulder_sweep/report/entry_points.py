@@ -101,7 +101,7 @@ def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at:
     readings, estimated = readings_from(s), s[9] > 0.0
     designs, finer, coarser = carray(designs_at, (15, n)), carray(fine_at, (10, n)), carray(coarse_at, (10, n))
     nothing = carray(coarse_at, (0,))
-    record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)))
+    record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
     for row in range(n):
         design = design_in(designs, row)
         finer[:, row] = np.nan
@@ -161,7 +161,8 @@ def history(
     readings, control = readings_from(s), control_from(s, s[9] > 0.0)
     design = design_in(carray(design_from, (15, 1)), 0)
     out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
-    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], carray(exchanged_at, (n, 4)))
+    exchanged, nothing = carray(exchanged_at, (n, 4)), carray(exchanged_at, (0,))
+    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, nothing)
     out[:] = np.nan
     record.states[:] = np.nan
     simulate_design(design, readings, control, record)

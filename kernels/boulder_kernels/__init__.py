@@ -10,6 +10,7 @@ from .design import Constants, Design, DesignTable, constants_of
 from .impact import Control, Record, no_record, simulate_design
 from .outcomes import SIMULATED, Maxima, Outcome, OutcomeTable, Status
 from .readings import Readings, as_printed, corrected
+from .second_spring import SecondSpring, SecondSprings
 from .table import simulate_table
 
 __all__ = [
@@ -23,6 +24,8 @@ __all__ = [
     "OutcomeTable",
     "Readings",
     "Record",
+    "SecondSpring",
+    "SecondSprings",
     "Status",
     "as_printed",
     "constants_of",

@@ -19,6 +19,7 @@ from .after_step import (
     initial_state,
     is_finite,
     keep_step,
+    kept_up_to,
     passed_maxima,
     passes,
     rate_of,
@@ -31,6 +32,17 @@ from .events import NONE, SHORTEN, locate_limit
 from .modes import Modes, Switches
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
 from .readings import Readings
+from .second_spring import (
+    STIFFENS,
+    SecondSpring,
+    is_second_spring,
+    largest_crush,
+    offset_of,
+    on_second_spring,
+    provable_so_far,
+    reached,
+    stiffest,
+)
 from .settling import NO_PROOF, boulder_energy, proof_is_possible
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
 from .transitions import change_mode, initial_modes
@@ -84,6 +96,8 @@ class Record(NamedTuple):
     """Whether the truck touched, bool, shape (n,)."""
     exchanged: np.ndarray
     """Energy exchanged up to each [J], shape (n, 4), order of `Exchanged`."""
+    offset: np.ndarray = np.empty(0)
+    """Offset u_0 of the vehicle's spring at each [m], shape (n,), see `boulder_kernels.second_spring`; may be empty."""
 
 
 @array_kernel
@@ -95,6 +109,7 @@ def no_record() -> Record:
         np.empty(0, np.int8),
         np.empty(0, np.bool_),
         np.empty((0, 4), np.float64),
+        np.empty(0, np.float64),
     )
 
 
@@ -129,6 +144,8 @@ def write_samples(
             so_far.restoring,
             so_far.pull,
         )
+        if record.offset.size > 0:
+            record.offset[written] = c.u_0
         written += 1
     return written
 
@@ -191,24 +208,40 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     adds to the solution, so the order of the method is kept. A motion that became non-finite is retried with a
     shorter step.
     """
+    return simulate_on_springs(design, readings, control, record, None)
+
+
+@kernel
+def simulate_on_springs(
+    design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None
+) -> Outcome:
+    """Simulate one impact as `simulate_design`, of a vehicle that may have a second spring."""
     if design.H - design.d <= design.e_bumper:
         return failed(Status.NO_CONTACT.value)
-    return simulate_with(constants_of(design, readings, control.elements), readings, control, record)
+    return simulate_with_springs(constants_of(design, readings, control.elements), readings, control, record, second)
 
 
 @kernel
 def simulate_with(c: Constants, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact of known constants; see `simulate_design`, which also asks whether the truck hits at all."""
-    if not is_computable(c):
+    return simulate_with_springs(c, readings, control, record, None)
+
+
+@kernel
+def simulate_with_springs(
+    c: Constants, readings: Readings, control: Control, record: Record, second: SecondSpring | None
+) -> Outcome:
+    """Simulate one impact as `simulate_with`, of a vehicle that may have a second spring."""
+    if not is_computable(c) or not is_second_spring(c, second):
         return failed(Status.INVALID.value)
     theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
-    h, status = first_step(control, theta_stop, c)
+    h, status = first_step(control, theta_stop, stiffest(c, second))
     if status != ACCEPTED:
         return failed(status)
-    outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
+    outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record, second)
     while outcome.status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
         h *= RETRY
-        outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
+        outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record, second)
     return outcome
 
 
@@ -221,8 +254,12 @@ def simulate_by_steps(
     control: Control,
     theta_stop: float,
     record: Record,
+    second: SecondSpring | None,
 ) -> Outcome:
-    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate_design`."""
+    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate_design`.
+
+    A step in which the crush reaches a second spring is cut there, as at an event.
+    """
     ending = ending_of(control, readings, h_apart)
     budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
     h_full = h_touching
@@ -237,11 +274,15 @@ def simulate_by_steps(
     attempts = 0
     h_next = h_full
     barrier, horizon = NO_PROOF, control.horizon
+    latest, stiffening = 1.0, True
     while attempts < budget:
         attempts += 1
         h = min(h_next, horizon - t)
         y_end, k_end = step(y, k1, h, switches, c)
         passing, end = passes(y, y_end, k_end, factors, switches, c)
+        if second is not None and stiffening:
+            crush, latest = largest_crush(start, end, h)
+            passing = passing and crush < second.s_2
         # Where nothing proves that the motion may end, there is no energy to compare.
         provable = barrier > NO_PROOF and y_end.v_v <= 0.0
         if passing and h < horizon - t and not (provable and not boulder_energy(y_end, c) >= barrier):
@@ -255,7 +296,13 @@ def simulate_by_steps(
             if kept.event == SHORTEN:
                 h_next = kept.tau * h
                 continue
-            decided = decide(t, h, y, kept, barrier, horizon, ending, c)
+            provable_kept = kept
+            if second is not None and stiffening:
+                tau = reached(second.s_2, start, latest, dense, switches, c)
+                if tau < kept.tau:
+                    kept = kept_up_to(float(STIFFENS), tau, t, y_end, start, m, dense, switches, c)
+                provable_kept = provable_so_far(kept, c.k_v, second.k_2)
+            decided = decide(t, h, y, provable_kept, barrier, horizon, ending, c)
             end = compression_at(kept.y, switches, c)
         h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
         if recording or not control.stop_at_limit:
@@ -275,6 +322,9 @@ def simulate_by_steps(
             return Outcome(decided.status, m, t_limit, t, attempts)
         y, k1, start = kept.y, k_end, end
         if kept.event > NONE:
+            if second is not None and kept.event == STIFFENS:
+                c = on_second_spring(c, second.k_2, offset_of(start.u, c.k_v, second.k_2))
+                stiffening = False
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
             switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
             k1, start = rate_of(y, switches, c), compression_at(y, switches, c)

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 from ._jit import kernel
 from .design import Constants, Design, constants_of, is_computable
-from .impact import Control, Outcome, Record, failed, first_step, simulate_by_steps, simulate_design
+from .impact import Control, Outcome, Record, failed, first_step, simulate_by_steps, simulate_on_springs
 from .outcomes import Status
 from .readings import Readings
+from .second_spring import SecondSpring, is_second_spring, stiffest, times, with_spring
 from .stability import ACCEPTED, Rates, rates_of, stable_step
 
 DAMPED = 16.0
@@ -26,16 +27,6 @@ RESOLVED = 0.5
 """Step while the truck touches, over the longest that is stable: a short blow is to be followed, not only survived."""
 NO_SPRING = 1e-12
 """Factor on a spring that leaves nothing of its rates."""
-
-
-@kernel
-def with_spring(design: Design, factor: float) -> Design:
-    """Return a design whose vehicle has its spring times a factor."""
-    p = design
-    k_v = factor * p.k_v
-    return Design(
-        p.L, p.W, p.H, p.rho_b, p.d, p.e, p.rho_s, p.phi, p.beta, p.K_epsilon, p.m_v, p.v_0, k_v, p.c_v, p.e_bumper
-    )  # fmt: skip
 
 
 @kernel
@@ -67,17 +58,30 @@ def simulate_last_resort(design: Design, readings: Readings, control: Control, r
     record
         A record that keeps nothing.
     """
+    return last_resort_on_springs(design, readings, control, record, None)
+
+
+@kernel
+def last_resort_on_springs(
+    design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None
+) -> Outcome:
+    """Simulate one impact as `simulate_last_resort`, of a vehicle that may have a second spring.
+
+    Of two springs each is made softer only as far as it is too stiff to follow.
+    """
     c = constants_of(design, readings, control.elements)
-    if design.H - design.d <= design.e_bumper or not is_computable(c):
-        return simulate_design(design, readings, control, record)
-    _, status = first_step(control, control.theta_limit, c)
+    if design.H - design.d <= design.e_bumper or not is_computable(c) or not is_second_spring(c, second):
+        return simulate_on_springs(design, readings, control, record, second)
+    _, status = first_step(control, control.theta_limit, stiffest(c, second))
     if status == ACCEPTED:
-        return simulate_design(design, readings, control, record)
+        return simulate_on_springs(design, readings, control, record, second)
+    c = stiffest(c, second)
     factor = spring_to_follow(rates_of(control.theta_limit, c), control)
-    c = constants_of(with_spring(design, factor), readings, control.elements)
+    softer = times(second, factor)
+    c = constants_of(with_spring(design, min(1.0, factor * (c.k_v / design.k_v))), readings, control.elements)
     apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)
     part = 0.5 if control.halved else 1.0
-    h = part * min(control.h, RESOLVED * longest_step(control.theta_limit, c))
+    h = part * min(control.h, RESOLVED * longest_step(control.theta_limit, stiffest(c, softer)))
     h_apart = part * min(control.h, longest_step(control.theta_limit, apart)) if readings.separation_released else h
-    found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record)
+    found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record, softer)
     return failed(status) if found.status == Status.STEP_BUDGET.value else found

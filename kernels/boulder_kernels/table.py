@@ -6,11 +6,12 @@ import numpy as np
 
 from ._jit import array_kernel, kernel
 from .design import DesignTable, design_in
-from .impact import Control, no_record, simulate_design
+from .impact import Control, no_record, simulate_design, simulate_on_springs
 from .lanes import simulate_lanes
-from .last_resort import simulate_last_resort
+from .last_resort import last_resort_on_springs, simulate_last_resort
 from .outcomes import OutcomeTable, Status, empty_outcomes, write_outcome
 from .readings import Readings
+from .second_spring import SecondSpring, SecondSprings
 
 SAFETY = 3.0
 """Factor from the difference of two solutions to the error that is reported: it makes the estimate hold for 99 % and
@@ -40,8 +41,29 @@ def simulate_rows_last_resort(designs: np.ndarray, readings: Readings, control: 
     return out
 
 
-def simulate_once(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+@array_kernel
+def simulate_rows_on_springs(
+    designs: np.ndarray, springs: np.ndarray, readings: Readings, control: Control
+) -> np.ndarray:
+    """Simulate designs one by one, whose vehicles have a second spring: rows of `springs` as of `SecondSprings`."""
+    out = empty_outcomes(designs.shape[1])
+    for row in range(designs.shape[1]):
+        design, second = design_in(designs, row), SecondSpring(springs[0, row], springs[1, row])
+        if control.last_resort:
+            found = last_resort_on_springs(design, readings, control, no_record(), second)
+        else:
+            found = simulate_on_springs(design, readings, control, no_record(), second)
+        write_outcome(out, row, found)
+    return out
+
+
+def simulate_once(
+    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
+) -> OutcomeTable:
     """Simulate every design of a table once: in lanes where they can be, else one by one."""
+    if springs is not None:
+        out = simulate_rows_on_springs(np.stack(table), np.stack(springs), readings, control)
+        return OutcomeTable(out[0].astype(np.int8), *out[1:])
     simulate = simulate_lanes if control.elements == 0 and control.stop_at_limit else simulate_rows
     if control.last_resort:
         simulate = simulate_rows_last_resort
@@ -93,7 +115,9 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
         fine.x_error[row] = safety * x
 
 
-def simulate_table(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+def simulate_table(
+    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
+) -> OutcomeTable:
     """Simulate every design of a table.
 
     Parameters
@@ -105,15 +129,17 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
     control
         Step, horizon, limit, soil. With ``error_estimate`` every design is simulated with the step and
         with half of it, and the finer result is reported.
+    springs
+        Second springs of the vehicles, where they have any; such designs are simulated one by one.
 
     Returns
     -------
     OutcomeTable
         Arrays of shape (n,), in the order of the designs.
     """
-    out = simulate_once(table, readings, control)
+    out = simulate_once(table, readings, control, springs)
     if not control.error_estimate:
         return out
-    fine = simulate_once(table, readings, control._replace(halved=True))
+    fine = simulate_once(table, readings, control._replace(halved=True), springs)
     estimate_errors(out, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)
     return fine

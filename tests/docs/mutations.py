@@ -19,7 +19,7 @@ _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/s
 _VEHICLE, _RESTORING = "kernels/boulder_kernels/vehicle.py", "kernels/boulder_kernels/restoring.py"
 _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
-_DESIGNS = "boulder_sweep/designs.py"
+_DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
 _RESISTANCE, _LIFT, _UPLIFT = (
     f"boulder_sweep/{name}.py" for name in ("judge/resistance", "judge/uplift", "impact/uplift")
 )
@@ -66,7 +66,7 @@ MUTATIONS = (
     Mutation((39,), _MODES, "couple, couple_sin = -modes.corner", "couple, couple_sin = modes.corner"),
     Mutation((39,), _MODES, "net = 1.0 - modes.corner", "net = 1.0 + modes.corner"),
     Mutation((37, 39), _RESTORING, "switches.couple_sin * sin", "switches.couple_sin * sin * sin"),
-    Mutation((40, 45), _VEHICLE, "x_v - x_c - c.tau_v * (c.v_0 - v_v)", "x_v - x_c - c.tau_v * c.v_0"),
+    Mutation((40, 45), _VEHICLE, "c.tau_v * (c.v_0 - v_v)", "c.tau_v * c.v_0"),
     Mutation((41, 46, 47), _DYNAMICS, "F_v = s.k_contact * u", "F_v = s.k_truck * u"),
     Mutation((45, 48), _VEHICLE, "return c.h - c.h * versin + c.g_x * sin", "return c.h - c.h * versin - c.g_x * sin"),
     Mutation(
@@ -83,4 +83,8 @@ MUTATIONS = (
     Mutation((103,), _LIFT, "(table.L**2 + table.H**2)", "(table.L**2 - table.H**2)"),
     Mutation((103,), _LIFT, "table.d**2 * table.L", "table.d**2 * table.W"),
     Mutation((104,), _UPLIFT, "- (across + over) * omega**2", "+ (across + over) * omega**2"),
+    Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
+    Mutation((111,), _SECOND, "c.k_m * (k_2 / c.k_v)", "c.k_m"),
+    Mutation((111,), _VEHICLE, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
+    Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),
 )

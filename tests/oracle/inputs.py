@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from math import inf
 
 GRAVITY = 9.80665  # standard acceleration of gravity g [m/s^2], Eqs 27 and 37
 
@@ -35,6 +36,8 @@ class Inputs:
         Strain-rate factor on the ultimate soil pressure, Eq 27.
     resistance : {'kp_squared', 'broms', 'width_capped'}
         Law of the ultimate soil pressure: Eq 27, or one of the two that are not the paper's.
+    k_2, s_2 : float
+        Second spring of the vehicle [N/m], and the crush [m] from which it takes the place of k_v; none by default.
     """
 
     L: float
@@ -52,6 +55,12 @@ class Inputs:
     c_v: float
     K_epsilon: float = 1.0
     resistance: str = "kp_squared"
+    k_2: float = inf
+    s_2: float = inf
+
+    def spring(self, stage: int) -> float:
+        """Spring of the vehicle [N/m] in a stage of its crush, 1 or 2."""
+        return self.k_v if stage == 1 else self.k_2
 
 
 CORRECTED_NAMES = {
