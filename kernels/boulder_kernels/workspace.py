@@ -15,9 +15,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
-from numba.extending import overload
+from numba import types
+from numba.extending import lower_builtin, type_callable
 
-from ._jit import function_of, inlined
+from ._jit import inlined
 from .dense_output import Track
 from .design import Constants
 from .dynamics import Acceleration, State
@@ -148,13 +149,11 @@ STATUS_OF_LANE = _place("status")
 _RECORDS = {_place(name): record for name, record in _ALL.items()}
 
 
-@inlined
 def field(ws: np.ndarray, place: int, lane: int) -> float:
     """Return the number at a place for one lane."""
     return ws[place + lane]
 
 
-@inlined
 def put(ws: np.ndarray, place: int, lane: int, value: float) -> None:
     """Write the number at a place for one lane."""
     ws[place + lane] = value
@@ -183,25 +182,87 @@ def store(ws: np.ndarray, place: int, lane: int, record: Any) -> None:
         ws[place + offset + lane] = getattr(record, name)
 
 
-# Inside kernels both are written out, field by field, wherever they are called.
+# Inside kernels the four are instructions of the compiler, one load or store for every number: as code to be compiled
+# and inlined wherever they are called they would take a third of the time of all kernels to compile.
 
 
-@overload(load, inline="always", prefer_literal=True, strict=False)
-def _load(ws: Any, place: Any, lane: Any) -> Callable[..., Any]:
-    record = _RECORDS[place.literal_value]
-    offsets = _offsets(record)
-    values = (
-        f"{kind.__name__}(ws[place + {offsets[name]} + lane])" if name in offsets else str(KNOWN[name])
-        for name, kind in get_type_hints(record).items()
+def _pointer(context: Any, builder: Any, sig: Any, args: Any, offset: int = 0) -> Any:
+    """Where the number at a place and an offset lies for one lane, from the first three arguments of a call."""
+    (ws_type, place_type, lane_type), (ws, place, lane) = sig.args[:3], args[:3]
+    place, lane = (
+        context.cast(builder, value, kind, types.intp) for value, kind in ((place, place_type), (lane, lane_type))
     )
-    return function_of(f"def load(ws, place, lane):\n return Record({', '.join(values)})", Record=record)
+    numbers = context.make_array(ws_type)(context, builder, ws).data
+    first = builder.add(place, context.get_constant(types.intp, offset))
+    return builder.gep(numbers, [builder.add(first, lane)], inbounds=True)
 
 
-@overload(store, inline="always", strict=False)
-def _store(ws: Any, place: Any, lane: Any, record: Any) -> Callable[..., Any]:
+_NOT_REAL = {int: types.int64, bool: types.boolean}
+
+
+@type_callable(field)
+def _type_field(context: Any) -> Callable[..., Any]:
+    return lambda ws, place, lane: ws.dtype
+
+
+@lower_builtin(field, types.Array, types.Any, types.Any)
+def _lower_field(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.load(_pointer(context, builder, sig, args))
+
+
+@type_callable(put)
+def _type_put(context: Any) -> Callable[..., Any]:
+    return lambda ws, place, lane, value: types.void
+
+
+@lower_builtin(put, types.Array, types.Any, types.Any, types.Any)
+def _lower_put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    value = context.cast(builder, args[3], sig.args[3], sig.args[0].dtype)
+    builder.store(value, _pointer(context, builder, sig, args))
+    return context.get_dummy_value()
+
+
+@type_callable(load)
+def _type_load(context: Any) -> Callable[..., Any]:
+    def result(ws: Any, place: Any, lane: Any) -> Any:
+        """Return the type of the record, or None where the place is not yet known as a constant."""
+        if not isinstance(place, types.IntegerLiteral):
+            return None
+        record = _RECORDS[place.literal_value]
+        kinds = [_NOT_REAL.get(kind, ws.dtype) for kind in get_type_hints(record).values()]
+        return types.BaseTuple.from_types(kinds, record)
+
+    return result
+
+
+@lower_builtin(load, types.Array, types.IntegerLiteral, types.Any)
+def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    record = sig.return_type.instance_class
+    offsets = _offsets(record)
+    values = []
+    for name, kind in zip(record._fields, sig.return_type.types, strict=True):
+        if name in offsets:
+            number = builder.load(_pointer(context, builder, sig, args, offsets[name]))
+            values.append(context.cast(builder, number, sig.args[0].dtype, kind))
+        else:
+            values.append(context.get_constant(kind, KNOWN[name]))
+    return context.make_tuple(builder, sig.return_type, values)
+
+
+@type_callable(store)
+def _type_store(context: Any) -> Callable[..., Any]:
+    return lambda ws, place, lane, record: types.void
+
+
+@lower_builtin(store, types.Array, types.Any, types.Any, types.BaseNamedTuple)
+def _lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    record = sig.args[3]
     offsets = _offsets(record.instance_class)
-    lines = (f" ws[place + {offset} + lane] = record.{name}" for name, offset in offsets.items())
-    return function_of("\n".join(("def store(ws, place, lane, record):", *lines)))
+    for i, (name, kind) in enumerate(zip(record.fields, record.types, strict=True)):
+        if name in offsets:
+            value = context.cast(builder, builder.extract_value(args[3], i), kind, sig.args[0].dtype)
+            builder.store(value, _pointer(context, builder, sig, args, offsets[name]))
+    return context.get_dummy_value()
 
 
 @inlined
