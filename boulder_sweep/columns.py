@@ -91,6 +91,14 @@ INPUTS: tuple[ColumnSpec, ...] = (
     ColumnSpec("bed_offset_m", "float64", "m", "distance from the front bumper to the leading edge of the cargo bed"),
 )
 
+OPTIONAL_INPUTS: tuple[ColumnSpec, ...] = (
+    ColumnSpec("vehicle_second_spring_N_m", "float64", "N/m", "second spring of the vehicle's front, which stiffens"),
+    ColumnSpec(
+        "vehicle_second_spring_from_m", "float64", "m", "crush of the vehicle's front from which its second spring acts"
+    ),
+)
+"""Inputs of laws that are switched off where a file does not give them: their columns are in its tables only then."""
+
 OUTCOMES: tuple[OutcomeColumn, ...] = (
     OutcomeColumn(
         "verdict",
@@ -231,8 +239,9 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
 
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
+OPTIONAL_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OPTIONAL_INPUTS)
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
-BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in COLUMNS}
+BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *OPTIONAL_INPUTS)}
 
 
 def column_spec(name: str) -> ColumnSpec:

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 
+SECOND_SPRING = "vehicle_second_spring_N_m"
 MAX_DICTIONARY = 1 << 16
 """Largest dictionary of a column; beyond that a column holds one value per row."""
 
@@ -173,6 +174,7 @@ REASONS = (
     "embedment depth is not less than the boulder's height",
     "hood is lower than the bumper",
     "impact height is above the top of the boulder",
+    "second spring of the vehicle is softer than the first",
 )
 
 
@@ -205,6 +207,11 @@ def refusal(
     codes[hood < bumper] = 2
     codes[exposed <= 0.0] = 1
     return codes
+
+
+def refusal_of_springs(codes: np.ndarray, spring: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the same for vehicles with a second spring, which must not be softer than the first."""
+    return np.where(codes == 0, 4 * (second < spring), codes).astype(np.int8)
 
 
 class DesignPlan:
@@ -241,11 +248,15 @@ class DesignPlan:
             impact: Quantity = Source(np.zeros(1))
         else:
             impact = quantities["impact_height_m"]
-        self.columns = {name: quantities[name] for name in INPUT_COLUMNS}
+        optional = [name for name in OPTIONAL_COLUMNS if name in quantities]
+        self.columns = {name: quantities[name] for name in (*INPUT_COLUMNS, *optional)}
         for quantity in self.columns.values():
             if isinstance(quantity, Source):
                 quantity.find_dictionary()
         self.refusals = self.combine(refusal, height, embedment, bumper, hood, impact)
+        if SECOND_SPRING in self.columns:
+            springs = (self.columns[name] for name in ("vehicle_spring_N_m", SECOND_SPRING))
+            self.refusals = self.combine(refusal_of_springs, self.refusals, *springs)
 
     def combine(self, function: Callable[..., np.ndarray], *inputs: Quantity) -> Quantity:
         """Return ``function(*inputs)`` over all combinations if these are few, else per row."""
@@ -331,7 +342,10 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
     if "impact_height_m" not in values:
         values["impact_height_m"] = impact_height_of_face(height, embedment, bumper, hood)
     codes = refusal(height, embedment, bumper, hood, impact)
-    columns = {name: Column(None, np.ascontiguousarray(values[name])) for name in INPUT_COLUMNS}
+    if SECOND_SPRING in values:
+        codes = refusal_of_springs(codes, values["vehicle_spring_N_m"], values[SECOND_SPRING])
+    names = (*INPUT_COLUMNS, *(name for name in OPTIONAL_COLUMNS if name in values))
+    columns = {name: Column(None, np.ascontiguousarray(values[name])) for name in names}
     return DesignBlock(0, len(codes), columns, Reasons(codes, REASONS))
 
 

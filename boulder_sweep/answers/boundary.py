@@ -20,7 +20,7 @@ import numpy as np
 
 from boulder_sweep.answers.draws import threads
 from boulder_sweep.answers.trials import Judges, judges_of
-from boulder_sweep.columns import INPUT_COLUMNS, REASONS, VERDICTS
+from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
@@ -93,7 +93,7 @@ class Boundary:
 
         block = self.sweep.block(0, self.sweep.n_designs)
         columns: dict[str, Any] = {"design_id": block.design_id()}
-        columns |= {name: block.columns[name].to_numpy() for name in INPUT_COLUMNS}
+        columns |= {name: column.to_numpy() for name, column in block.columns.items()}
         for name, label in block.labels.items():
             columns[name] = pd.Categorical.from_codes(label.codes, list(label.words))
         columns["verdict"] = pd.Categorical.from_codes(self.verdict, list(VERDICTS))

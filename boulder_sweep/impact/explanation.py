@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import INPUT_COLUMNS, OUTCOME_COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOME_COLUMNS
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.refinement import reported_step_s
@@ -106,7 +106,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     there = load_manifest(folder).identity
     row = read_row(folder, design_id)
     values = row.to_pylist()[0]
-    inputs = {name: values[name] for name in INPUT_COLUMNS}
+    inputs = {name: values[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in values}
     try:
         control, readings = Control(**there["control"]), Readings(**there["readings"])
         sweep = _one_design(there["settings"], inputs, control, values["step_s"] or reported_step_s(control))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from boulder_kernels import Constants, Design, Readings, Record
+from boulder_kernels import Constants, Design, Readings, Record, SecondSpring
 from boulder_kernels.dynamics import Acceleration, State, acceleration
 from boulder_kernels.energy import stored_energies
 from boulder_kernels.modes import (
@@ -21,6 +21,7 @@ from boulder_kernels.modes import (
     Switches,
     switches_of,
 )
+from boulder_kernels.second_spring import on_second_spring, spent_energy
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
 
 MODE_NAMES = {
@@ -48,6 +49,8 @@ class EnergyLedger:
         Kinetic energy of the vehicle.
     crush_spring_J, crush_damper_J : ndarray
         Stored in the spring of its front, and dissipated in the damper.
+    crush_spent_J : ndarray
+        Spent where a second spring took over (Eq 112); 0 without one.
     boulder_linear_J, boulder_angular_J : ndarray
         Kinetic energy of boulder and lumped soil.
     soil_elastic_J, soil_drag_J : ndarray
@@ -65,6 +68,7 @@ class EnergyLedger:
     vehicle_kinetic_J: np.ndarray
     crush_spring_J: np.ndarray
     crush_damper_J: np.ndarray
+    crush_spent_J: np.ndarray
     boulder_linear_J: np.ndarray
     boulder_angular_J: np.ndarray
     soil_elastic_J: np.ndarray
@@ -87,7 +91,9 @@ class EnergyLedger:
         return largest / self.initial if largest > 0.0 else 0.0
 
 
-def forces_along(record: Record, design: Design, readings: Readings, c: Constants) -> dict[str, np.ndarray]:
+def forces_along(
+    record: Record, design: Design, readings: Readings, c: Constants, second: SecondSpring | None = None
+) -> dict[str, np.ndarray]:
     """Evaluate the forces at the samples of a record.
 
     Parameters
@@ -96,13 +102,15 @@ def forces_along(record: Record, design: Design, readings: Readings, c: Constant
         The recorded motion, n samples.
     design, readings, c
         The design, its readings and the constants of its motion.
+    second
+        Second spring of the vehicle, if it has one.
 
     Returns
     -------
     dict of str to ndarray
         Arrays of shape (n,) by the names of the trajectory's columns.
     """
-    rates = [acceleration(*y, switches, c) for y, switches in _samples(record, readings, c)]
+    rates = [acceleration(*y, switches, own) for y, switches, own in _samples(record, readings, c, second)]
     a_b, alpha_b, a_v, M = np.array(rates).reshape(-1, len(Acceleration._fields)).T
     theta = record.states[:, 2]
     # As printed the truck is pulled back by a force that the boulder does not feel: only contact counts here.
@@ -118,7 +126,9 @@ def forces_along(record: Record, design: Design, readings: Readings, c: Constant
     }
 
 
-def ledger_of(record: Record, design: Design, readings: Readings, c: Constants) -> EnergyLedger:
+def ledger_of(
+    record: Record, design: Design, readings: Readings, c: Constants, second: SecondSpring | None = None
+) -> EnergyLedger:
     """Draw up the energy ledger at the samples of a record.
 
     Parameters
@@ -127,6 +137,8 @@ def ledger_of(record: Record, design: Design, readings: Readings, c: Constants) 
         The recorded motion, n samples, with the energies exchanged.
     design, readings, c
         The design, its readings and the constants of its motion.
+    second
+        Second spring of the vehicle, if it has one.
 
     Returns
     -------
@@ -140,16 +152,18 @@ def ledger_of(record: Record, design: Design, readings: Readings, c: Constants) 
             design.m_v,
             bool(touching) or not readings.separation_released,
             readings.restoring_gravity,
-            c,
+            own,
         )
-        for y, touching in zip(record.states, record.touching, strict=True)
+        for y, touching, own in zip(record.states, record.touching, _constants(record, c, second), strict=True)
     ]
+    spent = [0.0 if second is None else spent_energy(float(u_0), c.k_v, second.k_2) for u_0 in _offsets(record)]
     truck, linear, angular, elastic, spring, potential = np.array(stored).reshape(-1, 6).T
     drag, damper, restoring, pull = record.exchanged.T
     parts = {
         "vehicle_kinetic_J": truck,
         "crush_spring_J": spring,
         "crush_damper_J": damper.copy(),
+        "crush_spent_J": np.array(spent),
         "boulder_linear_J": linear,
         "boulder_angular_J": angular,
         "soil_elastic_J": elastic,
@@ -162,13 +176,27 @@ def ledger_of(record: Record, design: Design, readings: Readings, c: Constants) 
     return EnergyLedger(time_s=record.times, **parts, residual_J=residual)
 
 
-def _samples(record: Record, readings: Readings, c: Constants) -> list[tuple[np.ndarray, Switches]]:
-    """State of every sample and the factors of its modes; the signs of Eq 37 follow from the rotation itself."""
+def _offsets(record: Record) -> np.ndarray:
+    """Offset of the vehicle's spring at every sample [m]; 0 on its first spring."""
+    return record.offset if len(record.offset) else np.zeros(len(record.times))
+
+
+def _constants(record: Record, c: Constants, second: SecondSpring | None) -> list[Constants]:
+    """Return the constants of every sample: those of the second spring where it has taken over."""
+    if second is None:
+        return [c] * len(record.times)
+    return [c if u_0 == 0.0 else on_second_spring(c, second.k_2, float(u_0)) for u_0 in _offsets(record)]
+
+
+def _samples(
+    record: Record, readings: Readings, c: Constants, second: SecondSpring | None
+) -> list[tuple[np.ndarray, Switches, Constants]]:
+    """State, factors of the modes and constants of every sample; the signs of Eq 37 follow from the rotation itself."""
     theta = record.states[:, 2]
     corner = np.copysign(1.0, c.theta_corner - theta)
     arm = np.copysign(1.0, c.C_cos * np.cos(theta) + c.C_sin * np.sin(theta))
     samples = []
-    for row in range(len(theta)):
+    for row, own in enumerate(_constants(record, c, second)):
         modes = Modes(
             turning=int(record.turning[row]),
             touching=bool(record.touching[row]),
@@ -177,7 +205,7 @@ def _samples(record: Record, readings: Readings, c: Constants) -> list[tuple[np.
             yielded_top=0,
             yielded_base=0,
         )
-        samples.append((record.states[row], switches_of(modes, readings, c)))
+        samples.append((record.states[row], switches_of(modes, readings, own), own))
     return samples
 
 

@@ -12,19 +12,22 @@ import numpy as np
 
 from boulder_kernels import (
     Control,
+    Design,
     DesignTable,
     Outcome,
     OutcomeTable,
     Readings,
     Record,
+    SecondSpring,
     constants_of,
     no_record,
     simulate_design,
 )
 from boulder_kernels.design import design_at
+from boulder_kernels.impact import simulate_on_springs
 from boulder_kernels.outcomes import empty_outcomes, write_outcome
 from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
-from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
@@ -119,16 +122,27 @@ def simulate(
     control = _control(evaluation.control, decided)
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
-    outcome = simulate_design(one, how, control, record)
+    second = None if designs.springs is None else SecondSpring(*(float(column[0]) for column in designs.springs))
+    outcome = _simulated(one, how, control, record, second)
     row = _outcome_row(outcome)
     if control.error_estimate:
-        coarser = simulate_design(one, how, control._replace(halved=False), no_record())
+        coarser = _simulated(one, how, control._replace(halved=False), no_record(), second)
         _estimate(row, _outcome_row(coarser), designs.table, how)
     judged = judge(row, designs, evaluation.limits, reported_step_s(control))
     if judged.verdict[0] != ERROR:
         judged = _as_decided(judged, decided)
-    motion = Motion(one, how, constants_of(one, how, control.elements), control, _kept(record, times, outcome), outcome)
+    c = constants_of(one, how, control.elements)
+    motion = Motion(one, how, c, control, _kept(record, times, outcome), outcome, second)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
+
+
+def _simulated(
+    design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None
+) -> Outcome:
+    """Simulate one impact, by kernels of its own where the vehicle has a second spring."""
+    if second is None:
+        return simulate_design(design, readings, control, record)
+    return simulate_on_springs(design, readings, control, record, second)
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
@@ -138,7 +152,7 @@ def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
     if isinstance(design, str | Path):
         return load(design)
     given = dict(design.items())
-    names = (*INPUT_COLUMNS, "embedment_ratio")
+    names = (*INPUT_COLUMNS, *OPTIONAL_COLUMNS, "embedment_ratio")
     constants = _DEFAULTS | {name: float(given[name]) for name in names if name in given}
     if "embedment_depth_m" in constants:
         constants.pop("embedment_ratio", None)
@@ -146,6 +160,8 @@ def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
     missing = [name for name in INPUT_COLUMNS if name not in constants and name not in optional]
     if missing:
         raise ValueError(f"the design lacks {', '.join(missing)}")
+    if 0 < len(half := [name for name in OPTIONAL_COLUMNS if name in constants]) < len(OPTIONAL_COLUMNS):
+        raise ValueError(f"a second spring needs {' and '.join(OPTIONAL_COLUMNS)}, not {half[0]} alone")
     return Sweep(name="design", path=None, axes=(), constants=constants)
 
 
@@ -211,7 +227,7 @@ def _empty_record(times: np.ndarray) -> Record:
     n = len(times)
     asked = np.minimum(times, times[-1] * BEFORE_THE_END)
     states, exchanged = np.full((n, 6), np.nan), np.full((n, 4), np.nan)
-    return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged)
+    return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged, np.zeros(n))
 
 
 def _outcome_row(outcome: Outcome) -> OutcomeTable:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
+from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
-from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY
+from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY, SPENT
 from boulder_sweep.judge.judged import Judged
 from boulder_sweep.text import printable
 
@@ -38,6 +38,7 @@ class Motion:
     control: Control
     record: Record
     outcome: Outcome
+    second: SecondSpring | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +121,7 @@ class Trajectory:
         record, c = motion.record, motion.constants
         x_b, v_b, theta, omega, x_v, v_v = record.states.T
         along, up = 0.5 * motion.design.L - c.c_x, 0.5 * motion.design.H - c.c_y
-        forces = forces_along(record, motion.design, motion.readings, c)
+        forces = forces_along(record, motion.design, motion.readings, c, motion.second)
         return cls(
             name=name,
             design_id=design_id,
@@ -162,7 +163,8 @@ class Trajectory:
 
     def energy(self) -> EnergyLedger:
         """Return where the vehicle's energy is at every sample."""
-        return ledger_of(self.motion.record, self.motion.design, self.motion.readings, self.motion.constants)
+        motion = self.motion
+        return ledger_of(motion.record, motion.design, motion.readings, motion.constants, motion.second)
 
     def summary(self) -> dict[str, Any]:
         """Return the outcome in the names and units of the table, with the times of the maxima.
@@ -189,7 +191,8 @@ class Trajectory:
         found = {spec.name: getattr(self, spec.name) for spec in HISTORY}
         if energy:
             ledger = self.energy()
-            for spec in ENERGY:
+            spent = () if self.motion.second is None else (SPENT,)
+            for spec in (*ENERGY, *spent):
                 found[spec.name] = getattr(ledger, spec.name.removeprefix("energy_"))
         return found
 

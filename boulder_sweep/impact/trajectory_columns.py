@@ -54,4 +54,9 @@ ENERGY: tuple[ColumnSpec, ...] = (
     _number("energy_residual_J", "J", "sum of all parts minus the vehicle's energy at first touch"),
 )
 
-BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY)}
+SPENT = _number(
+    "energy_crush_spent_J", "J", "spent where the second spring of the vehicle's front took over: permanent crush"
+)
+"""Of vehicles with a second spring only."""
+
+BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY, SPENT)}

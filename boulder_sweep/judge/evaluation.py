@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
+from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
@@ -29,17 +30,19 @@ if TYPE_CHECKING:
 LONGEST_HORIZON = 10.0
 """A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 
-Simulate = Callable[[DesignTable, Readings, Control], OutcomeTable]
-"""Function that simulates a table of designs; always `by_kernels` outside tests."""
+Simulate = Callable[..., OutcomeTable]
+"""Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
 
 
-def by_kernels(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+def by_kernels(
+    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
+) -> OutcomeTable:
     """Simulate with the compiled kernels.
 
     A plain function, so that worker processes import it by name and use the compiled code on disk; the kernel
     itself would be sent as source and compiled again.
     """
-    return simulate_table(table, readings, control)
+    return simulate_table(table, readings, control, springs)
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,8 @@ class Evaluation:
         Outcome columns wanted, verdict and reason among them; all of the table where empty.
     resistance
         Law of the ultimate resistance of the soil.
+    second_spring
+        Whether the vehicles have a second spring, for which other kernels are compiled.
     """
 
     readings: Readings
@@ -68,6 +73,7 @@ class Evaluation:
     simulate: Simulate = by_kernels
     only: tuple[str, ...] = ()
     resistance: str = RESISTANCES[0]
+    second_spring: bool = False
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -124,7 +130,7 @@ class Evaluation:
 
     def _once(self, designs: Designs, control: Control) -> Judged:
         """Simulate and judge designs once."""
-        outcomes = self.simulate(designs.table, self.readings, control)
+        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
         return judge(outcomes, designs, self.limits, reported_step_s(control), self.only)
 
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -134,7 +140,8 @@ class Evaluation:
     def warm_up(self) -> None:
         """Load or compile the kernels by simulating one step of a plain design."""
         begun = time.monotonic()
-        self.simulate(PLAIN_DESIGN.table, self.readings, self.control._replace(horizon=self.control.h))
+        plain = PLAIN_DESIGN._replace(springs=PLAIN_SPRINGS if self.second_spring else None)
+        self.simulate(plain.table, self.readings, self.control._replace(horizon=self.control.h), *plain.laws)
         _warm_ups_s.append(time.monotonic() - begun)
 
 
@@ -159,6 +166,8 @@ PLAIN_DESIGN = Designs(
     bed_offset=np.array([2.9]),
 )
 """One usual design."""
+PLAIN_SPRINGS = SecondSprings(k_2=np.array([9e6]), s_2=np.array([1.0]))
+"""A second spring for its vehicle."""
 _warm_ups_s: list[float] = []
 
 
@@ -177,6 +186,7 @@ def evaluation_of(
         limits=limits_of(sweep, proved=proved),
         simulate=simulate,
         resistance=sweep.model.resistance,
+        second_spring=SECOND_SPRING in sweep.plan.columns,
     )
 
 

@@ -101,7 +101,8 @@ def firmness_of(sweep: Sweep) -> Firmness:
         steps = (STEPS if read.restoring_gravity else STEPS_PRINTED)["fast"]
         # Not beyond the horizon: without a proof that would cost ten times as much for a few verdicts.
         fast = control._replace(h=steps.step_s, locate_yield=False, error_estimate=False, longest_horizon=0.0)
-        return judge(simulated(table, read, fast), designs._replace(table=table), limits, steps.step_s)
+        changed = designs._replace(table=table)
+        return judge(simulated(changed, read, fast), changed, limits, steps.step_s)
 
     table = designs.table
     found = verdicts(table, readings)
@@ -145,7 +146,7 @@ def _numerical_errors(designs: Designs, readings: Readings, control: Control) ->
         share = min(1.0, reported_step_s(control) / SHORTEST_STEP_S)
         some = designs.rows(slice(None, None, max(1, round(1.0 / share))))
         control = control._replace(longest_horizon=0.0)
-        outcomes = simulated(some.table, readings, control)
+        outcomes = simulated(some, readings, control)
         counts = np.isfinite(outcomes.theta_error) & (outcomes.theta_error > 0.0)
         if counts.any():
             of_all = (np.degrees(outcomes.theta_error[counts]), outcomes.x_error[counts])

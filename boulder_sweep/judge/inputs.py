@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_kernels import DesignTable
+from boulder_kernels import DesignTable, SecondSprings
+from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.resistance import with_law
 from boulder_sweep.settings.model import RESISTANCES
 
@@ -40,6 +41,8 @@ class Designs(NamedTuple):
     """What the kernels simulate: contiguous float64 arrays of shape (n,); SI, phi in rad, beta in MN/m^3."""
     bed_offset: np.ndarray
     """Distance from the front bumper to the leading edge of the cargo bed [m], shape (n,)."""
+    springs: SecondSprings | None = None
+    """Second springs of the vehicles, SI, where the file gives them."""
 
     @property
     def size(self) -> int:
@@ -49,7 +52,15 @@ class Designs(NamedTuple):
     def rows(self, chosen: np.ndarray | slice) -> Designs:
         """Return some of the designs, chosen by a mask, by their places or by a slice."""
         table = DesignTable(*(np.ascontiguousarray(column[chosen]) for column in self.table))
-        return Designs(table, self.bed_offset[chosen])
+        springs = self.springs
+        if springs is not None:
+            springs = SecondSprings(*(np.ascontiguousarray(column[chosen]) for column in springs))
+        return Designs(table, self.bed_offset[chosen], springs)
+
+    @property
+    def laws(self) -> tuple[SecondSprings, ...]:
+        """What `boulder_kernels.simulate_table` takes beside table, readings and control; nothing as a rule."""
+        return () if self.springs is None else (self.springs,)
 
 
 def designs_of(block: DesignBlock, rows: np.ndarray | None = None, resistance: str = RESISTANCES[0]) -> Designs:
@@ -66,7 +77,12 @@ def designs_of(block: DesignBlock, rows: np.ndarray | None = None, resistance: s
     """
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
-    return Designs(with_law(DesignTable(**columns), resistance), _values(block, "bed_offset_m", rows))
+    springs = None
+    if SECOND_SPRING in block.columns:
+        springs = SecondSprings(
+            _values(block, SECOND_SPRING, rows), _values(block, "vehicle_second_spring_from_m", rows)
+        )
+    return Designs(with_law(DesignTable(**columns), resistance), _values(block, "bed_offset_m", rows), springs)
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, simulate_table
+from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, LADDER, Accuracy, Steps, steps_of
 from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
@@ -63,13 +63,13 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     Accuracy
         The first steps of `LADDER` that meet it, or those that come closest if none does.
     """
-    table = sampled_designs(sweep, pilot_size(sweep.model.soil_elements)).table
+    designs = sampled_designs(sweep, pilot_size(sweep.model.soil_elements))
     readings = readings_of(sweep)
     found: list[tuple[float, int]] = []
     for rung, steps in enumerate(LADDER):
         control = control_of(sweep, Accuracy("", steps, error_estimate=True))
         # Rounded, so that a processor that differs in the last bits finds the same.
-        achieved = float(f"{estimated_error_deg(table, readings, control):.3g}")
+        achieved = float(f"{estimated_error_deg(designs, readings, control):.3g}")
         found.append((achieved, rung))
         if achieved <= wanted_deg:
             break
@@ -79,7 +79,7 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
         steps=LADDER[rung],
         error_estimate=True,
         achieved_deg=achieved,
-        pilot_designs=table.L.size,
+        pilot_designs=designs.size,
         met=achieved <= wanted_deg,
     )
 
@@ -95,21 +95,17 @@ def sampled_designs(sweep: Sweep, count: int) -> Designs:
     return designs_of(block, np.asarray(block.reasons.codes) == 0, sweep.model.resistance)
 
 
-def simulated(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Simulate a table in pieces, so that an interruption need not wait long."""
-    size = AT_ONCE if control.elements else AT_ONCE_CLOSED
-    pieces = [
-        simulate_table(DesignTable(*(column[at : at + size] for column in table)), readings, control)
-        for at in range(0, table.L.size, size)
-    ]
-    if not pieces:
-        return simulate_table(table, readings, control)
+def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
+    """Simulate designs in pieces, so that an interruption need not wait long."""
+    size = AT_ONCE if control.elements or designs.laws else AT_ONCE_CLOSED
+    rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
+    pieces = [simulate_table(some.table, readings, control, *some.laws) for some in rows]
     return OutcomeTable(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
 
 
-def estimated_error_deg(table: DesignTable, readings: Readings, control: Control) -> float:
+def estimated_error_deg(designs: Designs, readings: Readings, control: Control) -> float:
     """Quantile of the estimated errors of the rotation [deg] where the limit was not reached; 0 where it always was."""
-    outcomes = simulated(table, readings, control)
+    outcomes = simulated(designs, readings, control)
     counts = ~np.isnan(outcomes.theta_error) & (outcomes.status != Status.LIMIT)
     if not counts.any():
         return 0.0

@@ -80,7 +80,8 @@ FLAGS = (
         "more crush than the vehicle's front is calibrated for",
         "vehicle driven on by more than `vehicle.calibrated_crush` (1 m) further than the boulder moved",
         "After about 1 m of displacement the chassis stiffens, as the paper says, and the model parts from the test on "
-        "the unsafe side. The larger boulder of the paper is at 1.04 m itself (0.77 m as printed).",
+        "the unsafe side. The larger boulder of the paper is at 1.04 m itself (0.77 m as printed). A second spring "
+        "does not move the limit: the file says how far both are calibrated.",
         lambda facts: facts.outcomes.x_v_max - facts.outcomes.x_b_max > facts.limits.calibrated_crush,
     ),
     Flag(

@@ -45,6 +45,7 @@ def check_pairs(entries: Entries) -> None:
         message = f"the hood ({hood:g} m) is lower than the bumper ({bumper:g} m)"
         entries.problems.add(entries.key_place("vehicle", key), f"vehicle.{key}", message)
     _check_impact_height(entries, bumper)
+    _check_second_spring(entries)
     _check_solver(entries)
     _check_uncertain(entries)
 
@@ -60,6 +61,22 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
     if exposed > bumper and impact > exposed * (1 + 1e-12):
         message = f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
         entries.problems.add(entries.leaves["impact_height_m"].place, "site.impact_height", message)
+
+
+def _check_second_spring(entries: Entries) -> None:
+    """Report half of a second spring, and one that is softer than the first."""
+    names = ("vehicle_second_spring_N_m", "vehicle_second_spring_from_m")
+    listed = set() if entries.table is None else set(entries.table.columns)
+    both = [fields.BY_NAME[name] for name in names]
+    given = [field for field in both if field.path in entries.given or field.name in listed]
+    if len(given) == 1:
+        lacking = next(field for field in both if field not in given)
+        message = f"needs {lacking.key} beside it"
+        entries.problems.add(entries.key_place("vehicle", given[0].key), given[0].path, message)
+    spring, second = entries.single("vehicle_spring_N_m"), entries.single(names[0])
+    if spring is not None and second is not None and second < spring:
+        message = f"{second:g} N/m is softer than the first spring of {spring:g} N/m; a front that softens is refused"
+        entries.problems.add(entries.key_place("vehicle", both[0].key), both[0].path, message)
 
 
 def _check_solver(entries: Entries) -> None:

@@ -14,6 +14,7 @@ from boulder_sweep.settings.distribution_reader import read_input
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_single
 from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
+from boulder_sweep.settings.springs import unfold_springs
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 if TYPE_CHECKING:
@@ -62,6 +63,9 @@ class Entries:
             if entry.key not in TOP_KEYS:
                 self._unknown(entry, "", TOP_KEYS)
         self._read_table()
+        for problem in unfold_springs(self.root):
+            self.given.add("vehicle.spring")
+            self.problems.add(problem.place, "vehicle.spring", problem.message)
         for section in fields.SECTIONS:
             self._read_block(section)
 

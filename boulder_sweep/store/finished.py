@@ -39,8 +39,8 @@ class FinishedRows:
         Rows of the whole table.
     rows_done : int
         Rows that are finished.
-    labels : tuple of str
-        Names of the text columns that its settings file gave.
+    more_columns : tuple of str
+        Names of the columns that not every table has.
     identity : dict
         What all rows have in common, see `provenance`.
 
@@ -55,7 +55,7 @@ class FinishedRows:
     def __init__(self, folder: Place):
         manifest = load(folder)
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
-        self.labels = manifest.labels
+        self.more_columns = manifest.more_columns
         self._folder = folder
         self._places = _Places(manifest)
         self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, field
 from io import BytesIO
 from typing import IO, Any
 
-from boulder_sweep.columns import COLUMNS
+from boulder_sweep.columns import COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError, StoreError
 from boulder_sweep.store.files import WRITING_SUFFIX
@@ -158,10 +158,13 @@ class Manifest:
         return whole
 
     @property
-    def labels(self) -> tuple[str, ...]:
-        """Names of the text columns that the settings file gave."""
+    def more_columns(self) -> tuple[str, ...]:
+        """Names of the columns that not every table has: optional inputs, and text that the settings file gave."""
         settings = self.identity.get("settings")
-        return tuple(settings.get("labels", ())) if isinstance(settings, dict) else ()
+        if not isinstance(settings, dict):
+            return ()
+        inputs = settings.get("inputs", {})
+        return (*(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
 
 
 def part_name(first: int, stop: int, table_rows: int) -> str:
@@ -205,7 +208,7 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
 
     text = json.dumps({"format": _FORMAT, **asdict(manifest)}, separators=(",", ":"))
     value = hashlib.sha256(text.encode()).hexdigest() + text
-    schema = table_schema({_KEY: value.encode(), **more}, manifest.labels)
+    schema = table_schema({_KEY: value.encode(), **more}, manifest.more_columns)
     sink = pa.BufferOutputStream()
     with pq.ParquetWriter(sink, schema):
         pass  # columns, and no rows
@@ -246,7 +249,7 @@ def load(folder: Place) -> Manifest:
     try:
         content = json.loads(text)
         manifest = _from_json(content)
-        _check_columns(found.schema.names, manifest.labels)
+        _check_columns(found.schema.names, manifest.more_columns)
         return manifest
     except ValueError as unfamiliar:
         raise OtherVersionError(path, str(unfamiliar), version_of(content)) from None
@@ -281,9 +284,9 @@ def _no_result(folder: Place) -> str:
     return f"{folder} is a file; the result of a sweep is a folder{inside}"
 
 
-def _check_columns(names: list[str], labels: tuple[str, ...]) -> None:
+def _check_columns(names: list[str], more: tuple[str, ...]) -> None:
     """Raise ValueError where a table has other columns than today."""
-    expected = [*(spec.name for spec in COLUMNS), *labels]
+    expected = [*(spec.name for spec in COLUMNS), *more]
     differing = sorted(set(names) ^ set(expected))
     if differing:
         raise ValueError(f"its table has other columns: {', '.join(differing)}")

@@ -96,6 +96,6 @@ def _read(folder: Place, columns: Sequence[str] | None, verify: bool) -> tuple[p
     finished = FinishedRows(folder)
     parts = list(finished.tables(columns, verify=verify))
     if not parts:
-        empty = table_schema(labels=finished.labels).empty_table()
+        empty = table_schema(more=finished.more_columns).empty_table()
         return (empty if columns is None else empty.select(list(columns))), finished.rows
     return pa.concat_tables(parts), finished.rows

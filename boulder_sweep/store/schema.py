@@ -15,7 +15,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUTS, OUTCOMES, ColumnSpec, OutcomeColumn, column_spec
+from boulder_sweep.columns import (
+    COLUMNS,
+    DESIGN_ID,
+    INPUTS,
+    OPTIONAL_COLUMNS,
+    OUTCOMES,
+    ColumnSpec,
+    OutcomeColumn,
+    column_spec,
+)
 from boulder_sweep.judge.judged import Judged
 
 if TYPE_CHECKING:
@@ -31,17 +40,18 @@ _TYPES = {
 }
 
 
-def table_schema(metadata: Mapping[bytes, bytes] | None = None, labels: Iterable[str] = ()) -> pa.Schema:
+def table_schema(metadata: Mapping[bytes, bytes] | None = None, more: Iterable[str] = ()) -> pa.Schema:
     """Return the schema of the table, with unit and meaning of every column in its field metadata.
 
     Parameters
     ----------
     metadata
         Goes into the metadata of the file.
-    labels
-        Names of the text columns that the settings file gives.
+    more
+        Names of the columns that not every table has: inputs of laws that the settings file switches on, and text
+        columns that it gives.
     """
-    specs = [*COLUMNS, *(column_spec(name) for name in labels)]
+    specs = [*COLUMNS, *(column_spec(name) for name in more)]
     return pa.schema([_field(spec, _TYPES[spec.type]) for spec in specs], metadata=_complete(metadata, specs))
 
 
@@ -60,13 +70,15 @@ def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, byte
     Returns
     -------
     pyarrow.Table
-        Columns in the order of the register, then the text columns; null where a value is NaN.
+        Columns in the order of the register, then those that not every table has; null where a value is NaN.
     """
     arrays = [_array(block.design_id())]
     arrays += [_input_array(block.columns[spec.name]) for spec in INPUTS]
     arrays += [_outcome_array(spec, judged) for spec in OUTCOMES]
+    optional = [name for name in OPTIONAL_COLUMNS if name in block.columns]
+    arrays += [_input_array(block.columns[name]) for name in optional]
     arrays += [_word_array(label.codes, label.words) for label in block.labels.values()]
-    specs = [*COLUMNS, *(column_spec(name) for name in block.labels)]
+    specs = [*COLUMNS, *(column_spec(name) for name in (*optional, *block.labels))]
     fields = [_field(spec, array.type) for spec, array in zip(specs, arrays, strict=True)]
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata, specs)))
 

@@ -36,7 +36,7 @@ class Sample:
         control = self.control._replace(
             h=step_s, elements=elements, error_estimate=error_estimate, locate_yield=locate_yield
         )
-        return simulated(self.designs.table, self.readings, control)
+        return simulated(self.designs, self.readings, control)
 
     def judged(self, outcomes: OutcomeTable, step_s: float) -> Judged:
         """Return their verdicts."""

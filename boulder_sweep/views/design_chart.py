@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.columns import BY_NAME as COLUMNS
-from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, figure
@@ -55,7 +54,7 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
     """
     frame = need.frame
     sets = {axis.name: axis.labels for axis in need.sweep.axes if axis.labels}
-    open_ = [name for name in INPUT_COLUMNS if name not in (need.key.name, *need.derived)]
+    open_ = [name for name in need.sweep.plan.columns if name not in (need.key.name, *need.derived)]
     varying = [name for name in open_ if BY_NAME[name].section not in sets and len(frame[name].unique()) > 1]
     across = next((name for name in ACROSS if name in varying), next(iter(varying), None))
     if across is None:

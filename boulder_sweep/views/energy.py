@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.views import figures
-from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, YELLOW
+from boulder_sweep.views.figures import (
+    AMBER,
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    LIGHT_GREY,
+    ORANGE,
+    PALE_ORANGE,
+    PURPLE,
+    SKY,
+    YELLOW,
+)
 from boulder_sweep.views.labels import sized
 from boulder_sweep.views.trajectory import require_samples
 from boulder_sweep.views.wording import design_line, verdict_line
@@ -64,6 +76,8 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
         axes = fig.subplots()
         above, below = np.zeros_like(time), np.zeros_like(time)
         layers = [(getattr(ledger, name) / size, label, colour) for name, label, colour in LAYERS]
+        if ledger.crush_spent_J.any():
+            layers.insert(1, (ledger.crush_spent_J / size, "crush of the vehicle (spent as it stiffened)", PALE_ORANGE))
         if np.abs(ledger.pull_J).max() > 0.0:
             layers.append((ledger.pull_J / size, "out of nothing (printed separation)", BLACK))
         handles = []

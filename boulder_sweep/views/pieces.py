@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boulder_sweep.columns import OPTIONAL_COLUMNS
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -22,7 +24,8 @@ _RASTER = 500
 """Distinct positions along an axis of a map; more than it has pixels."""
 
 Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
-"""Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along."""
+"""Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and those
+of `boulder_sweep.columns.OPTIONAL_COLUMNS` are left out that the table does not have."""
 
 
 def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
@@ -59,7 +62,8 @@ def finished_pieces(finished: FinishedRows) -> Pieces:
 
     def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         nonlocal verified
-        stored = list(dict.fromkeys(own for name in columns for own in ((DEPTH, HEIGHT) if name == RATIO else (name,))))
+        there = [name for name in columns if name not in OPTIONAL_COLUMNS or name in finished.more_columns]
+        stored = list(dict.fromkeys(own for name in there for own in ((DEPTH, HEIGHT) if name == RATIO else (name,))))
         for table in finished.tables(stored, verify=not verified):
             frame = table.to_pandas()
             yield frame.assign(**{RATIO: frame[DEPTH] / frame[HEIGHT]}) if RATIO in columns else frame

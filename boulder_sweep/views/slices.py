@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME as FIELDS
 from boulder_sweep.views.pieces import DEPTH, HEIGHT, RATIO, Kept, Pieces, pieces_of, with_places
@@ -226,7 +226,7 @@ def _levels_of(pieces: Pieces, sets: Collection[str]) -> tuple[dict[str, np.ndar
     """Return the different values of every input, and the number of rows; a named set stands for what it gives."""
     found: dict[str, np.ndarray] = {}
     total = 0
-    given = [name for name in (*INPUT_COLUMNS, RATIO) if FIELDS[name].section not in sets]
+    given = [name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS, RATIO) if FIELDS[name].section not in sets]
     for piece in pieces([*given, *sets]):
         total += len(piece)
         for name in (*given, *sets):

@@ -126,7 +126,7 @@ def audit(preset: str, steps: Steps, count: int = AUDIT_DESIGNS, seed: int = 0) 
         record = _blank_record()
         simulate_design(design, readings, control, record)
         reached = np.isfinite(record.states).all(axis=1)
-        kept = Record(*(field[reached] for field in record))
+        kept = Record(*(field[reached] for field in record[:-1]))
         residuals[row] = ledger_of(kept, design, readings, constants_of(design, readings, 0)).largest_residual
     return residuals
 

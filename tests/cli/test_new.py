@@ -32,7 +32,12 @@ def test_every_entry_is_in_it_and_every_optional_line_holds(tmp_path, units):
         if line.startswith("  #"):
             path.write_text(text.replace(line, line.replace("# ", "", 1)))
             found = _problems(path)
-            alternatives = {"site.embedment_depth": "not both", "soil.correlation": "needs a distribution"}
+            alternatives = {
+                "site.embedment_depth": "not both",
+                "soil.correlation": "needs a distribution",
+                "vehicle.second_spring": "needs second_spring_from",
+                "vehicle.second_spring_from": "needs second_spring ",
+            }
             assert [p for p in found if alternatives.get(field.path, "-") not in p] == [], field.path
 
 

@@ -166,7 +166,7 @@ def in_pieces(table: pd.DataFrame, size: int) -> Pieces:
     def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         (frame,) = whole(columns)
         for first in range(0, len(frame), size):
-            yield frame[list(columns)][first : first + size]
+            yield frame[[name for name in columns if name in frame]][first : first + size]
 
     return pieces
 
