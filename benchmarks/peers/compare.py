@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib
 import time
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -19,6 +20,8 @@ from .problem import READINGS, Problem, Solver, peaks
 ACCURACY_DEG = 0.01
 """Largest error of the largest rotation at which all are compared."""
 KERNEL_STEPS_S = (0.016, 0.014, 0.012, 0.010, 0.008, 0.006, 0.004, 0.002, 0.001)
+FEWER_OUTPUTS = (49, 33, 25, 17, 13, 9, 5)
+"""Numbers of output times that are tried once the tolerance is found; giving fewer is less work for a solver."""
 LONGEST_S = 20.0
 """A solver that takes longer than this for one tolerance is not tried at a finer one."""
 MODULES = {
@@ -47,6 +50,10 @@ class Measured:
         Why there are no more points; empty if there is no problem.
     in_steps
         Whether the tolerances are steps [s].
+    outputs
+        Output times; None if the solver finds the peaks itself.
+    with_fewest
+        The chosen point again with no more output times than the accuracy needs; None where it is not known.
     """
 
     name: str
@@ -54,6 +61,8 @@ class Measured:
     points: list[tuple[float, float, float]] = field(default_factory=list)
     problem: str = ""
     in_steps: bool = False
+    outputs: int | None = None
+    with_fewest: tuple[float, float, float] | None = None
 
     @property
     def chosen(self) -> tuple[float, float, float] | None:
@@ -63,7 +72,7 @@ class Measured:
             if point[2] > ACCURACY_DEG:
                 break
             best = point
-        return best
+        return self.with_fewest or best
 
 
 def measure_kernels(problem: Problem, *, in_lanes: bool = True) -> Measured:
@@ -101,21 +110,43 @@ def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measured
     own = problem.first(min(solver.designs, problem.size))
     measured = Measured(solver.name, own.size, in_steps=solver.in_steps)
     solve = solver.prepare(own)
-    solve(solver.tolerances[0])
-    enough = 0
+    enough, states = 0, solve(solver.tolerances[0]).ndim > 1
     for tolerance in solver.tolerances:
-        begun = time.process_time()
-        found = solve(tolerance)
-        seconds = time.process_time() - begun
-        error = own.largest_error_deg(found if found.ndim == 1 else peaks(own, found))
-        measured.points.append((tolerance, seconds / own.size, error))
-        enough = enough + 1 if error <= ACCURACY_DEG else 0
+        point = _point(solve, tolerance, own)
+        measured.points.append(point)
+        enough = enough + 1 if point[2] <= ACCURACY_DEG else 0
         if enough > finer:
             break
-        if seconds > LONGEST_S:
+        if (seconds := point[1] * own.size) > LONGEST_S:
             measured.problem = f"finer tolerances were not tried: this one took {seconds:.0f} s"
             break
+    if states:
+        measured.outputs = own.outputs
+        _try_fewer_outputs(measured, solver, own)
     return measured
+
+
+def _point(solve: Callable[[float], np.ndarray], tolerance: float, problem: Problem) -> tuple[float, float, float]:
+    """Tolerance, CPU time per design [s] and largest error [deg] of one solution."""
+    begun = time.process_time()
+    found = solve(tolerance)
+    seconds = time.process_time() - begun
+    error = problem.largest_error_deg(found if found.ndim == 1 else peaks(problem, found))
+    return tolerance, seconds / problem.size, error
+
+
+def _try_fewer_outputs(measured: Measured, solver: Solver, problem: Problem) -> None:
+    """Give fewer output times as long as the chosen tolerance stays accurate enough."""
+    if measured.chosen is None:
+        return
+    for outputs in FEWER_OUTPUTS:
+        fewer = replace(problem, outputs=outputs)
+        solve = solver.prepare(fewer)
+        solve(measured.chosen[0])
+        point = _point(solve, measured.chosen[0], fewer)
+        if point[2] > ACCURACY_DEG:
+            return
+        measured.outputs, measured.with_fewest = outputs, point
 
 
 def measure_all(problem: Problem) -> tuple[list[Measured], list[str]]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from boulder_kernels import Constants
 
-from .problem import OUTPUTS, Problem, Solver
+from .problem import Problem, Solver
 
 LONGEST_STEPS_S = tuple(4e-3 * 2.0 ** (-0.5 * k) for k in range(14))
 SERIES_TOLERANCE = 1e-7
@@ -80,7 +80,7 @@ def _prepare(problem: Problem) -> Callable[[float], np.ndarray]:
     v_0 = Constants._fields.index("v_0")
 
     def solve_all(longest_step: float) -> np.ndarray:
-        states = np.full((problem.size, OUTPUTS, 6), np.nan)
+        states = np.full((problem.size, problem.outputs, 6), np.nan)
         for start in range(0, problem.size, LANES):
             part = np.arange(start, min(start + LANES, problem.size))
             lanes = np.resize(part, LANES)  # the last batch is padded with designs it has already

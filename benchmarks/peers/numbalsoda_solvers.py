@@ -13,7 +13,7 @@ from boulder_kernels import Constants
 from boulder_kernels.dynamics import State
 
 from ..literal import literal_acceleration
-from .problem import OUTPUTS, READINGS, Problem, Solver
+from .problem import READINGS, Problem, Solver
 
 TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(4, 19))
 ABSOLUTE = 0.1
@@ -38,11 +38,11 @@ def _loop(solve: Callable[..., tuple[np.ndarray, bool]]) -> Callable[..., np.nda
     """Compile the loop over designs around one of the solvers."""
 
     @numba.njit(nogil=True)
-    def solve_all(address, constants, v_0, t_end, tolerance):
-        states = np.full((len(t_end), OUTPUTS, 6), np.nan)
+    def solve_all(address, constants, v_0, t_end, outputs, tolerance):
+        states = np.full((len(t_end), outputs, 6), np.nan)
         for row in range(len(t_end)):
             start = np.array((0.0, 0.0, 0.0, 0.0, 0.0, v_0[row]))
-            times = np.linspace(0.0, t_end[row], OUTPUTS)
+            times = np.linspace(0.0, t_end[row], outputs)
             found, success = solve(address, start, times, constants[row], tolerance, ABSOLUTE * tolerance, MOST_STEPS)
             if success:
                 states[row] = found
@@ -59,8 +59,8 @@ def _prepare(method: str, problem: Problem) -> Callable[[float], np.ndarray]:
     constants = np.array([[float(value) for value in c] for c in rows])
     v_0 = np.array([c.v_0 for c in rows])
     solve, address = _LOOPS[method], _rates.address
-    solve(address, constants[:1], v_0[:1], problem.t_end[:1], 1e-3)  # compiles
-    return lambda tolerance: solve(address, constants, v_0, problem.t_end, tolerance)
+    solve(address, constants[:1], v_0[:1], problem.t_end[:1], problem.outputs, 1e-3)  # compiles
+    return lambda tolerance: solve(address, constants, v_0, problem.t_end, problem.outputs, tolerance)
 
 
 SOLVERS = [

@@ -1,13 +1,13 @@
 """The problem that all solvers get, and how their answers are compared.
 
 They get an advantage over the kernels: each design ends at the time at which the kernels stopped, so that no
-solver simulates more than it needs to, and the peak is taken from 65 output times afterwards, untimed.
+solver simulates more than it needs to, and the peak is taken from the states at some output times afterwards, untimed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -22,7 +22,7 @@ from ..literal import literal_acceleration
 
 READINGS = bk.corrected()
 OUTPUTS = 65
-"""Times at which a solver gives its state, from 0 to the end."""
+"""Times at which a solver gives its state, from 0 to the end, unless fewer do."""
 REFERENCE_STEP_S = 5e-5
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
@@ -40,11 +40,14 @@ class Problem:
         End of each [s], shape (n,).
     theta
         Largest rotation of each in the reference [rad], shape (n,).
+    outputs
+        Times at which a solver gives its state, from 0 to the end: k of them.
     """
 
     designs: DesignTable
     t_end: np.ndarray
     theta: np.ndarray
+    outputs: int = OUTPUTS
 
     @property
     def size(self) -> int:
@@ -53,11 +56,13 @@ class Problem:
 
     def first(self, count: int) -> Problem:
         """Return the problem of the first designs only."""
-        return Problem(first(self.designs, count), self.t_end[:count].copy(), self.theta[:count].copy())
+        return replace(
+            self, designs=first(self.designs, count), t_end=self.t_end[:count].copy(), theta=self.theta[:count].copy()
+        )
 
     def times(self, row: int) -> np.ndarray:
-        """Output times of a design [s], shape (65,)."""
-        return np.linspace(0.0, self.t_end[row], OUTPUTS)
+        """Output times of a design [s], shape (k,)."""
+        return np.linspace(0.0, self.t_end[row], self.outputs)
 
     def constants(self, row: int, elements: int = 0) -> Constants:
         """Constants of the motion of a design."""
@@ -81,7 +86,7 @@ class Solver:
         Number of designs it gets; slow solvers get fewer.
     prepare
         Returns, for the problem, the function that solves it at a tolerance, compiled if need be. The function
-        returns the states, shape (n, 65, 6), or the largest rotations [rad], shape (n,).
+        returns the states, shape (n, k, 6), or the largest rotations [rad], shape (n,).
     tolerances
         Relative tolerances (or steps) to try, the loosest first.
     in_steps
@@ -103,7 +108,7 @@ def problem_of(designs: DesignTable) -> Problem:
 
 
 def peaks(problem: Problem, states: np.ndarray) -> np.ndarray:
-    """Largest rotation of each design [rad], from states at the output times, shape (n, 65, 6)."""
+    """Largest rotation of each design [rad], from states at the output times, shape (n, k, 6)."""
     return np.array([_peak(problem.constants(row), problem.times(row), states[row]) for row in range(problem.size)])
 
 

@@ -16,7 +16,7 @@ from boulder_kernels.vehicle import contact_displacement, contact_lever, spring_
 
 from ..designs import HORIZON, ROTATION_LIMIT
 from ..literal import literal_acceleration, literal_net_moment
-from .problem import OUTPUTS, READINGS, Problem, Solver
+from .problem import READINGS, Problem, Solver
 
 ELEMENTS = 5000
 TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(4, 19))
@@ -72,7 +72,7 @@ def _solve(
     ends: np.ndarray | None = None,
 ) -> np.ndarray:
     """Solve design by design, as a user of SciPy would; up to other end times [s] than the problem's if given."""
-    states = np.full((problem.size, OUTPUTS, 6), np.nan)
+    states = np.full((problem.size, problem.outputs, 6), np.nan)
     for row, rate in enumerate(rates):
         times = problem.times(row)
         span = (0.0, times[-1] if ends is None else ends[row])

@@ -34,6 +34,13 @@ SITE = Path(__file__).parents[2] / "configs" / "site.yaml"
 ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
 
 
+@pytest.fixture(scope="module")
+def compiled():
+    """Compile all kernels, where that was not done before."""
+    evaluation_of(crash_test("rwg"), Accuracy("", Steps(0.01), error_estimate=False)).warm_up()
+    simulate(crash_test("rwg"))
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -46,7 +53,7 @@ ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
         ("tradeoff", SITE, *ONE, "--seconds", "0"),
     ],
 )
-def test_every_command_that_compiles_says_so_first(sweep, words, monkeypatch, tmp_path):
+def test_every_command_that_compiles_says_so_first(compiled, sweep, words, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert COMPILING not in sweep(*words)[2]
     monkeypatch.setattr("boulder_sweep.cli.progress.cold_start", lambda kernels: f"{COMPILING}7 s")
@@ -81,9 +88,7 @@ def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatc
     assert progress.cold_start("design") is not None
 
 
-def test_compiled_kernels_are_those_that_are_looked_for():
-    evaluation_of(crash_test("rwg"), Accuracy("", Steps(0.01), error_estimate=False)).warm_up()
-    simulate(crash_test("rwg"))
+def test_compiled_kernels_are_those_that_are_looked_for(compiled):
     assert progress.cold_start("table") is None
     assert progress.cold_start("design") is None
 
