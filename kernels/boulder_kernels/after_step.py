@@ -69,7 +69,7 @@ class Ending(NamedTuple):
     """Whether the energy argument of `boulder_kernels.settling` holds."""
 
 
-@kernel
+@inlined
 def is_finite(y: State) -> bool:
     """Whether no component of a state is NaN or infinite."""
     return bool(np.isfinite(y.x_b + y.v_b + y.theta_b + y.omega_b + y.x_v + y.v_v))
@@ -81,7 +81,7 @@ def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
     return acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c)
 
 
-@kernel
+@inlined
 def is_growing(y: State, m: Maxima) -> bool:
     """Whether a maximum of rotation or truck is just being set."""
     turning_out = y.theta_b * y.omega_b > 0.0 and abs(y.theta_b) >= m.theta
@@ -255,7 +255,7 @@ def keep_step(
     return kept_up_to(event, tau, t, y_end, start, m, dense, switches, c)
 
 
-@kernel
+@inlined
 def decide(
     t: float, h: float, y_start: State, kept: Kept, barrier: float, horizon: float, ending: Ending, c: Constants
 ) -> Decided:
@@ -300,7 +300,7 @@ def at_limit(m: Maxima, t: float, limit: float) -> Maxima:
     return Maxima(limit, t, m.x_b, m.t_x_b, m.x_v, m.t_x_v, m.F_v, m.t_F_v, m.crush, m.t_crush)
 
 
-@kernel
+@inlined
 def enter_modes(
     modes: Modes, readings: Readings, theta_stop: float, locate_yield: bool, c: Constants
 ) -> tuple[Switches, GapFactors]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import inlined, kernel
+from ._jit import inlined
 from .design import Constants
 from .dynamics import State
 from .modes import FREE, HELD, LIMITED_FORWARD, SEATED, TURNING_BACK, TURNING_FORWARD, Modes
@@ -84,7 +84,7 @@ class Gaps(NamedTuple):
     limit: float
 
 
-@kernel
+@inlined
 def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: bool) -> GapFactors:
     """Factors of the gaps in the present modes.
 

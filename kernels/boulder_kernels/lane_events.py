@@ -140,7 +140,7 @@ def keep_steps(ws: np.ndarray) -> None:
             store(ws, MAXIMA, lane, kept.m)
 
 
-@kernel
+@inlined
 def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, locate_yield: bool) -> int:
     """Decide what follows from the step of a lane, and go over into the modes that follow its event.
 

@@ -107,11 +107,11 @@ def next_design(
 @inlined
 def let_return(ws: np.ndarray, q: Queue, other: int, place: int) -> None:
     """Move a design from its place in a group of events into a lane."""
-    copy_lane(ws, lane_of(other), lane_of(place), 0, ATTENTION)
+    copy_lane(ws, lane_of(other), lane_of(place), ATTENTION)
     q.rows[place] = q.rows[other]
 
 
-@kernel
+@inlined
 def hand_over(
     ws: np.ndarray,
     q: Queue,
@@ -124,7 +124,7 @@ def hand_over(
     """Move a design into the group of events, and let another into its lane; arguments as of `next_design`."""
     counts = q.counts
     other = STEPPED + counts[SIDE] * LANES + counts[PENDING]
-    copy_lane(ws, lane_of(place), lane_of(other), 0, SIZE)
+    copy_lane(ws, lane_of(place), lane_of(other), SIZE)
     q.rows[other] = q.rows[place]
     counts[PENDING] += 1
     if counts[READY] > 0:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import kernel
+from ._jit import inlined
 from .design import Constants
 from .readings import Readings
 
@@ -69,7 +69,7 @@ class Switches(NamedTuple):
     """Spring over mass that decelerates the truck, k_v/m_v or 0 [1/s^2]."""
 
 
-@kernel
+@inlined
 def switches_of(modes: Modes, readings: Readings, c: Constants) -> Switches:
     """Factors of the right-hand side for the modes of a step (Eqs 37-39, 47)."""
     net, couple, couple_sin = 1.0, 0.0, 0.0

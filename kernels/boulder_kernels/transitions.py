@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ._jit import kernel
+from ._jit import inlined, kernel
 from .design import Constants
 from .dynamics import State
 from .gaps import ARM, CONTACT, CORNER, COUPLE, ROTATION, YIELD_BASE, YIELD_TOP
@@ -70,7 +70,7 @@ def initial_modes(readings: Readings, c: Constants) -> Modes:
     return Modes(turning, True, 1.0, 1.0, 0, 0)
 
 
-@kernel
+@inlined
 def yield_mode(displacement: float, c: Constants) -> int:
     """Mode of the soil at a displacement [m]: 0 below its ultimate resistance, 1 at it forwards, -1 backwards."""
     if abs(displacement) <= c.x_yield:
@@ -78,7 +78,7 @@ def yield_mode(displacement: float, c: Constants) -> int:
     return 1 if displacement > 0.0 else -1
 
 
-@kernel
+@inlined
 def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> tuple[State, Modes]:
     """Cross an event: the modes that follow, and the state with its crossing made exact.
 

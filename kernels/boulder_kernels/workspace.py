@@ -18,7 +18,6 @@ import numpy as np
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
-from ._jit import inlined
 from .dense_output import Track
 from .design import Constants
 from .dynamics import Acceleration, State
@@ -182,19 +181,22 @@ def store(ws: np.ndarray, place: int, lane: int, record: Any) -> None:
         ws[place + offset + lane] = getattr(record, name)
 
 
-# Inside kernels the four are instructions of the compiler, one load or store for every number: as code to be compiled
-# and inlined wherever they are called they would take a third of the time of all kernels to compile.
+def copy_lane(ws: np.ndarray, lane: int, other: int, end: int) -> None:
+    """Copy the numbers of one lane to another, up to before a place."""
+    ws[other : other + end : LANES] = ws[lane : lane + end : LANES]
 
 
-def _pointer(context: Any, builder: Any, sig: Any, args: Any, offset: int = 0) -> Any:
-    """Where the number at a place and an offset lies for one lane, from the first three arguments of a call."""
-    (ws_type, place_type, lane_type), (ws, place, lane) = sig.args[:3], args[:3]
-    place, lane = (
-        context.cast(builder, value, kind, types.intp) for value, kind in ((place, place_type), (lane, lane_type))
-    )
-    numbers = context.make_array(ws_type)(context, builder, ws).data
-    first = builder.add(place, context.get_constant(types.intp, offset))
-    return builder.gep(numbers, [builder.add(first, lane)], inbounds=True)
+# Inside kernels the five are instructions of the compiler, one load or store for every number: as code to be compiled
+# and inlined wherever they are called they would take a third of the time of all kernels to compile. A copy by a loop
+# would be compiled to vectors gathered and scattered, which take three times as long.
+
+
+def _pointer(context: Any, builder: Any, kinds: Any, values: Any, offset: int = 0) -> Any:
+    """Where a number lies: from the workspace on, the sum of some whole numbers and an offset."""
+    first = context.get_constant(types.intp, offset)
+    for kind, value in zip(kinds[1:], values[1:], strict=True):
+        first = builder.add(first, context.cast(builder, value, kind, types.intp))
+    return builder.gep(context.make_array(kinds[0])(context, builder, values[0]).data, [first], inbounds=True)
 
 
 _NOT_REAL = {int: types.int64, bool: types.boolean}
@@ -207,7 +209,7 @@ def _type_field(context: Any) -> Callable[..., Any]:
 
 @lower_builtin(field, types.Array, types.Any, types.Any)
 def _lower_field(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.load(_pointer(context, builder, sig, args))
+    return builder.load(_pointer(context, builder, sig.args[:3], args[:3]))
 
 
 @type_callable(put)
@@ -218,7 +220,7 @@ def _type_put(context: Any) -> Callable[..., Any]:
 @lower_builtin(put, types.Array, types.Any, types.Any, types.Any)
 def _lower_put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     value = context.cast(builder, args[3], sig.args[3], sig.args[0].dtype)
-    builder.store(value, _pointer(context, builder, sig, args))
+    builder.store(value, _pointer(context, builder, sig.args[:3], args[:3]))
     return context.get_dummy_value()
 
 
@@ -242,7 +244,7 @@ def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     values = []
     for name, kind in zip(record._fields, sig.return_type.types, strict=True):
         if name in offsets:
-            number = builder.load(_pointer(context, builder, sig, args, offsets[name]))
+            number = builder.load(_pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
             values.append(context.cast(builder, number, sig.args[0].dtype, kind))
         else:
             values.append(context.get_constant(kind, KNOWN[name]))
@@ -261,13 +263,24 @@ def _lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     for i, (name, kind) in enumerate(zip(record.fields, record.types, strict=True)):
         if name in offsets:
             value = context.cast(builder, builder.extract_value(args[3], i), kind, sig.args[0].dtype)
-            builder.store(value, _pointer(context, builder, sig, args, offsets[name]))
+            builder.store(value, _pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
     return context.get_dummy_value()
 
 
-@inlined
-def copy_lane(ws: np.ndarray, lane: int, other: int, first: int, end: int) -> None:
-    """Copy the numbers of one lane to another, from a place to before another."""
-    source, target = ws[lane:], ws[other:]
-    for place in range(first, end, LANES):
-        target[place] = source[place]
+@type_callable(copy_lane)
+def _type_copy_lane(context: Any) -> Callable[..., Any]:
+    def result(ws: Any, lane: Any, other: Any, end: Any) -> Any:
+        """Return the type of the result, or None where the end is not yet known as a constant."""
+        return types.void if isinstance(end, types.IntegerLiteral) else None
+
+    return result
+
+
+@lower_builtin(copy_lane, types.Array, types.Any, types.Any, types.IntegerLiteral)
+def _lower_copy_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    for place in range(0, sig.args[3].literal_value, LANES):
+        source, target = (
+            _pointer(context, builder, (sig.args[0], sig.args[i]), (args[0], args[i]), place) for i in (1, 2)
+        )
+        builder.store(builder.load(source), target)
+    return context.get_dummy_value()

@@ -1,0 +1,179 @@
+"""CPU time and memory in proportion to another checkout, such as an earlier version of the project.
+
+Run as ``python -m benchmarks.ratio FOLDER``: kernels by four settings on random designs and on those of
+``configs/m30_sizing.yaml``, and whole runs of 10^6 designs from process start to table. Each checkout has a process
+and a folder of compiled kernels of its own. Both are timed in turn in every round, so that the load of the machine hits
+both alike.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+
+FOLDER = Path(__file__).resolve().parent.parent
+ROUNDS, RUN_ROUNDS = 9, 3
+RUN_ROWS = 1_000_000
+
+
+class Setting(NamedTuple):
+    """How designs are simulated."""
+
+    step_s: float
+    error_estimate: bool
+    locate_yield: bool
+    printed: bool
+
+
+def settings() -> dict[str, Setting]:
+    """Settings whose costs are compared, by name."""
+    from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
+
+    found = {name: Setting(steps.step_s, name != "fast", steps.locate_yield, False) for name, steps in STEPS.items()}
+    return found | {"as_printed": Setting(STEPS_PRINTED["balanced"].step_s, True, False, True)}
+
+
+def tables() -> dict[str, dict[str, np.ndarray]]:
+    """Designs that are simulated, by name, as columns of a `DesignTable`."""
+    from boulder_sweep import load
+    from boulder_sweep.judge.inputs import designs_of
+
+    from .designs import DESIGNS, sample
+
+    sweep = load(FOLDER / "configs" / "m30_sizing.yaml")
+    grid = designs_of(sweep.block(0, sweep.n_designs)).table._asdict()
+    every = max(sweep.n_designs // DESIGNS, 1)
+    return {
+        "random": sample()._asdict(),
+        "m30_sizing": {name: np.ascontiguousarray(column[::every]) for name, column in grid.items()},
+    }
+
+
+class Kernels:
+    """A process with the kernels of one checkout, which times them when asked to."""
+
+    def __init__(self, checkout: Path, cache: Path, designs: Path) -> None:
+        command = [sys.executable, str(Path(__file__).resolve()), str(designs)]
+        self._process = subprocess.Popen(
+            command, env=_environment(checkout, cache), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def cpu_s(self, designs: str, setting: Setting) -> float:
+        """CPU time of one simulation of a table of designs [s]."""
+        assert self._process.stdin is not None, "the pipe was asked for"
+        assert self._process.stdout is not None, "the pipe was asked for"
+        self._process.stdin.write(f"{designs} {setting.step_s} {setting[1]:d} {setting[2]:d} {setting[3]:d}\n")
+        self._process.stdin.flush()
+        return float(self._process.stdout.readline())
+
+    def end(self) -> None:
+        """End the process."""
+        self._process.communicate()
+
+
+def answer_requests(designs: Path) -> None:
+    """Time the kernels of this process as its standard input asks; the designs are the files of a folder."""
+    import boulder_kernels as bk
+
+    known = {
+        file.stem: bk.DesignTable(*(np.ascontiguousarray(column) for column in np.load(file)))
+        for file in designs.glob("*.npy")
+    }
+    for line in sys.stdin:
+        name, step, estimate, locate, printed = line.split()
+        control = bk.Control(float(step), 1.0, np.radians(20.0), 0, estimate == "1", True, locate == "1")
+        readings = bk.as_printed() if printed == "1" else bk.corrected()
+        begun = time.process_time()
+        bk.simulate_table(known[name], readings, control)
+        print(time.process_time() - begun, flush=True)
+
+
+def whole_run(checkout: Path, cache: Path, accuracy: str, folder: Path) -> tuple[float, float]:
+    """CPU time [s] and largest memory [MB] of a ``sweep run``, from process start to table."""
+    from .sweep import settings_of
+
+    grid = folder / "grid.yaml"
+    grid.write_text(settings_of(RUN_ROWS))
+    with tempfile.TemporaryDirectory(dir=folder) as name:
+        words = ("run", str(grid), "-o", f"{name}/table", "--jobs", "2", "--accuracy", accuracy, "--quiet")
+        command = [sys.executable, "-m", "boulder_sweep", *words]
+        process = subprocess.Popen(command, env=_environment(checkout, cache), stdout=subprocess.DEVNULL)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"the run of {checkout} ended with exit code {process.returncode}")
+    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
+
+
+def _environment(checkout: Path, cache: Path) -> dict[str, str]:
+    path = os.pathsep.join((str(checkout), str(checkout / "kernels")))
+    return os.environ | {"PYTHONPATH": path, "BOULDER_SWEEP_CACHE_DIR": str(cache)}
+
+
+def compare_kernels(checkouts: tuple[Path, Path], caches: tuple[Path, Path], folder: Path, rounds: int) -> None:
+    """Print the ratios of the kernels' times."""
+    known = tables()
+    for name, table in known.items():
+        np.save(folder / f"{name}.npy", np.stack(list(table.values())))
+    both = [Kernels(checkout, cache, folder) for checkout, cache in zip(checkouts, caches, strict=True)]
+    print("kernels      designs     now [us]  other [us]  ratio of least, median of ratios")
+    for setting_name, setting in settings().items():
+        for name, table in known.items():
+            count = len(table["L"])
+            for kernels in both:
+                kernels.cpu_s(name, setting)
+            times = [[kernels.cpu_s(name, setting) for kernels in both] for _ in range(rounds)]
+            now, other = (1e6 * min(column) / count for column in zip(*times, strict=True))
+            ratio = median(a / b for a, b in times)
+            print(f"{setting_name:<12} {name:<11} {now:8.3f} {other:11.3f}  {now / other:.3f}, {ratio:.3f}", flush=True)
+    for kernels in both:
+        kernels.end()
+
+
+def compare_runs(checkouts: tuple[Path, Path], caches: tuple[Path, Path], folder: Path, rounds: int) -> None:
+    """Print the ratios of the CPU times of whole runs, and the memory."""
+    print("run of 10^6  now [s]  other [s]  ratio of least, median of ratios   memory [MB]")
+    for accuracy in ("fast", "balanced"):
+        for checkout, cache in zip(checkouts, caches, strict=True):
+            whole_run(checkout, cache, accuracy, folder)
+        found = [
+            [whole_run(checkout, cache, accuracy, folder) for checkout, cache in zip(checkouts, caches, strict=True)]
+            for _ in range(rounds)
+        ]
+        now, other = (min(run[0] for run in column) for column in zip(*found, strict=True))
+        ratio = median(a[0] / b[0] for a, b in found)
+        memory = [max(run[1] for run in column) for column in zip(*found, strict=True)]
+        used = f"{memory[0]:.0f} and {memory[1]:.0f}"
+        print(f"{accuracy:<12} {now:7.2f} {other:10.2f}  {now / other:.3f}, {ratio:.3f}   {used}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.ratio", description=__doc__)
+    parser.add_argument("checkout", type=Path, help="folder of another checkout")
+    parser.add_argument("--rounds", type=int, default=ROUNDS, help="how often the kernels are timed")
+    parser.add_argument("--only", choices=("kernels", "runs"), help="only one part")
+    arguments = parser.parse_args()
+    checkouts = (FOLDER, arguments.checkout.resolve())
+    with tempfile.TemporaryDirectory(prefix="sweep-ratio-") as name:
+        folder = Path(name)
+        caches = (folder / "cache-0", folder / "cache-1")
+        if arguments.only != "runs":
+            compare_kernels(checkouts, caches, folder, arguments.rounds)
+        if arguments.only != "kernels":
+            compare_runs(checkouts, caches, folder, RUN_ROUNDS)
+
+
+if __name__ == "__main__":
+    if __package__:
+        main()
+    else:
+        answer_requests(Path(sys.argv[1]))
