@@ -92,6 +92,11 @@ def why_lines(found: Explanation) -> list[str]:
             f"  penetration: {row['penetration_m']:.4g} m, {rating} allows {PENETRATION_LIMITS_M[rating]:g} m "
             f"beyond the far face"
         )
+    if row.get("permanent_tilt_deg") is not None:
+        lines.append(
+            f"  afterwards: swings back by {row['swing_back_deg']:.3g} deg and comes to rest at "
+            f"{row['permanent_tilt_deg']:.3g} deg, to within {row['permanent_tilt_error_deg']:.1g} deg"
+        )
     if row["rotation_error_deg"] is not None:
         lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
     if row.get("validity"):

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOME_COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import Criterion, Model, ReadingChoice, SolverSettings
+from boulder_sweep.settings.model import UNLOADINGS, Criterion, Model, ReadingChoice, SolverSettings
 from boulder_sweep.store.errors import OtherVersionError
 from boulder_sweep.store.manifest import load as load_manifest
 from boulder_sweep.store.provenance import differences, identity
@@ -116,15 +116,16 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         raise OtherVersionError(folder, why, version_of({"identity": there})) from unfamiliar
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
-    judged = Evaluation(readings, control, limits, resistance=sweep.model.resistance)(block)
+    evaluation = Evaluation(readings, control, limits, resistance=sweep.model.resistance)
+    judged = evaluation(block)
     again = part_table(block, judged, {}).to_pylist()[0]
     computable = not block.reasons[0]
     return Explanation(
         name=sweep.name,
         design_id=design_id,
         inputs=inputs,
-        stored={name: values[name] for name in OUTCOME_COLUMNS},
-        recomputed={name: again[name] for name in OUTCOME_COLUMNS},
+        stored={spec.name: values[spec.name] for spec in evaluation.columns},
+        recomputed={spec.name: again[spec.name] for spec in evaluation.columns},
         changed=tuple(differences(there, identity(*stated))),
         trajectory=simulate(sweep) if computable else None,
     )
@@ -140,7 +141,11 @@ def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], contr
         constants={name: float(value) for name, value in inputs.items() if value is not None},
         criterion=Criterion(**settings["criterion"]),
         model=Model(
-            readings, control.elements, settings["model"]["calibrated_crush_m"], settings["model"]["resistance"]
+            readings,
+            control.elements,
+            settings["model"]["calibrated_crush_m"],
+            settings["model"]["resistance"],
+            UNLOADINGS[control.unloading],
         ),
         solver=SolverSettings(
             accuracy=None,

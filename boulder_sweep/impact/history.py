@@ -9,6 +9,7 @@ import numpy as np
 from boulder_kernels import Constants, Design, Readings, Record, SecondSpring
 from boulder_kernels.dynamics import Acceleration, State, acceleration
 from boulder_kernels.energy import stored_energies
+from boulder_kernels.memory import at_sample
 from boulder_kernels.modes import (
     FREE,
     HELD,
@@ -23,6 +24,7 @@ from boulder_kernels.modes import (
 )
 from boulder_kernels.second_spring import on_second_spring, spent_energy
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
+from boulder_kernels.unloading import plastic_work
 
 MODE_NAMES = {
     SEATED: "seated",
@@ -55,6 +57,8 @@ class EnergyLedger:
         Kinetic energy of boulder and lumped soil.
     soil_elastic_J, soil_drag_J : ndarray
         Stored in the springs of the soil, and dissipated by its drag.
+    soil_plastic_J : ndarray
+        Taken by soil that is pressed for good; 0 where it springs back (Eq 123).
     gravity_J : ndarray
         Done against the weight. Under the gravity reading a potential energy; as printed the work done against
         the restoring moment, which has no potential (and is negative where it drives the boulder on).
@@ -72,6 +76,7 @@ class EnergyLedger:
     boulder_linear_J: np.ndarray
     boulder_angular_J: np.ndarray
     soil_elastic_J: np.ndarray
+    soil_plastic_J: np.ndarray
     soil_drag_J: np.ndarray
     gravity_J: np.ndarray
     pull_J: np.ndarray
@@ -157,6 +162,8 @@ def ledger_of(
         for y, touching, own in zip(record.states, record.touching, _constants(record, c, second), strict=True)
     ]
     spent = [0.0 if second is None else spent_energy(float(u_0), c.k_v, second.k_2) for u_0 in _offsets(record)]
+    works = [plastic_work(State(*y), at_sample(c, row)) for row, y in enumerate(record.states)]
+    before, since = np.array(works).reshape(-1, 2).T
     truck, linear, angular, elastic, spring, potential = np.array(stored).reshape(-1, 6).T
     drag, damper, restoring, pull = record.exchanged.T
     parts = {
@@ -166,7 +173,8 @@ def ledger_of(
         "crush_spent_J": np.array(spent),
         "boulder_linear_J": linear,
         "boulder_angular_J": angular,
-        "soil_elastic_J": elastic,
+        "soil_elastic_J": elastic - since,
+        "soil_plastic_J": before + since,
         "soil_drag_J": drag.copy(),
         "gravity_J": potential if readings.restoring_gravity else restoring.copy(),
         "pull_J": -pull,
@@ -182,10 +190,12 @@ def _offsets(record: Record) -> np.ndarray:
 
 
 def _constants(record: Record, c: Constants, second: SecondSpring | None) -> list[Constants]:
-    """Return the constants of every sample: those of the second spring where it has taken over."""
+    """Return the constants of every sample: what soil remembers, and the second spring where it has taken over."""
+    own = [at_sample(c, row) for row in range(len(record.times))]
     if second is None:
-        return [c] * len(record.times)
-    return [c if u_0 == 0.0 else on_second_spring(c, second.k_2, float(u_0)) for u_0 in _offsets(record)]
+        return own
+    offsets = zip(own, _offsets(record), strict=True)
+    return [now if u_0 == 0.0 else on_second_spring(now, second.k_2, float(u_0)) for now, u_0 in offsets]
 
 
 def _samples(

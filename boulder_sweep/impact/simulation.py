@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import (
+    ELASTIC,
     Control,
     Design,
     DesignTable,
@@ -26,8 +27,9 @@ from boulder_kernels import (
 from boulder_kernels.design import design_at
 from boulder_kernels.impact import simulate_on_springs
 from boulder_kernels.outcomes import empty_outcomes, write_outcome
+from boulder_kernels.plastic import simulate_plastic
 from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
-from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import AT_REST, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
@@ -123,26 +125,29 @@ def simulate(
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
     second = None if designs.springs is None else SecondSpring(*(float(column[0]) for column in designs.springs))
-    outcome = _simulated(one, how, control, record, second)
+    outcome, c = _simulated(one, how, control, record, second)
     row = _outcome_row(outcome)
     if control.error_estimate:
-        coarser = _simulated(one, how, control._replace(halved=False), no_record(), second)
+        coarser, _ = _simulated(one, how, control._replace(halved=False), no_record(), second)
         _estimate(row, _outcome_row(coarser), designs.table, how)
     judged = judge(row, designs, evaluation.limits, reported_step_s(control))
     if judged.verdict[0] != ERROR:
         judged = _as_decided(judged, decided)
-    c = constants_of(one, how, control.elements)
     motion = Motion(one, how, c, control, _kept(record, times, outcome), outcome, second)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
 
 
 def _simulated(
     design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None
-) -> Outcome:
-    """Simulate one impact, by kernels of its own where the vehicle has a second spring."""
+) -> tuple[Outcome, Any]:
+    """Simulate one design; return also the constants of its motion, with what its soil remembered at each sample."""
+    if control.unloading != ELASTIC:
+        found = simulate_plastic(design, readings, control, record, second)
+        return found.outcome, found.constants
+    c = constants_of(design, readings, control.elements)
     if second is None:
-        return simulate_design(design, readings, control, record)
-    return simulate_on_springs(design, readings, control, record, second)
+        return simulate_design(design, readings, control, record), c
+    return simulate_on_springs(design, readings, control, record, second), c
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
@@ -208,7 +213,8 @@ def _control(control: Control, decided: Judged) -> Control:
 
 def _as_decided(judged: Judged, decided: Judged) -> Judged:
     """Return the maxima of the whole time history with the verdict of a row of ``sweep run``."""
-    columns = judged.columns | {name: decided[name] for name in _DECIDED}
+    own = (*_DECIDED, *(spec.name for spec in AT_REST if spec.name in decided.columns))
+    columns = judged.columns | {name: decided[name] for name in own}
     return Judged(columns, judged.words | {name: decided.words[name] for name in _DECIDED if name in decided.words})
 
 

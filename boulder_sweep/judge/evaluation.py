@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
+from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
-from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -92,7 +93,7 @@ class Evaluation:
             return self.judged(designs_of(block, None, self.resistance))
         codes = np.asarray(block.reasons.codes)
         computable = codes == 0
-        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1)
+        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1, self.columns)
         if not computable.any():
             return joined([refused])
         both = joined([self.judged(designs_of(block, computable, self.resistance)), refused])
@@ -132,6 +133,11 @@ class Evaluation:
         """Simulate and judge designs once."""
         outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
         return judge(outcomes, designs, self.limits, reported_step_s(control), self.only)
+
+    @property
+    def columns(self) -> tuple[OutcomeColumn, ...]:
+        """Outcome columns of the rows, where `only` does not leave some out."""
+        return (*OUTCOMES, *AT_REST) if self.control.unloading else OUTCOMES
 
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return readings and control as plain data, for the record."""
@@ -201,8 +207,9 @@ def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
         h=accuracy.steps.step_s,
         horizon=float(sweep.solver.horizon_s),
         theta_limit=math.radians(sweep.criterion.max_rotation_deg),
-        elements=int(sweep.model.soil_elements),
+        elements=int(sweep.model.elements),
         error_estimate=accuracy.error_estimate,
         locate_yield=accuracy.steps.locate_yield,
         longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
+        unloading=UNLOADINGS.index(sweep.model.unloading),
     )

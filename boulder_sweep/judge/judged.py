@@ -6,12 +6,13 @@ Numbers only, so that stored tables can be read and put together without the ker
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from boulder_sweep.columns import OUTCOMES, REASONS, VERDICTS, OutcomeColumn
+from boulder_sweep.columns import AT_REST, OUTCOMES, REASONS, VERDICTS, OutcomeColumn
 
 PASS, FAIL, UNDECIDED, ERROR = range(len(VERDICTS))
 NO_REASON, NO_CONTACT, OVERTURNS, PENETRATION, HORIZON, NUMERICAL_ERROR, CRUSH, OVERRIDE = range(len(REASONS))
@@ -57,6 +58,11 @@ class Judged:
         """Return some rows, chosen by a mask, by their places or by a slice."""
         return Judged({name: values[chosen] for name, values in self.columns.items()}, self.words)
 
+    def only(self, names: Sequence[str]) -> Judged:
+        """Return these columns alone."""
+        words = {name: self.words[name] for name in names if name in self.words}
+        return Judged({name: self.columns[name] for name in names}, words)
+
     def row(self, place: int) -> dict[str, Any]:
         """Return one row as plain data by the names of the columns: words, numbers, None for no value."""
         found: dict[str, Any] = {}
@@ -69,7 +75,9 @@ class Judged:
         return found
 
 
-def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
+def not_computed(
+    reasons: tuple[str, ...], codes: np.ndarray, specs: Sequence[OutcomeColumn] = (*OUTCOMES, *AT_REST)
+) -> Judged:
     """Return rows of verdict ``error`` without any value.
 
     Parameters
@@ -78,6 +86,8 @@ def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
         Why, in words; none of them empty.
     codes
         Index into `reasons` of each row, shape (n,).
+    specs
+        Columns of the rows.
 
     Returns
     -------
@@ -86,10 +96,10 @@ def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
     """
     n = len(codes)
     nothing, no_word = np.full(n, np.nan), np.full(n, -1, dtype=np.int32)
-    columns = {spec.name: no_word if spec.type == "dictionary" else nothing for spec in OUTCOMES}
+    columns = {spec.name: no_word if spec.type == "dictionary" else nothing for spec in specs}
     columns["verdict"] = np.full(n, ERROR, dtype=np.int32)
     columns["reason"] = (np.asarray(codes) + len(REASONS)).astype(np.int32)
-    words = {spec.name: spec.words for spec in OUTCOMES if spec.type == "dictionary"}
+    words = {spec.name: spec.words for spec in specs if spec.type == "dictionary"}
     return Judged(columns, words | {"reason": (*REASONS, *reasons)})
 
 
@@ -99,7 +109,7 @@ def joined(pieces: list[Judged]) -> Judged:
     Parameters
     ----------
     pieces
-        At least one. The first one tells the columns; the others have these and may have more.
+        At least one. What comes out has the columns that all of them have.
 
     Returns
     -------
@@ -108,8 +118,8 @@ def joined(pieces: list[Judged]) -> Judged:
     """
     columns: dict[str, np.ndarray] = {}
     words: dict[str, tuple[str, ...]] = {}
-    for spec in OUTCOMES:
-        if spec.name not in pieces[0].columns:
+    for spec in (*OUTCOMES, *AT_REST):
+        if any(spec.name not in piece.columns for piece in pieces):
             continue
         parts = [piece[spec.name] for piece in pieces]
         if spec.type == "dictionary":

@@ -63,7 +63,7 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     Accuracy
         The first steps of `LADDER` that meet it, or those that come closest if none does.
     """
-    designs = sampled_designs(sweep, pilot_size(sweep.model.soil_elements))
+    designs = sampled_designs(sweep, pilot_size(sweep.model.elements))
     readings = readings_of(sweep)
     found: list[tuple[float, int]] = []
     for rung, steps in enumerate(LADDER):
@@ -100,7 +100,7 @@ def simulated(designs: Designs, readings: Readings, control: Control) -> Outcome
     size = AT_ONCE if control.elements or designs.laws else AT_ONCE_CLOSED
     rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
     pieces = [simulate_table(some.table, readings, control, *some.laws) for some in rows]
-    return OutcomeTable(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+    return type(pieces[0])(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
 
 
 def estimated_error_deg(designs: Designs, readings: Readings, control: Control) -> float:

@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_kernels import SIMULATED, OutcomeTable, Status
-from boulder_sweep.columns import OUTCOMES, RATINGS, REASONS, Rows
+from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
+from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, Rows
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import (
     CRUSH,
@@ -145,7 +145,7 @@ def judge(
     """
     facts = facts_of(outcomes, designs, limits, step_s)
     columns, words = {}, {}
-    for spec in OUTCOMES:
+    for spec in (*OUTCOMES, *(AT_REST if isinstance(outcomes, OutcomesAtRest) else ())):
         if only and spec.name not in only:
             continue
         if spec.name == "validity":

@@ -14,6 +14,7 @@ import numpy as np
 from numba import carray, types
 
 from boulder_kernels import (
+    ELASTIC,
     Constants,
     Control,
     Design,
@@ -65,7 +66,7 @@ def readings_from(s: np.ndarray) -> Readings:
 @inlined
 def control_from(s: np.ndarray, halved: bool) -> Control:
     """Return the control, which follows the readings, with its step or half of it."""
-    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved, s[13], False)
+    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved, s[13], False, ELASTIC)
 
 
 @inlined

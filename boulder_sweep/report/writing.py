@@ -22,6 +22,7 @@ from boulder_sweep.settings.model import SolverSettings
 from boulder_sweep.store.files import put_file
 from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
 from boulder_sweep.text import printable
+from boulder_sweep.views.wording import UNLOADING_WORDS
 
 FACTS = ("versions", "settings_sha256", "kernels_sha256")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
@@ -184,6 +185,11 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:
         notes.append("No numerical error was estimated: verdicts near a limit are unguarded.")
+    if control.unloading:
+        notes.append(
+            f"The table was computed with soil that stays pressed ({UNLOADING_WORDS[control.unloading]}); what is "
+            "simulated in this page uses soil that springs back whole."
+        )
     if control.elements:
         notes.append(
             f"The table was computed with {control.elements:,} soil elements; what is simulated in this page uses the "

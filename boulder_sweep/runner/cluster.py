@@ -17,7 +17,7 @@ from uuid import uuid4
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
 from boulder_sweep.runner.computing import Computation, failed_rows
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
-from boulder_sweep.runner.remote import Done, Work, compute, drop, fingerprint, other_versions_text, parts_of, received
+from boulder_sweep.runner.remote import Done, Work, compute, fingerprint, other_versions_text, parts_of, received
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 from boulder_sweep.text import one_line
@@ -170,7 +170,6 @@ class ClusterWorkers(threading.Thread):
     ):
         super().__init__(name="workers", daemon=True)
         self.messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
-        self._name = uuid4().hex
         self._cluster = cluster
         self._computation = computation
         self._tasks = (_Task(*rows) for rows in tasks)
@@ -186,9 +185,8 @@ class ClusterWorkers(threading.Thread):
         self._without_worker_since: float | None = None
 
     def stop(self) -> None:
-        """Hand out no more tasks; those in progress are dropped, and end early where the worker is in this process."""
+        """Hand out no more tasks; those in progress are dropped."""
         self._stopped.set()
-        drop(self._name)
 
     def flush(self) -> list[StagedPart]:
         """Stage what is not written yet: nothing, for workers write what they compute."""
@@ -209,7 +207,7 @@ class ClusterWorkers(threading.Thread):
         """Keep some tasks in flight until all are done."""
         manifest = self._folder.manifest
         work = Work(
-            self._name,
+            uuid4().hex,
             self._computation,
             self._rows_per_block,
             manifest.rows_per_part,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.columns import VERDICTS
+from boulder_sweep.columns import OUTCOMES, VERDICTS, OutcomeColumn
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed
 from boulder_sweep.judge.validity import FLAGGED
 from boulder_sweep.text import one_line
@@ -49,6 +49,8 @@ class Computation:
         Metadata of the files of parts.
     warm_up
         Loads or compiles what `evaluate` calls.
+    specs
+        Outcome columns that `evaluate` gives.
     """
 
     def __init__(
@@ -57,11 +59,13 @@ class Computation:
         make_block: MakeBlock,
         metadata: Mapping[bytes, bytes],
         warm_up: Callable[[], None] = lambda: None,
+        specs: Sequence[OutcomeColumn] = OUTCOMES,
     ):
         self._evaluate = evaluate
         self._make_block = make_block
         self._metadata = dict(metadata)
         self._warm_up = warm_up
+        self._columns = tuple(spec.name for spec in specs)
         self._failures = 0
 
     def warm_up(self) -> None:
@@ -86,7 +90,7 @@ class Computation:
         """Encode consecutive judged rows from `first` on as one part."""
         from boulder_sweep.store.schema import encode, part_table  # imports pyarrow
 
-        judged = joined(list(pieces))
+        judged = joined(list(pieces)).only(self._columns)
         rows = len(judged.verdict)
         table = part_table(self._make_block(first, first + rows), judged, self._metadata)
         return EncodedPart(first, rows, encode(table), verdict_counts(judged))

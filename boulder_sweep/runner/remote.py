@@ -18,8 +18,6 @@ Fingerprint = tuple[dict[str, str], str, str]
 _prepared: set[str] = set()
 _preparing = threading.Lock()
 """Which runs this process, a worker, is ready for."""
-_dropped: set[str] = set()
-"""Runs that were stopped in this process: a worker within it leaves their tasks after a block."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ def received(work: Work) -> Work:
 
 
 def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
-    """Compute, encode and stage some rows on a worker, part by part; less if the run was dropped in this process."""
+    """Compute, encode and stage some rows on a worker, part by part."""
     prepare(work)
     folder = place_of(work.folder)
     done = Done([], [])
@@ -63,22 +61,13 @@ def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
         return done
     storage = storage_of(folder)
     for begin, end in parts_of(start, stop, work.rows_per_part):
-        pieces = []
-        for rows in blocks(iter([(begin, end)]), work.rows_per_block):
-            if work.name in _dropped:
-                return done
-            pieces.append(work.computation.judged(*rows))
+        pieces = [work.computation.judged(*rows) for rows in blocks(iter([(begin, end)]), work.rows_per_block)]
         part = work.computation.encoded(begin, pieces)
         if relayed:
             done.relayed.append(part._replace(content=bytes(part.content)))
         else:
             done.staged.append(stage(storage, work.table_rows, part.first, part.content, part.rows, part.verdicts))
     return done
-
-
-def drop(name: str) -> None:
-    """Let tasks of a run that are in progress in this process end after the present block."""
-    _dropped.add(name)
 
 
 def prepare(work: Work) -> None:

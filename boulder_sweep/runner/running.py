@@ -94,7 +94,7 @@ class Run:
     def compute(self, progress: Report | None, commit_every_s: float) -> None:
         """Compute and write what is missing."""
         evaluation = self._evaluation
-        computation = Computation(evaluation, self._sweep.block, self._metadata, evaluation.warm_up)
+        computation = Computation(evaluation, self._sweep.block, self._metadata, evaluation.warm_up, evaluation.columns)
         admission = Admission(0)
         workers = self._workers(computation, admission, commit_every_s)
         if progress is not None and self._cluster is not None and self._cluster.dashboard:

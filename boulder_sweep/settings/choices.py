@@ -15,6 +15,7 @@ from boulder_sweep.settings.model import (
     PRINTED,
     RESISTANCES,
     SWITCHES,
+    UNLOADINGS,
     ReadingChoice,
 )
 from boulder_sweep.settings.numbers import NumberError, read_count, split_number
@@ -97,6 +98,10 @@ def _read_resistance(node: Node) -> str:
     return _one_of(node, RESISTANCES, "a law of the soil's resistance")
 
 
+def _read_unloading(node: Node) -> str:
+    return _one_of(node, UNLOADINGS, "a way in which the soil unloads")
+
+
 def _read_accuracy(node: Node) -> str | float:
     """Read a name, or the error of the rotation that is admitted."""
     field = BY_NAME["accuracy"]
@@ -118,6 +123,7 @@ _READERS: dict[str, Callable[[Node], Any]] = {
     "readings": _read_readings,
     "soil_elements": _read_soil,
     "resistance": _read_resistance,
+    "unloading": _read_unloading,
     "accuracy": _read_accuracy,
 }
 """Readers by name; an entry without one is a single number within its admitted range."""

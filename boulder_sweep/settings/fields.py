@@ -289,6 +289,7 @@ SETTINGS: tuple[Field, ...] = (
     Field("model", "readings", "readings", "", "how the misprinted equations of the paper are read"),
     Field("model", "soil", "soil_elements", "", "closed form of the soil, or a number of soil elements"),
     Field("model", "resistance", "resistance", "", "law of the ultimate resistance of the soil"),
+    Field("model", "unloading", "unloading", "", "whether the soil springs back, and whether a gap opens"),
     Field(
         "solver",
         "accuracy",

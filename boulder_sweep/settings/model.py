@@ -22,6 +22,12 @@ RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 
 
+UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
+"""How the soil unloads, in the order of the kernels; the first is the paper's."""
+REMEMBERING_ELEMENTS = 200
+"""Soil elements where the soil remembers and no number is given."""
+
+
 @dataclass(frozen=True, slots=True)
 class Criterion:
     """What a design must hold.
@@ -94,12 +100,21 @@ class Model:
         Crush up to which spring and damper describe the vehicle's front [m].
     resistance : str
         Law of the ultimate resistance of the soil, one of `RESISTANCES`.
+    unloading : str
+        How the soil unloads, one of `UNLOADINGS`.
     """
 
     readings: ReadingChoice = ReadingChoice()
     soil_elements: int = 0
     calibrated_crush_m: float = 1.0
     resistance: str = RESISTANCES[0]
+    unloading: str = UNLOADINGS[0]
+
+    @property
+    def elements(self) -> int:
+        """Number of soil elements that is computed with; 0 for the closed form, which soil that remembers has not."""
+        remembers = self.unloading != UNLOADINGS[0]
+        return REMEMBERING_ELEMENTS if remembers and self.soil_elements == 0 else self.soil_elements
 
     @property
     def preset(self) -> str:

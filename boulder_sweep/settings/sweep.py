@@ -210,9 +210,10 @@ class Sweep:
             "model": {
                 "preset": self.model.preset,
                 "readings": self.model.readings.as_dict(),
-                "soil": self.model.soil_elements or CLOSED_FORM,
+                "soil": self.model.elements or CLOSED_FORM,
                 "calibrated_crush_m": self.model.calibrated_crush_m,
                 "resistance": self.model.resistance,
+                "unloading": self.model.unloading,
             },
             "solver": {
                 "accuracy": accuracy if isinstance(accuracy, str) else None,

@@ -15,8 +15,9 @@ from dataclasses import asdict, dataclass, field
 from io import BytesIO
 from typing import IO, Any
 
-from boulder_sweep.columns import COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import AT_REST, COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError, StoreError
 from boulder_sweep.store.files import WRITING_SUFFIX
 from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
@@ -159,12 +160,14 @@ class Manifest:
 
     @property
     def more_columns(self) -> tuple[str, ...]:
-        """Names of the columns that not every table has: optional inputs, and text that the settings file gave."""
+        """Names of the columns that not every table has: of boulders at rest, optional inputs, text of the settings."""
         settings = self.identity.get("settings")
         if not isinstance(settings, dict):
             return ()
+        elastic = settings.get("model", {}).get("unloading", UNLOADINGS[0]) == UNLOADINGS[0]
+        resting = [] if elastic else [spec.name for spec in AT_REST]
         inputs = settings.get("inputs", {})
-        return (*(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
+        return (*resting, *(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
 
 
 def part_name(first: int, stop: int, table_rows: int) -> str:

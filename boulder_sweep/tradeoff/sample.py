@@ -58,7 +58,7 @@ class Sample:
             )
             took = time.thread_time() - begun
             spent, best = spent + took, min(best, took)
-        ref = OutcomeTable(*(column[rows] for column in known))
+        ref = type(known)(*(column[rows] for column in known))
         step_s = 1e-3 * method.step_ms
         both = (out, fewer.judged(out, step_s)), (ref, fewer.judged(ref, step_s))
         return compared(method, accuracy, 1e6 * best / len(rows), *both)

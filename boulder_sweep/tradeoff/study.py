@@ -24,6 +24,7 @@ from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import pool
+from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.tradeoff.points import Method, Point, mark_front
 from boulder_sweep.tradeoff.sample import Sample
 
@@ -199,10 +200,15 @@ def measure(
     Raises
     ------
     NothingToMeasureError
-        No design of the sample can be computed.
+        No design of the sample can be computed, or the soil does not spring back.
     """
     begun = time.monotonic()
     sweep.require_values()
+    if sweep.model.unloading != UNLOADINGS[0]:
+        raise NothingToMeasureError(
+            f"{sweep.name}: model.unloading is {sweep.model.unloading}, and the methods that are compared here are "
+            f"ways to compute soil that springs back (model.unloading: {UNLOADINGS[0]})"
+        )
     if backend != THREADING:
         with pool(1, backend, scheduler) as workers:
             return next(workers([(measure, (sweep,), {"designs": designs, "seconds": seconds})]))

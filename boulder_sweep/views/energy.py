@@ -13,6 +13,7 @@ from boulder_sweep.views.figures import (
     AMBER,
     BLACK,
     BLUE,
+    BROWN,
     GREEN,
     GREY,
     LIGHT_GREY,
@@ -76,6 +77,8 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
         axes = fig.subplots()
         above, below = np.zeros_like(time), np.zeros_like(time)
         layers = [(getattr(ledger, name) / size, label, colour) for name, label, colour in LAYERS]
+        if ledger.soil_plastic_J.max() > 0.0:
+            layers.insert(3, (ledger.soil_plastic_J / size, "soil: pressed for good", BROWN))
         if ledger.crush_spent_J.any():
             layers.insert(1, (ledger.crush_spent_J / size, "crush of the vehicle (spent as it stiffened)", PALE_ORANGE))
         if np.abs(ledger.pull_J).max() > 0.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.views.labels import sized, value_text
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ REASON_WORDS = {
 
 LAW_WORDS = {"broms": "3 K_p (Broms)", "width_capped": "capped by the width"}
 """Laws of the soil's resistance that are not the paper's."""
+UNLOADING_WORDS = ("elastic unloading", "plastic unloading", "plastic unloading with a gap")
+"""How the soil unloads, in the order of the kernels."""
 NOT_A_TEST = "Simulation, not a rating by test"
 
 
@@ -50,10 +53,12 @@ def terms_line(settings: Mapping[str, Any]) -> str:
 
 
 def model_words(settings: Mapping[str, Any]) -> str:
-    """Return the readings of the paper, and the law of the soil's resistance where it is not the paper's."""
+    """Return the readings of the paper, and the laws of the soil where they are not the paper's."""
     model = settings["model"]
     law = LAW_WORDS.get(model.get("resistance", ""), "")
-    return f"readings {model['preset'].replace('_', ' ')}{f', resistance {law}' if law else ''}"
+    words = [f"readings {model['preset'].replace('_', ' ')}", *([f"resistance {law}"] if law else [])]
+    unloading = UNLOADINGS.index(model.get("unloading", UNLOADINGS[0]))
+    return ", ".join([*words, *([UNLOADING_WORDS[unloading]] if unloading else [])])
 
 
 def design_line(trajectory: Trajectory, units: str = "si") -> str:

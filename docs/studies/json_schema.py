@@ -19,6 +19,7 @@ from boulder_sweep.settings.model import (
     PRINTED,
     RESISTANCES,
     SWITCHES,
+    UNLOADINGS,
 )
 from boulder_sweep.settings.units import EXPECTED
 
@@ -181,6 +182,7 @@ _FORMS: dict[str, Schema] = {
         ]
     },
     "resistance": _words(*RESISTANCES),
+    "unloading": _words(*UNLOADINGS),
     "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
 }
 """Entries that are more than a quantity."""

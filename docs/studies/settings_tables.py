@@ -6,7 +6,7 @@ from boulder_sweep.columns import OUTCOMES, RATINGS
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings.defaults import default_of, default_text
 from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
-from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS
 from boulder_sweep.settings.units import EXPECTED
 
 DEFAULTS = {
@@ -20,6 +20,7 @@ FORMS = {
     "readings": "`corrected`, `as_printed`, or single switches ([readings](readings.md))",
     "soil_elements": "`closed_form`, or `{elements: 5000}` ([soil elements](convergence.md))",
     "resistance": ", ".join(f"`{law}`" for law in RESISTANCES) + " ([soil](soil.md))",
+    "unloading": ", ".join(f"`{way}`" for way in UNLOADINGS) + " ([unloading](soil.md#unloading))",
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }
 """What a setting may be, where it is not a plain quantity."""

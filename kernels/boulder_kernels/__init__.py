@@ -8,12 +8,16 @@ subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, 
 from ._jit import source_hash
 from .design import Constants, Design, DesignTable, constants_of
 from .impact import Control, Record, no_record, simulate_design
-from .outcomes import SIMULATED, Maxima, Outcome, OutcomeTable, Status
+from .memory import ELASTIC, PLASTIC, PLASTIC_WITH_GAP
+from .outcomes import SIMULATED, Maxima, Outcome, OutcomesAtRest, OutcomeTable, Status
 from .readings import Readings, as_printed, corrected
 from .second_spring import SecondSpring, SecondSprings
 from .table import simulate_table
 
 __all__ = [
+    "ELASTIC",
+    "PLASTIC",
+    "PLASTIC_WITH_GAP",
     "SIMULATED",
     "Constants",
     "Control",
@@ -22,6 +26,7 @@ __all__ = [
     "Maxima",
     "Outcome",
     "OutcomeTable",
+    "OutcomesAtRest",
     "Readings",
     "Record",
     "SecondSpring",

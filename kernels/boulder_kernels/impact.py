@@ -29,6 +29,7 @@ from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
 from .energy import Exchanged, add_exchanged, nothing_exchanged
 from .events import NONE, SHORTEN, locate_limit
+from .memory import ELASTIC
 from .modes import Modes, Switches
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
 from .readings import Readings
@@ -46,6 +47,7 @@ from .second_spring import (
 from .settling import NO_PROOF, boulder_energy, proof_is_possible
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
 from .transitions import change_mode, initial_modes
+from .unloading import forget, note, rate_after, remember, until_rest
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
@@ -81,6 +83,9 @@ class Control(NamedTuple):
     last_resort: bool = False
     """Whether a design that needs more steps than are allowed is simulated all the same, see
     `boulder_kernels.last_resort`."""
+    unloading: int = ELASTIC
+    """How the soil unloads: ELASTIC, or PLASTIC or PLASTIC_WITH_GAP by elements that remember, of which there must be
+    some. Their simulations go on until the boulder is at rest, and are not ended by a proof before the horizon."""
 
 
 class Record(NamedTuple):
@@ -134,6 +139,7 @@ def write_samples(
         states = record.states[written]
         states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
         states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
+        note(written, c)
         record.turning[written] = modes.turning
         record.touching[written] = modes.touching
         so_far = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
@@ -178,7 +184,8 @@ def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
     longest = control.horizon
     if control.stop_at_limit:
         longest = max(longest, min(control.longest_horizon, most))
-    return Ending(control.theta_limit, control.horizon, longest, control.stop_at_limit, proof_is_possible(readings))
+    stopping = control.stop_at_limit and control.unloading == ELASTIC
+    return Ending(control.theta_limit, control.horizon, longest, stopping, proof_is_possible(readings))
 
 
 @kernel
@@ -260,6 +267,7 @@ def simulate_by_steps(
 
     A step in which the crush reaches a second spring is cut there, as at an event.
     """
+    forget(c)
     ending = ending_of(control, readings, h_apart)
     budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
     h_full = h_touching
@@ -303,6 +311,7 @@ def simulate_by_steps(
                     kept = kept_up_to(float(STIFFENS), tau, t, y_end, start, m, dense, switches, c)
                 provable_kept = provable_so_far(kept, c.k_v, second.k_2)
             decided = decide(t, h, y, provable_kept, barrier, horizon, ending, c)
+            decided = until_rest(decided, kept.y, ending, c)
             end = compression_at(kept.y, switches, c)
         h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
         if recording or not control.stop_at_limit:
@@ -314,13 +323,14 @@ def simulate_by_steps(
             if recording:
                 written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
                 exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
+        remember(y, kept.y, kept.tau * h, c)
         t = decided.t
         if decided.status != RUNNING:
             if decided.status == Status.LIMIT.value:
                 m = at_limit(m, t, theta_stop)
                 t_limit = t if control.stop_at_limit else t_limit
             return Outcome(decided.status, m, t_limit, t, attempts)
-        y, k1, start = kept.y, k_end, end
+        y, k1, start = kept.y, rate_after(k_end, kept.y, switches, c), end
         if kept.event > NONE:
             if second is not None and kept.event == STIFFENS:
                 c = on_second_spring(c, second.k_2, offset_of(start.u, c.k_v, second.k_2))

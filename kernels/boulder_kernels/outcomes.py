@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -125,6 +126,11 @@ class OutcomeTable(NamedTuple):
     """Estimated numerical error of x_b_max, x_v_max and crush_max, the largest [m]."""
 
 
+_record: Any = namedtuple
+OutcomesAtRest = _record("OutcomesAtRest", (*OutcomeTable._fields, "theta_rest", "swing_back", "rest_error"))
+"""The fields of `OutcomeTable`, and for soil that remembers, NaN where nothing is known of it: the rotation in which
+the boulder comes to rest, signed, how far it swings back from its largest rotation, and by how much that rest may
+be wrong, by the numerical error and by the energy that is left at the end of the simulation [rad]."""
 OUTCOME_FIELDS = OutcomeTable._fields
 STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END = (
     OUTCOME_FIELDS.index(name)

@@ -26,13 +26,18 @@ turn back freely, and a truck that the air pulls on, feed energy. It does happen
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
+
+from numba.extending import overload
 
 from ._jit import inlined, kernel
 from .design import Constants
 from .dynamics import State
+from .memory import RememberingConstants
 from .outcomes import Maxima
 from .readings import Readings
-from .roots import Bracket, narrowed, next_guess
+from .roots import ITERATIONS, Bracket, narrowed, next_guess
 from .soil import Potential, soil_kinematics, soil_potential
 from .trigonometry import sine_versine
 from .vehicle import contact_displacement, spring_compression
@@ -41,6 +46,8 @@ NO_PROOF = -1e300
 """Barrier of a motion that nothing has been proved of: no energy is below it."""
 PLACING_STEPS = 6
 """Steps of the root finder that places a tangent."""
+RESTING_PRECISION = 1e-13
+"""Precision of the least energy where a place of rest is looked for, as a fraction of it."""
 CAUTION = 1.0 - 1e-6
 """The energy must be below the barrier by the integrator's own error, and more."""
 LEAST_ANGLE = 1e-9
@@ -56,7 +63,7 @@ def proof_is_possible(readings: Readings) -> bool:
 
 
 @kernel
-def least_soil_energy(slope_x: float, c: Constants) -> float:
+def least_elastic_energy(slope_x: float, c: Constants) -> float:
     """Lower bound of the elastic energy at a rotation, wherever the boulder stands [J].
 
     Parameters
@@ -79,6 +86,66 @@ def least_soil_energy(slope_x: float, c: Constants) -> float:
         bracket = narrowed(bracket, A, soil_potential(A, slope_x, c).V_A)
     p = soil_potential(A, slope_x, c)
     return p.V - abs(p.V_A) * slope_x
+
+
+@kernel
+def least_remembering_energy(slope_x: float, c: Any) -> float:
+    """Lower bound of the least work that brings soil that remembers to a rotation, wherever the boulder stands [J].
+
+    Parameters
+    ----------
+    slope_x
+        Decrease of displacement over the depth, sin(theta) d [m].
+    c
+        `RememberingConstants` of the design.
+
+    Notes
+    -----
+    The least has its displacement between one that presses no front and one that presses no back.
+    """
+    soil, memory = c.soil, c.memory
+    low, high = memory.back[0] + slope_x * soil.ratio[0], memory.front[0] + slope_x * soil.ratio[0]
+    for n in range(soil.ratio.size):
+        low = min(low, memory.back[n] + slope_x * soil.ratio[n])
+        high = max(high, memory.front[n] + slope_x * soil.ratio[n])
+    start, end = soil_potential(low, slope_x, c), soil_potential(high, slope_x, c)
+    if start.V_A >= 0.0:
+        return start.V
+    if end.V_A <= 0.0:
+        return end.V
+    bracket = Bracket(low, start.V_A, high, end.V_A, 0.0)
+    least = 0.0
+    for _ in range(ITERATIONS):
+        A = next_guess(bracket)
+        p = soil_potential(A, slope_x, c)
+        below = max(p.V_A * (A - low), p.V_A * (A - high))
+        least = max(least, p.V - below)
+        if below <= RESTING_PRECISION * p.V:
+            break
+        bracket = narrowed(bracket, A, p.V_A)
+    return least
+
+
+def least_soil_energy(slope_x: float, c: Any) -> float:
+    """Lower bound of the energy of the soil at a rotation by a modulus, wherever the boulder stands [J].
+
+    Parameters
+    ----------
+    slope_x
+        Decrease of displacement over the depth, sin|theta| d [m]; not negative.
+    c
+        Constants of the design.
+    """
+    if isinstance(c, RememberingConstants):
+        return min(least_remembering_energy(slope_x, c), least_remembering_energy(-slope_x, c))
+    return least_elastic_energy(slope_x, c)
+
+
+@overload(least_soil_energy, inline="always", strict=False)
+def _least_soil_energy(slope_x: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is RememberingConstants:
+        return lambda slope_x, c: min(least_remembering_energy(slope_x, c), least_remembering_energy(-slope_x, c))
+    return lambda slope_x, c: least_elastic_energy(slope_x, c)
 
 
 @kernel

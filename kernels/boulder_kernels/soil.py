@@ -27,6 +27,7 @@ from numba.extending import overload
 from ._jit import inlined, kernel, summing_kernel
 from .design import Constants
 from .layered import LayeredConstants, SoilElements
+from .memory import Memory, RememberingConstants
 
 TINY = 1e-30
 """Stands in for a slope of zero, so that a break point at infinity is clamped and not 0/0."""
@@ -174,6 +175,22 @@ def reaction_of_elements(k: Kinematics, soil: SoilElements) -> Reaction:
     return Reaction(F, M)
 
 
+@summing_kernel
+def reaction_of_remembering(k: Kinematics, soil: SoilElements, memory: Memory) -> Reaction:
+    """Sum force and moment over elements that remember how far they have been pushed (Eqs 19, 20, 36, 121, 122)."""
+    F = M = 0.0
+    for n in range(soil.ratio.size):
+        ratio, stiffness, ultimate = soil.ratio[n], soil.stiffness[n], soil.ultimate[n]
+        displacement = k.A - k.slope_x * ratio
+        velocity = k.B - k.slope_v * ratio
+        ahead = min(max(stiffness * (displacement - memory.front[n]), 0.0), ultimate)
+        behind = min(max(stiffness * (memory.back[n] - displacement), 0.0), ultimate)
+        F_n = behind - ahead - soil.drag[n] * velocity * abs(velocity)
+        F += F_n
+        M -= F_n * (k.lever_d * ratio + k.q)
+    return Reaction(F, M)
+
+
 @inlined
 def uniform_reaction(k: Kinematics, c: Constants) -> Reaction:
     """Force and moment of a uniform soil: element sums where the design asks for N, else the closed form."""
@@ -186,6 +203,8 @@ def soil_reaction(k: Kinematics, c: Any) -> Reaction:
     """Force and moment of the soil that the constants describe, see `LayeredConstants`."""
     if isinstance(c, LayeredConstants):
         return reaction_of_elements(k, c.soil)
+    if isinstance(c, RememberingConstants):
+        return reaction_of_remembering(k, c.soil, c.memory)
     return uniform_reaction(k, c)
 
 
@@ -264,6 +283,38 @@ def potential_of_elements(A: float, slope_x: float, soil: SoilElements) -> Poten
     return Potential(V, V_A, V_X)
 
 
+@kernel
+def potential_of_remembering(A: float, slope_x: float, soil: SoilElements, memory: Memory) -> Potential:
+    """Least work that pushes elements to a displacement from where they would rest, given what they remember.
+
+    It is what their springs hold and what their sliders would take; see `closed_potential`, and `slider_energy` for
+    the second part alone. A sum of convex functions of the displacement, as without memory.
+    """
+    V = V_A = V_X = 0.0
+    for n in range(soil.ratio.size):
+        ratio, stiffness, ultimate = soil.ratio[n], soil.stiffness[n], soil.ultimate[n]
+        displacement = A - slope_x * ratio
+        ahead, behind = max(displacement - memory.front[n], 0.0), max(memory.back[n] - displacement, 0.0)
+        pressed = ahead - behind
+        over = max(ahead + behind - ultimate / stiffness, 0.0)
+        force = min(max(stiffness * pressed, -ultimate), ultimate)
+        V += 0.5 * stiffness * (pressed * pressed - over * over)
+        V_A += force
+        V_X -= ratio * force
+    return Potential(V, V_A, V_X)
+
+
+@kernel
+def slider_energy(k: Kinematics, soil: SoilElements, memory: Memory) -> float:
+    """Part of `potential_of_remembering` that the sliders take since the memory was written: plastic work [J]."""
+    work = 0.0
+    for n in range(soil.ratio.size):
+        displacement = k.A - k.slope_x * soil.ratio[n]
+        pressed = max(displacement - memory.front[n], 0.0) + max(memory.back[n] - displacement, 0.0)
+        work += soil.ultimate[n] * max(pressed - soil.ultimate[n] / soil.stiffness[n], 0.0)
+    return work
+
+
 @inlined
 def uniform_potential(A: float, slope_x: float, c: Constants) -> Potential:
     """Elastic energy of a uniform soil by the same representation as the forces."""
@@ -276,6 +327,8 @@ def soil_potential(A: float, slope_x: float, c: Any) -> Potential:
     """Elastic energy of the soil by the same representation as the forces, a convex function of both displacements."""
     if isinstance(c, LayeredConstants):
         return potential_of_elements(A, slope_x, c.soil)
+    if isinstance(c, RememberingConstants):
+        return potential_of_remembering(A, slope_x, c.soil, c.memory)
     return uniform_potential(A, slope_x, c)
 
 
@@ -307,7 +360,7 @@ def uniform_drag_power(k: Kinematics, c: Constants) -> float:
 
 def drag_power(k: Kinematics, c: Any) -> float:
     """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
-    if isinstance(c, LayeredConstants):
+    if isinstance(c, LayeredConstants | RememberingConstants):
         return power_of_elements(k, c.soil)
     return uniform_drag_power(k, c)
 
@@ -319,6 +372,8 @@ def drag_power(k: Kinematics, c: Any) -> float:
 def _soil_reaction(k: Any, c: Any) -> Callable[..., Any]:
     if c.instance_class is LayeredConstants:
         return lambda k, c: reaction_of_elements(k, c.soil)
+    if c.instance_class is RememberingConstants:
+        return lambda k, c: reaction_of_remembering(k, c.soil, c.memory)
     return lambda k, c: uniform_reaction(k, c)
 
 
@@ -326,12 +381,14 @@ def _soil_reaction(k: Any, c: Any) -> Callable[..., Any]:
 def _soil_potential(A: Any, slope_x: Any, c: Any) -> Callable[..., Any]:
     if c.instance_class is LayeredConstants:
         return lambda A, slope_x, c: potential_of_elements(A, slope_x, c.soil)
+    if c.instance_class is RememberingConstants:
+        return lambda A, slope_x, c: potential_of_remembering(A, slope_x, c.soil, c.memory)
     return lambda A, slope_x, c: uniform_potential(A, slope_x, c)
 
 
 @overload(drag_power, inline="always", strict=False)
 def _drag_power(k: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is LayeredConstants:
+    if c.instance_class in (LayeredConstants, RememberingConstants):
         return lambda k, c: power_of_elements(k, c.soil)
     return lambda k, c: uniform_drag_power(k, c)
 

@@ -9,7 +9,9 @@ from .design import DesignTable, design_in
 from .impact import Control, no_record, simulate_design, simulate_on_springs
 from .lanes import simulate_lanes
 from .last_resort import last_resort_on_springs, simulate_last_resort
+from .memory import ELASTIC
 from .outcomes import OutcomeTable, Status, empty_outcomes, write_outcome
+from .plastic import add_rest_error, simulate_plastic_rows
 from .readings import Readings
 from .second_spring import SecondSpring, SecondSprings
 
@@ -61,6 +63,8 @@ def simulate_once(
     table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
 ) -> OutcomeTable:
     """Simulate every design of a table once: in lanes where they can be, else one by one."""
+    if control.unloading != ELASTIC:
+        return simulate_plastic_rows(table, readings, control, springs)
     if springs is not None:
         out = simulate_rows_on_springs(np.stack(table), np.stack(springs), readings, control)
         return OutcomeTable(out[0].astype(np.int8), *out[1:])
@@ -135,11 +139,14 @@ def simulate_table(
     Returns
     -------
     OutcomeTable
-        Arrays of shape (n,), in the order of the designs.
+        Arrays of shape (n,), in the order of the designs; `OutcomesAtRest` for soil that remembers.
     """
     out = simulate_once(table, readings, control, springs)
     if not control.error_estimate:
         return out
     fine = simulate_once(table, readings, control._replace(halved=True), springs)
-    estimate_errors(out, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)
+    safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
+    estimate_errors(out, fine, table, safety)
+    if control.unloading != ELASTIC:
+        add_rest_error(out, fine, safety)
     return fine

@@ -5,36 +5,20 @@ from __future__ import annotations
 import os
 import signal
 import time
-from pathlib import Path
 
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings
 from tests.runner.grids import plausible
 
-POISON, MAIN_PROCESS, HOLD = "TEST_POISON", "TEST_MAIN_PROCESS", "TEST_HOLD"
-"""Environment variables: the subgrade reactions that do harm [MN/m^3], the process that must not die of them, and a
-file that holds up a run as long as it exists.
-"""
+POISON, MAIN_PROCESS = "TEST_POISON", "TEST_MAIN_PROCESS"
+"""Environment variables: the subgrade reactions that do harm [MN/m^3], and the process that must not die of them."""
 
 
 def slowly(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Take 0.1 ms a design."""
     time.sleep(1e-4 * len(table.L))
     return plausible(table, readings, control)
-
-
-def very_slowly(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Take 2 ms a design."""
-    time.sleep(2e-3 * len(table.L))
-    return plausible(table, readings, control)
-
-
-def held_up(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Take 0.1 ms a design, and wait for a file to go away."""
-    while Path(os.environ[HOLD]).exists():
-        time.sleep(0.01)
-    return slowly(table, readings, control)
 
 
 def poisoned(table: DesignTable) -> bool:

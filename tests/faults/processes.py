@@ -30,12 +30,12 @@ class Driver:
             start_new_session=True,
         )
 
-    def wait_for_rows(self, rows: int = 1) -> int:
-        """Wait until the process reports that so many rows or more are done; return how many."""
+    def wait_for_rows(self, rows: int = 1) -> None:
+        """Wait until the process reports that so many rows are done."""
         assert self.process.stdout is not None
         for line in self.process.stdout:
             if line.strip().isdigit() and int(line) >= rows:
-                return int(line)
+                return
         raise AssertionError(f"the run ended before: {self.process.communicate()}")
 
     def signal(self, number: int) -> None:
@@ -49,9 +49,9 @@ class Driver:
         last = json.loads(lines[-1]) if lines and lines[-1].startswith("{") else {}
         return self.process.returncode, last, complaints
 
-    def left_behind(self, patience_s: float = 60.0) -> list[str]:
-        """Processes with the mark that stay alive; those that end are waited for, which may take on a busy machine."""
-        end = time.monotonic() + patience_s
+    def left_behind(self, patience: float = 3.0) -> list[str]:
+        """Processes with the mark that are still alive after a while."""
+        end = time.monotonic() + patience
         while (left := _marked(self.mark)) and time.monotonic() < end:
             time.sleep(0.05)
         return left

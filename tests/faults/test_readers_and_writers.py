@@ -15,9 +15,9 @@ from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import read, status
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import read_table
-from tests.faults.faulty import HOLD, slowly
+from tests.faults.faulty import slowly
 from tests.faults.processes import Driver, run_driver
-from tests.runner.grids import grid_of, plausible, same_bits
+from tests.runner.grids import grid_of, same_bits
 
 pytestmark = pytest.mark.faults
 
@@ -34,11 +34,9 @@ READERS = {
 
 def test_readers_during_a_run_see_whole_parts_in_order_and_never_fewer_than_before(tmp_path):
     """Others than ours up to the merge of small parts after the last row, when they may have to try again."""
-    out, rows, hold = tmp_path / "out", 2 * ROWS, tmp_path / "hold"
-    driver = Driver(out, *OPTIONS, "--rows", str(rows), "--simulate", "held_up", **{HOLD: str(hold)})
-    while not (out / "_manifest.parquet").exists() or not status(out).rows_done:
-        assert driver.process.poll() is None
-    hold.touch()  # until every reader has seen some rows
+    out, rows = tmp_path / "out", 2 * ROWS
+    driver = Driver(out, *OPTIONS, "--rows", str(rows))
+    driver.wait_for_rows()
     seen = dict.fromkeys(READERS, 0)
     looks = dict.fromkeys(READERS, 0)
     while driver.process.poll() is None:
@@ -53,7 +51,6 @@ def test_readers_during_a_run_see_whole_parts_in_order_and_never_fewer_than_befo
                 continue
             seen[name] = len(ids)
             looks[name] += 1
-        hold.unlink(missing_ok=True)
         found = status(out, verify=True)
         assert found.damaged == {}
         assert found.rows_done >= seen["read"]
@@ -95,12 +92,12 @@ def test_of_many_who_begin_at_once_one_wins(tmp_path):
 
 def test_the_lock_of_a_killed_run_is_no_obstacle(tmp_path):
     out = tmp_path / "out"
-    first = Driver(out, *OPTIONS, "--simulate", "very_slowly")
-    first.wait_for_rows(200)
+    first = Driver(out, *OPTIONS)
+    first.wait_for_rows(3000)
     first.signal(signal.SIGKILL)
     first.end()
     assert (out / "_lock").exists()
-    assert run(grid_of(ROWS), out, resume=True, simulate=plausible).rows == ROWS
+    assert run(grid_of(ROWS), out, resume=True, simulate=slowly).rows == ROWS
     assert not (out / "_lock").exists()
 
 

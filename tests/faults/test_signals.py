@@ -10,14 +10,16 @@ import pytest
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
+from tests.faults.faulty import slowly
 from tests.faults.processes import Driver
-from tests.runner.grids import grid_of, plausible, same_bits
+from tests.runner.grids import grid_of, same_bits
 
 pytestmark = pytest.mark.faults
 
-ROWS = 400_000
-"""Twenty seconds of work for two workers: no run ends before its signal, even on a busy machine."""
+ROWS = 100_000
 SLOW = ("--rows", str(ROWS), "--simulate", "slowly", "--rows-per-part", "20000")
+SOON = 5.0
+"""A second on a free machine; several where others work, too."""
 
 
 @pytest.mark.parametrize(
@@ -31,9 +33,11 @@ SLOW = ("--rows", str(ROWS), "--simulate", "slowly", "--rows-per-part", "20000")
 def test_a_run_stops_soon_keeps_what_is_done_and_says_how_to_go_on(tmp_path, backend, number, code):
     out = tmp_path / "out"
     driver = Driver(out, *SLOW, "--backend", backend)
-    reported = driver.wait_for_rows(10_000)  # so many that the first ones must be among them
+    driver.wait_for_rows(10_000)  # so many that the first ones must be among them
+    begun = time.monotonic()
     driver.signal(number)
     returned, told, complaints = driver.end()
+    assert time.monotonic() - begun < SOON
     assert returned == code
     assert signal.Signals(number).name in told["problem"]
     assert "resume=True" in told["problem"] or "--resume" in told["problem"]
@@ -42,21 +46,21 @@ def test_a_run_stops_soon_keeps_what_is_done_and_says_how_to_go_on(tmp_path, bac
     found = status(out, verify=True)
     assert found.damaged == {}
     assert not found.running
-    assert 0 < found.rows_done < reported + ROWS / 2
+    assert 0 < found.rows_done < ROWS
     assert found.sessions[-1].how == f"interrupted by signal {int(number)}"
     assert read_table(out)["design_id"].to_pylist() == list(range(found.rows_done))
 
 
 def test_an_interrupted_run_goes_on_to_the_same_table(tmp_path):
-    rows = 10_000
-    driver = Driver(tmp_path / "out", "--rows", str(rows), "--simulate", "very_slowly", "--rows-per-part", "4000")
-    driver.wait_for_rows(200)
+    rows = ("--rows", "10000", "--simulate", "slowly", "--rows-per-part", "4000")
+    driver = Driver(tmp_path / "out", *rows)
+    driver.wait_for_rows(2000)
     driver.signal(signal.SIGINT)
     assert driver.end()[0] == 130
     done = status(tmp_path / "out").rows_done
-    again = run(grid_of(rows), tmp_path / "out", resume=True, simulate=plausible)
-    assert again.rows_computed == rows - done
-    run(grid_of(rows), tmp_path / "whole", simulate=plausible, rows_per_part=4000)
+    again = run(grid_of(10_000), tmp_path / "out", resume=True, simulate=slowly)
+    assert again.rows_computed == 10_000 - done
+    run(grid_of(10_000), tmp_path / "whole", simulate=slowly, rows_per_part=4000)
     assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
 
 

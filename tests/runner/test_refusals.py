@@ -47,7 +47,7 @@ def test_a_grid_whose_outcomes_do_not_fit(tmp_path, monkeypatch, height, refused
     """Ten bytes a row are too little where the truck meets the boulder, and may do where it does not."""
     sweep = grid(**(HUGE | {"height": height}))
     monkeypatch.setattr(estimate, "_disk_free", lambda out: 10 * sweep.n_designs)
-    begun = time.process_time()
+    begun = time.monotonic()
     if refused:
         with pytest.raises(DoesNotFitError, match=r"needs at least 25 TB of disk, and 10 TB are free"):
             run(sweep, tmp_path / "out")
@@ -55,7 +55,7 @@ def test_a_grid_whose_outcomes_do_not_fit(tmp_path, monkeypatch, height, refused
     else:
         with pytest.raises(AssertionError, match="too late"):
             run(sweep, tmp_path / "out")
-    assert time.process_time() - begun < 5
+    assert time.monotonic() - begun < 5
 
 
 def test_a_full_disk(tmp_path, monkeypatch):

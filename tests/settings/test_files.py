@@ -143,10 +143,10 @@ def test_deep_nesting_closed_again(problems_of):
 def test_alias_bomb(problems_of):
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 15)]
-    begun = time.process_time()
+    begun = time.monotonic()
     problems = problems_of("\n".join(lines))
     assert "more than 100000 values" in problems[-1].message
-    assert time.process_time() - begun < 30  # written out it would be 10^15 values
+    assert time.monotonic() - begun < 30  # written out it would be 10^15 values
 
 
 def test_aliases_are_accepted_where_they_are_harmless(load_it, minimal):

@@ -43,18 +43,13 @@ def parquet(**columns: object) -> bytes:
     return sink.getvalue()
 
 
-def loaded(path: Path) -> None:
-    """Read a table, or a measured curve if its name says so."""
-    if path.name.startswith("pulse"):
-        read_history(path, PULSE_SIGNALS if path.name == "pulse.csv" else TEST_SIGNALS)
-    else:
-        assert load_text(SETTINGS.format(file=path.name), path.parent / "grid.yaml").n_designs > 0
-
-
 def read(path: Path) -> None:
-    """Read a table or a measured curve; all that may be raised is a list of mistakes."""
+    """Read a table, or a measured curve if its name says so; all that may be raised is a list of mistakes."""
     try:
-        loaded(path)
+        if path.name.startswith("pulse"):
+            read_history(path, PULSE_SIGNALS if path.name == "pulse.csv" else TEST_SIGNALS)
+        else:
+            assert load_text(SETTINGS.format(file=path.name), path.parent / "grid.yaml").n_designs > 0
     except SettingsError as refused:
         if not refused.problems or not all(map(str, refused.problems)):
             raise AssertionError("refused without a word") from refused
@@ -148,8 +143,9 @@ def test_numbers_that_are_none(tmp_path, values):
 @pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
 def test_a_named_pipe_is_not_waited_for(tmp_path, name):
     os.mkfifo(tmp_path / name)
-    with pytest.raises(SettingsError, match="is not a regular file"):
-        loaded(tmp_path / name)
+    begun = time.monotonic()
+    read(tmp_path / name)
+    assert time.monotonic() - begun < 5
 
 
 @pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
@@ -157,9 +153,9 @@ def test_more_columns_than_a_table_has(tmp_path, name):
     names = [f"c{place} [s]" for place in range(5000)]
     text = (",".join(names) + "\n" + ",".join("1" * len(names)) + "\n").encode()
     (tmp_path / name).write_bytes(parquet(**{name: [1.0] for name in names}) if name.endswith("parquet") else text * 2)
-    begun = time.process_time()
+    begun = time.monotonic()
     read(tmp_path / name)
-    assert time.process_time() - begun < 20
+    assert time.monotonic() - begun < 20
 
 
 def large(folder: Path) -> dict[str, Path]:
@@ -182,19 +178,13 @@ def large(folder: Path) -> dict[str, Path]:
     return {name: folder / name for name in made}
 
 
-def seconds_of_children() -> float:
-    """CPU time of the processes that have ended [s]."""
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return spent.ru_utime + spent.ru_stime
-
-
 @pytest.mark.slow
 def test_large_files_are_answered_in_seconds_and_two_gigabytes(tmp_path):
     """20 million designs may be read; everything else is refused."""
     for name, path in large(tmp_path).items():
         (tmp_path / "grid.yaml").write_text(SETTINGS.format(file=name))
         words = ["fit-vehicle", path, "--mass", "6800 kg"] if name.startswith("pulse") else ["check", "grid.yaml"]
-        begun = seconds_of_children()
+        begun = time.monotonic()
         done = subprocess.run(
             [sys.executable, "-m", "boulder_sweep", *map(str, words)],
             cwd=tmp_path,
@@ -204,7 +194,7 @@ def test_large_files_are_answered_in_seconds_and_two_gigabytes(tmp_path):
             text=True,
             check=False,
         )
-        assert seconds_of_children() - begun < 60, name
+        assert time.monotonic() - begun < 60, name
         assert done.returncode == (0 if name == "repeated.parquet" else 2), (name, done.stderr)
         assert "Traceback" not in done.stderr
         assert "internal error" not in done.stderr

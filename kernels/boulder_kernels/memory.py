@@ -1,0 +1,105 @@
+"""Soil elements that remember how far they have been pushed: plastic unloading with and without a gap (Eqs 121, 122).
+
+The paper's soil is elastic: it gives back all that its springs took up. Here each spring is in series with a slider
+that gives way at the ultimate resistance, and what the slider has moved stays. An element then presses by
+
+    F = k clip(u - u_f, 0, y) - k clip(u_b - u, 0, y),    y = F_u / k
+
+where u_f is the displacement at which its front comes to bear and u_b that at which its back does. Without a gap the
+soil sticks to the boulder on both sides, and both are the same, the plastic displacement u_p. With a gap each side
+keeps its own: u_f >= 0 grows with the largest displacement, u_b <= 0 with the least, and between them there is no soil
+force at all.
+
+What an element remembers changes with the motion, so it is held in arrays that are written as the simulation goes on.
+A step is integrated with what was remembered at its start: as long as an element moves one way, its force is that of
+an elastic one that starts there.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ._jit import kernel
+from .design import Constants
+
+ELASTIC, PLASTIC, PLASTIC_WITH_GAP = range(3)
+"""How the soil unloads, see `boulder_kernels.impact.Control`."""
+
+
+class Memory(NamedTuple):
+    """What N soil elements remember, and what is kept of the motion because of it."""
+
+    front: np.ndarray
+    """Displacement u_f beyond which the front of each element is pressed [m], shape (N,)."""
+    back: np.ndarray
+    """Displacement u_b below which its back is pressed [m], shape (N,); never more than u_f."""
+    gap: bool
+    """Whether a gap opens, else both are the same."""
+    so_far: np.ndarray
+    """Plastic work [J], rotation of largest modulus [rad], swing back from it [rad], and the state at the end of the
+    last step in the order of `State`; shape (9,)."""
+    samples: np.ndarray
+    """u_f, u_b and the plastic work at each sample of a record, shape (n, 2 N + 1)."""
+
+
+WORK, PEAK, SWING, LAST = range(4)
+"""Places in `Memory.so_far`; from LAST on, the state."""
+
+_record: Any = namedtuple
+RememberingConstants = _record("RememberingConstants", (*Constants._fields, "soil", "memory"))
+"""The fields of `boulder_kernels.layered.LayeredConstants`, and ``memory``, the `Memory`."""
+
+
+def remembering(c: Any, gap: bool, samples: int = 0) -> Any:
+    """Return the constants of a design with soil elements that remember, so far nothing.
+
+    Parameters
+    ----------
+    c
+        `LayeredConstants` of the design.
+    gap
+        Whether a gap opens behind the boulder.
+    samples
+        Number of samples of the record that goes with it.
+    """
+    n = c.soil.ratio.size
+    memory = Memory(np.zeros(n), np.zeros(n), gap, np.zeros(LAST + 6), np.zeros((samples, 2 * n + 1)))
+    return RememberingConstants(*c, memory)
+
+
+def at_sample(c: Any, sample: int) -> Any:
+    """Return constants with what their soil remembered at a sample of the record; elastic ones as they are."""
+    if not isinstance(c, RememberingConstants):
+        return c
+    memory, n = c.memory, c.soil.ratio.size
+    row = memory.samples[sample]
+    so_far = memory.so_far.copy()
+    so_far[WORK] = row[-1]
+    return c._replace(memory=memory._replace(front=row[:n], back=row[n:-1], so_far=so_far))
+
+
+@kernel
+def push(n: int, u: float, y: float, memory: Memory) -> float:
+    """Push element n to a displacement, and return by how much its sliders have moved [m].
+
+    Parameters
+    ----------
+    n
+        Index of the element.
+    u
+        Displacement [m], reached from the last one without turning back in between.
+    y
+        Displacement at which its spring reaches the ultimate resistance [m].
+    memory
+        What the elements remember; changed.
+    """
+    front, back = memory.front[n], memory.back[n]
+    if memory.gap:
+        memory.front[n] = max(front, u - y)
+        memory.back[n] = min(back, u + y)
+        return memory.front[n] - front + back - memory.back[n]
+    memory.front[n] = memory.back[n] = min(max(front, u - y), u + y)
+    return abs(memory.front[n] - front)

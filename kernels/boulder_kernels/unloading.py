@@ -1,0 +1,268 @@
+"""A motion in soil that remembers: what it remembers after a step, and where the boulder rests (Eqs 121 to 124).
+
+**Steps.** A step is integrated with the memory at its start, which is exact as long as an element moves one way. Where
+one turns back within a step, the memory is written with the displacement at which it turned, by the cubic through both
+ends of the step; from there to the end of the step its force was that of an element that goes on, an error of third
+order, as of a kink that no step lands on.
+
+**Rest.** With the drag as the only damping, which falls with the square of the speed, a boulder rings for a long time.
+But from what the soil remembers now, the least work that brings it to another displacement is that of the straight way
+there (`boulder_kernels.soil.potential_of_remembering`): to push an element to and fro takes more. So the energy
+argument of `boulder_kernels.settling` holds with the potential about the present memory, at any time. The boulder
+will come to rest where this potential with its weight is least, and until then it stays between the two angles that its
+energy does not suffice to pass. The half that is farther away is the doubt of where it will rest. A simulation goes
+on until that is less than REST, or its longest time is over; then the doubt that is left is reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+
+from ._jit import kernel
+from .after_step import RUNNING, Decided, Ending, rate_of
+from .design import Constants
+from .dynamics import Acceleration, State
+from .memory import LAST, PEAK, SWING, WORK, RememberingConstants, push
+from .modes import Switches
+from .outcomes import Status, highest
+from .settling import boulder_energy, least_remembering_energy
+from .soil import slider_energy, soil_kinematics
+from .trigonometry import sine_versine
+
+REST = math.radians(0.1)
+"""A boulder is at rest that provably stays this close to where it will be in the end [rad]."""
+FIRST_STEP = 1e-4
+"""First angle at which the search for what the energy does not suffice to pass looks [rad]."""
+HALVINGS = 16
+"""Steps of that search once it has passed it."""
+SECTIONS = 50
+"""Sections of the search for the least energy; each leaves 0.618 of the interval."""
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+class Rest(NamedTuple):
+    """Where a boulder comes to rest."""
+
+    theta: float
+    """Rotation of least energy [rad]."""
+    doubt: float
+    """How far from it the boulder may still get [rad]."""
+
+
+@kernel
+def forgotten(c: Any) -> None:
+    """Make the soil forget everything."""
+    memory = c.memory
+    for n in range(memory.front.size):
+        memory.front[n] = memory.back[n] = 0.0
+    for i in range(memory.so_far.size):
+        memory.so_far[i] = 0.0
+
+
+@kernel
+def remembered(y: State, y_end: State, h: float, c: Any) -> None:
+    """Write what the soil remembers after a step.
+
+    Parameters
+    ----------
+    y, y_end
+        States at the ends of what is kept of it.
+    h
+        Length of that [s].
+    c
+        `RememberingConstants` of the design; their memory is written.
+    """
+    soil, memory = c.soil, c.memory
+    sin, versin = sine_versine(y.theta_b)
+    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+    sin, versin = sine_versine(y_end.theta_b)
+    k_end = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
+    work = 0.0
+    for n in range(soil.ratio.size):
+        ratio, limit = soil.ratio[n], soil.ultimate[n] / soil.stiffness[n]
+        end = k_end.A - k_end.slope_x * ratio
+        turn = turned_at(k.A - k.slope_x * ratio, k.B - k.slope_v * ratio, end, k_end.B - k_end.slope_v * ratio, h)
+        work += soil.ultimate[n] * (push(n, turn, limit, memory) + push(n, end, limit, memory))
+    so_far = memory.so_far
+    so_far[WORK] += work
+    swing(turned_at(y.theta_b, y.omega_b, y_end.theta_b, y_end.omega_b, h), so_far)
+    swing(y_end.theta_b, so_far)
+    for i in range(6):
+        so_far[LAST + i] = y_end[i]
+
+
+def plastic_work(y: State, c: Any) -> tuple[float, float]:
+    """Plastic work of the soil [J] (Eq 123): up to the start of the step that a state is in, and since then."""
+    if not isinstance(c, RememberingConstants):
+        return 0.0, 0.0
+    sin, versin = sine_versine(y.theta_b)
+    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+    return float(c.memory.so_far[WORK]), float(slider_energy(k, c.soil, c.memory))
+
+
+@kernel
+def turned_at(x: float, rate: float, x_end: float, rate_end: float, h: float) -> float:
+    """Displacement at which a motion turned back within a step of length h [s], or that at its end."""
+    way = 1.0 if rate > 0.0 else -1.0
+    farthest, _ = highest(way * x, way * rate, way * x_end, way * rate_end, h)
+    return way * farthest
+
+
+@kernel
+def swing(theta: float, so_far: Any) -> None:
+    """Note a rotation: the largest so far, or how far back from it."""
+    peak = so_far[PEAK]
+    if abs(theta) > abs(peak):
+        so_far[PEAK], so_far[SWING] = theta, 0.0
+    else:
+        back = peak - theta if peak > 0.0 else theta - peak
+        so_far[SWING] = max(so_far[SWING], back)
+
+
+@kernel
+def noted(sample: int, c: Any) -> None:
+    """Keep what the soil remembers beside a sample of the record."""
+    memory, n = c.memory, c.soil.ratio.size
+    row = memory.samples[sample]
+    for i in range(n):
+        row[i], row[n + i] = memory.front[i], memory.back[i]
+    row[2 * n] = memory.so_far[WORK]
+
+
+@kernel
+def resting_energy(theta: float, c: Any) -> float:
+    """Lower bound of the potential energy at a rotation, wherever x_b, given what the soil remembers [J]."""
+    sin, versin = sine_versine(theta)
+    return c.C_cos * abs(sin) + c.C_sin * versin + least_remembering_energy(c.d * sin, c)
+
+
+@kernel
+def not_passed(theta: float, side: float, E: float, theta_limit: float, c: Any) -> float:
+    """Rotation to one side of theta that an energy E [J] does not suffice to pass [rad]; at most the limit."""
+    inside, ahead = theta, FIRST_STEP
+    outside = theta + side * ahead
+    while side * outside < theta_limit and resting_energy(outside, c) <= E:
+        ahead *= 2.0
+        inside, outside = outside, theta + side * ahead
+    if side * outside >= theta_limit:
+        return side * theta_limit
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if resting_energy(middle, c) <= E:
+            inside = middle
+        else:
+            outside = middle
+    return outside
+
+
+@kernel
+def rest_of(y: State, theta_limit: float, c: Any) -> Rest:
+    """Where a boulder comes to rest that a state leaves in soil that remembers.
+
+    Parameters
+    ----------
+    y
+        The state; the truck must not move forward any more.
+    theta_limit
+        Limit of rotation [rad].
+    c
+        `RememberingConstants` of a design whose readings allow a proof, see `boulder_kernels.settling`.
+    """
+    E = boulder_energy(y, c)
+    first, last = not_passed(y.theta_b, -1.0, E, theta_limit, c), not_passed(y.theta_b, 1.0, E, theta_limit, c)
+    low, high = first, last
+    a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_a, at_b = resting_energy(a, c), resting_energy(b, c)
+    for _ in range(SECTIONS):
+        if at_a < at_b:
+            high, b, at_b = b, a, at_a
+            a = high - GOLDEN * (high - low)
+            at_a = resting_energy(a, c)
+        else:
+            low, a, at_a = a, b, at_b
+            b = low + GOLDEN * (high - low)
+            at_b = resting_energy(b, c)
+    theta = 0.5 * (low + high)
+    return Rest(theta, max(theta - first, last - theta))
+
+
+@kernel
+def going_on(decided: Decided, y: State, ending: Ending, c: Any) -> Decided:
+    """Go on with a motion that is decided but not at rest."""
+    if decided.status != Status.BELOW_LIMIT.value or decided.t >= ending.longest:
+        return decided
+    if rest_of(y, ending.theta_limit, c).doubt < REST:
+        return decided
+    return Decided(RUNNING, decided.t, decided.barrier, min(decided.horizon + ending.extension, ending.longest))
+
+
+# What a simulation calls after its steps; nothing at all where the soil does not remember.
+
+
+def forget(c: Any) -> None:
+    """Begin anew: soil that remembers forgets what was."""
+    if isinstance(c, RememberingConstants):
+        forgotten(c)
+
+
+def remember(y: State, y_end: State, h: float, c: Any) -> None:
+    """Write what the soil remembers after a step; see `remembered`."""
+    if isinstance(c, RememberingConstants):
+        remembered(y, y_end, h, c)
+
+
+def note(sample: int, c: Any) -> None:
+    """Keep what the soil remembers beside a sample of the record."""
+    if isinstance(c, RememberingConstants):
+        noted(sample, c)
+
+
+def rate_after(k_end: Acceleration, y: State, switches: Switches, c: Any) -> Acceleration:
+    """Acceleration at the start of the next step: that at the end of the last one, unless the soil remembers it."""
+    if isinstance(c, RememberingConstants):
+        return rate_of(y, switches, c)
+    return k_end
+
+
+def until_rest(decided: Decided, y: State, ending: Ending, c: Constants) -> Decided:
+    """Where the soil remembers, go on until the boulder is at rest; see `going_on`."""
+    if isinstance(c, RememberingConstants):
+        return going_on(decided, y, ending, c)
+    return decided
+
+
+@overload(forget, inline="always", strict=False)
+def _forget(c: Any) -> Callable[..., Any]:
+    return (lambda c: forgotten(c)) if c.instance_class is RememberingConstants else (lambda c: None)
+
+
+@overload(remember, inline="always", strict=False)
+def _remember(y: Any, y_end: Any, h: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is RememberingConstants:
+        return lambda y, y_end, h, c: remembered(y, y_end, h, c)
+    return lambda y, y_end, h, c: None
+
+
+@overload(note, inline="always", strict=False)
+def _note(sample: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is RememberingConstants:
+        return lambda sample, c: noted(sample, c)
+    return lambda sample, c: None
+
+
+@overload(rate_after, inline="always", strict=False)
+def _rate_after(k_end: Any, y: Any, switches: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is RememberingConstants:
+        return lambda k_end, y, switches, c: rate_of(y, switches, c)
+    return lambda k_end, y, switches, c: k_end
+
+
+@overload(until_rest, inline="always", strict=False)
+def _until_rest(decided: Any, y: Any, ending: Any, c: Any) -> Callable[..., Any]:
+    if c.instance_class is RememberingConstants:
+        return lambda decided, y, ending, c: going_on(decided, y, ending, c)
+    return lambda decided, y, ending, c: decided
