@@ -123,14 +123,14 @@ class RigidWall:
         """
         asked = np.asarray(time_s, dtype=float)
         t = np.minimum(asked, self.separation_time_s)
-        even, odd = self._decaying(t)
+        even, odd = self.decaying(t)
         m, k, c, v_0 = self.mass_kg, self.spring_N_m, self.damper_N_s_m, self.speed_m_s
         v = v_0 * (even - self.a * odd)
         acceleration = np.where(asked < self.separation_time_s, -v_0 * k / m * odd, 0.0)
         x = m / c * (v_0 - v) + v_0 * odd
         return x + v * (asked - t), v, acceleration
 
-    def _decaying(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def decaying(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """e^{at} cos bt and e^{at} sin(bt)/b, or what they become where over-damped."""
         if not self.over_damped:
             decay = np.exp(self.a * t)
@@ -140,6 +140,20 @@ class RigidWall:
         if apart == 0.0:
             return np.exp(self.a * t), t * np.exp(self.a * t)
         return 0.5 * (np.exp(slow * t) + np.exp(fast * t)), -np.exp(slow * t) * np.expm1(-apart * t) / apart
+
+    def first_zero(self, even: float, odd: float) -> float:
+        """First time after 0 at which even e^{at} cos(bt) + odd e^{at} sin(bt)/b is zero [s]; infinite where never."""
+        if even < 0.0:
+            even, odd = -even, -odd
+        if not self.over_damped:
+            return math.atan2(even * self.b, -odd) / self.b
+        if odd >= 0.0:
+            return math.inf
+        width = math.sqrt(self.discriminant)
+        share = -even * width / odd
+        if width == 0.0:
+            return -even / odd
+        return math.atanh(share) / width if share < 1.0 else math.inf
 
     def _real_roots(self) -> tuple[float, float]:
         """Both rates of decay, the slow one from the product k/m of the two, without cancellation [1/s]."""

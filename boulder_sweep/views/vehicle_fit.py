@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.crash_tests.fitting.pulse import RESPONSES, UNITS
+from boulder_sweep.crash_tests.stiffening_wall import StiffeningWall
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, GREY, ORANGE
 
@@ -63,4 +64,7 @@ def fit_line(fit: VehicleFit) -> str:
     """Spring and damper with their standard errors on one line."""
     spring = f"spring {fit.wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"
     damper = f"damper {fit.wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN·s/m"
+    wall = fit.wall
+    if isinstance(wall, StiffeningWall):
+        spring += f", {wall.second_spring_N_m / 1e3:.1f} kN/m from {wall.second_spring_from_m:.3f} m"
     return f"{spring}, {damper}"

@@ -20,6 +20,7 @@ _VEHICLE, _RESTORING = "kernels/boulder_kernels/vehicle.py", "kernels/boulder_ke
 _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
+_STAGES = "boulder_sweep/crash_tests/stiffening_wall.py"
 _RESISTANCE, _LIFT, _UPLIFT = (
     f"boulder_sweep/{name}.py" for name in ("judge/resistance", "judge/uplift", "impact/uplift")
 )
@@ -86,5 +87,6 @@ MUTATIONS = (
     Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
     Mutation((111,), _SECOND, "c.k_m * (k_2 / c.k_v)", "c.k_m"),
     Mutation((111,), _VEHICLE, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
+    Mutation((111,), _STAGES, "(a_2 - w.a * v_2) * odd", "(a_2 + w.a * v_2) * odd"),
     Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),
 )

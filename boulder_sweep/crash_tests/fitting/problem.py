@@ -16,6 +16,9 @@ RATIO_BOUNDS = (2e-3, 2e2)
 class Problem:
     """The least-squares problem: unknowns log sqrt(k/m), log(c/sqrt(k m)) and, where not given, v_0."""
 
+    least_share = 1e-14
+    """Combinations of unknowns that move the response less than this, as a share of the most, are left out."""
+
     def __init__(self, pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> None:
         self.pulse = pulse
         self.mass_kg = mass_kg
@@ -71,10 +74,8 @@ class Problem:
         high = [math.log(2000.0 / last), math.log(RATIO_BOUNDS[1]), 1e4]
         return np.array(low[: len(start)]), np.array(high[: len(start)])
 
-    def standard_errors(
-        self, unknowns: np.ndarray, scales: dict[str, float], correlations: dict[str, float]
-    ) -> tuple[float, float, float]:
-        """Standard errors of spring [N/m], damper [N s/m] and speed [m/s], by the sandwich of the signals' scatter.
+    def covariance(self, unknowns: np.ndarray, scales: dict[str, float], correlations: dict[str, float]) -> np.ndarray:
+        """Covariance of the unknowns, by the sandwich of the signals' scatter.
 
         A residual that is correlated r with its neighbour carries (1 - r)/(1 + r) of the information of an independent
         one, so each signal's part of the middle of the sandwich counts (1 + r)/(1 - r) times.
@@ -93,13 +94,18 @@ class Problem:
             r = min(max(correlations[name], 0.0), 1.0 - 2.0 / len(jacobian))
             bread += jacobian.T @ jacobian
             middle += (1.0 + r) / (1.0 - r) * (jacobian.T @ jacobian)
-        inverse = np.linalg.pinv(bread, rcond=1e-14, hermitian=True)
-        covariance = inverse @ middle @ inverse * (total / max(total - n, 1))
-        wall = self.wall(unknowns)
+        inverse = np.linalg.pinv(bread, rcond=self.least_share, hermitian=True)
+        return inverse @ middle @ inverse * (total / max(total - n, 1))
+
+    def standard_errors(
+        self, unknowns: np.ndarray, scales: dict[str, float], correlations: dict[str, float]
+    ) -> tuple[float, float, float]:
+        """Standard errors of spring [N/m], damper [N s/m] and speed [m/s]."""
+        n, covariance, wall = len(unknowns), self.covariance(unknowns, scales, correlations), self.wall(unknowns)
         # k = m exp(2 u_0), c = m exp(u_0 + u_1)
-        of_spring = np.array([2.0, 0.0, 0.0])[:n] * wall.spring_N_m
-        of_damper = np.array([1.0, 1.0, 0.0])[:n] * wall.damper_N_s_m
-        of_speed = np.array([0.0, 0.0, 1.0])[:n]
+        of_spring = np.eye(n)[0] * 2.0 * wall.spring_N_m
+        of_damper = (np.eye(n)[0] + np.eye(n)[1]) * wall.damper_N_s_m
+        of_speed = np.eye(3, n)[2]
         spring, damper, speed = (
             math.sqrt(max(float(g @ covariance @ g), 0.0)) for g in (of_spring, of_damper, of_speed)
         )
