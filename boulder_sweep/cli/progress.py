@@ -34,11 +34,12 @@ def cold_start(kernels: Kernels | None) -> str | None:
     """
     if kernels is None:
         return None
-    from boulder_kernels._jit import CACHE_FOLDER
+    from boulder_kernels._jit import CACHE_FOLDER, INSIDE
 
     function, seconds = COMPILED[kernels]
     if CACHE_FOLDER is not None:
-        if next(Path(CACHE_FOLDER).rglob(f"{function}-*.nbc"), None) is not None:
+        found = (path.relative_to(CACHE_FOLDER) for path in Path(CACHE_FOLDER).rglob(f"{function}-*.nbc"))
+        if any(INSIDE not in path.parts for path in found):
             return None
         with suppress(OSError, ValueError):  # no earlier compilation on this machine
             seconds = float(_remembered(kernels).read_text())

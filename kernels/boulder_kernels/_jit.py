@@ -12,8 +12,8 @@
 ``_nrt``
     Off but for what makes arrays: kernels borrow those that they are given, and do not count references to them.
     The counters are atomic, and cost a fifth of the time of short simulations.
-``no_cfunc_wrapper``
-    Nothing calls a kernel from C, and wrappers for that would have to be compiled, too.
+``no_cfunc_wrapper``, ``no_cpython_wrapper``
+    Nothing calls a kernel from C, and few are called from Python: wrappers would have to be compiled, too.
 ``cache``
     Compiled code is kept in a folder named by a hash of all kernel sources, because a cached function does
     not notice that a function it calls has changed in another file. Only a folder that nobody else can write is used.
@@ -23,10 +23,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import hashlib
 import os
 import stat
 import tempfile
+import threading
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -80,7 +82,7 @@ def _cache_folder() -> str | None:
             warnings.warn(f"compiled kernels are kept in {folder} ({refused[0]})", stacklevel=2)
         return str(folder)
     warnings.warn(
-        f"compiled kernels are not kept, so every start takes about half a minute ({'; '.join(refused)}). Set "
+        f"compiled kernels are not kept, so every start takes up to half a minute ({'; '.join(refused)}). Set "
         f"{CACHE_VARIABLE} to a folder that only you can write",
         stacklevel=2,
     )
@@ -120,6 +122,9 @@ def _own_folder(folder: Path) -> Path:
 
 
 CACHE_FOLDER = _cache_folder()
+INSIDE = "inside"
+"""Folder within it for kernels as other kernels call them, without what a call from Python needs."""
+_DECORATING = threading.Lock()
 
 
 def _ask_for_wide_vectors() -> None:
@@ -142,16 +147,52 @@ def _compiled(
     function: Callable[..., Any], fastmath: set[str], *, inline: bool = False, arrays: bool = False
 ) -> Callable[..., Any]:
     """Decorate one function, its cache in this package's folder."""
-    # Set only while decorating: other users of Numba in this process keep their own cache folder.
-    before = SETTINGS.CACHE_DIR
-    SETTINGS.CACHE_DIR = CACHE_FOLDER or ""
-    try:
-        options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
-        options |= {"cache": CACHE_FOLDER is not None, "fastmath": fastmath, "forceinline": inline}
-        options |= {} if arrays else {"_nrt": False}
-        return numba.njit(**options)(function)
-    finally:
-        SETTINGS.CACHE_DIR = before
+    options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
+    options |= {"cache": CACHE_FOLDER is not None, "fastmath": fastmath, "forceinline": inline}
+    options |= {} if arrays else {"_nrt": False}
+    if SETTINGS.DISABLE_JIT:
+        return function
+    return _compiled_in_two_ways(function, options)
+
+
+def _decorated(function: Callable[..., Any], options: dict[str, Any], folder: str) -> Any:
+    """Decorate a function, its compiled code in a folder."""
+    with _DECORATING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
+        before = SETTINGS.CACHE_DIR
+        SETTINGS.CACHE_DIR = folder
+        try:
+            return numba.njit(**options)(function)
+        finally:
+            SETTINGS.CACHE_DIR = before
+
+
+def _compiled_in_two_ways(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return a dispatcher that compiles a wrapper only for calls from Python, not for those of other kernels.
+
+    A wrapper takes the tuples among the arguments apart, number by number. Most kernels are called by kernels only, and
+    their wrappers would be a third of the work. What Python calls is left to a second dispatcher of the same function.
+    """
+    folder = Path(CACHE_FOLDER or "")
+    inside = _decorated(function, options | {"no_cpython_wrapper": True}, str(folder / INSIDE))
+    inside.targetoptions = options
+    called = functools.cache(lambda: _decorated(function, options, str(folder)))
+    take_over = inside.add_overload
+
+    def keep(compiled: Any) -> None:
+        """Let kernels alone find it: a call from Python would find nothing that it could run."""
+        inside.overloads[tuple(compiled.signature.args)] = compiled
+
+    def compile_for_python(*args: Any, **named: Any) -> Any:
+        """Compile for the first call from Python with arguments of these types."""
+        entry = called()._compile_for_args(*args, **named)
+        for types, compiled in called().overloads.items():
+            if inside.overloads.get(types) is not compiled:
+                take_over(compiled)
+        inside._cache_hits, inside._cache_misses = called()._cache_hits, called()._cache_misses
+        return entry
+
+    inside.add_overload, inside._compile_for_args = keep, compile_for_python
+    return inside
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

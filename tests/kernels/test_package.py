@@ -75,7 +75,8 @@ def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     assert (int(hits), int(misses)) == (0, 1)
     files = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
     assert len(files) > 2
-    assert {file.parent.parent.name for file in files} <= {f"kernels-{_jit.source_hash()[:16]}", tmp_path.name}
+    folder = f"kernels-{_jit.source_hash()[:16]}"
+    assert {file.parent.parent.name for file in files} <= {folder, _jit.INSIDE, tmp_path.name}
     theta_again, hits, misses = run(RUN, environment).split()
     assert (int(hits), int(misses)) == (1, 0)
     assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == files
@@ -172,3 +173,31 @@ def test_every_function_says_what_it_does() -> None:
         for node in ast.walk(ast.parse(source.read_text())):
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
                 assert ast.get_docstring(node), f"{source.name}: {node.name}"
+
+
+CALLED = """
+from boulder_kernels import _jit
+
+@_jit.kernel
+def half(x):
+    return 0.5 * x
+
+@_jit.kernel
+def quarter(x):
+    return half(half(x))
+
+print(quarter(1.0), half(1.0), half(3), quarter(1.0), len(half.overloads))
+"""
+
+
+@pytest.mark.compiled
+def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
+    """Compiled for kernels first it has no wrapper, and calls from Python must not run into that."""
+    (tmp_path / "called.py").write_text(CALLED)
+    script = f"import runpy; runpy.run_path({str(tmp_path / 'called.py')!r})"
+    for _ in range(2):
+        printed = run(script, {_jit.CACHE_VARIABLE: str(tmp_path / "cache")})
+        assert printed.split() == ["0.25", "0.5", "1.5", "0.25", "2"]
+    (folder,) = (tmp_path / "cache").glob("kernels-*")
+    inside = [path for path in folder.rglob("*.nbc") if _jit.INSIDE in path.relative_to(folder).parts]
+    assert [path.name.split("-")[0].rpartition(".")[2] for path in inside] == ["half"]
