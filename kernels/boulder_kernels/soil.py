@@ -20,43 +20,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from numba.extending import overload
 
 from ._jit import inlined, kernel, summing_kernel
 from .design import Constants
 from .layered import LayeredConstants, SoilElements
-from .memory import Memory, RememberingConstants
-
-TINY = 1e-30
-"""Stands in for a slope of zero, so that a break point at infinity is clamped and not 0/0."""
-
-
-class Reaction(NamedTuple):
-    """Force and moment of the soil on the boulder."""
-
-    F: float
-    """Sum of F_n [N] (Eq 19)."""
-    M: float
-    """Sum of M_n about the common centre of mass [N m] (Eq 20)."""
-
-
-class Kinematics(NamedTuple):
-    """Displacement and velocity of the soil along the depth, as lines."""
-
-    A: float
-    """Displacement at the soil line [m]."""
-    slope_x: float
-    """Decrease of displacement over the whole depth, sin(theta) d [m]."""
-    B: float
-    """Velocity at the soil line [m/s]."""
-    slope_v: float
-    """Decrease of velocity over the whole depth, omega cos(theta) d [m/s]."""
-    q: float
-    """Depth of the centre of mass relative to the soil line as a lever, l_n sin - z_0 cos [m]."""
-    lever_d: float
-    """Increase of the lever over the whole depth, cos(theta) d [m]."""
+from .memory import RememberingConstants
+from .remembering_soil import potential_of_remembering, reaction_of_remembering
+from .soil_records import TINY, Kinematics, Potential, Reaction
 
 
 @inlined
@@ -175,22 +148,6 @@ def reaction_of_elements(k: Kinematics, soil: SoilElements) -> Reaction:
     return Reaction(F, M)
 
 
-@summing_kernel
-def reaction_of_remembering(k: Kinematics, soil: SoilElements, memory: Memory) -> Reaction:
-    """Sum force and moment over elements that remember how far they have been pushed (Eqs 19, 20, 36, 121, 122)."""
-    F = M = 0.0
-    for n in range(soil.ratio.size):
-        ratio, stiffness, ultimate = soil.ratio[n], soil.stiffness[n], soil.ultimate[n]
-        displacement = k.A - k.slope_x * ratio
-        velocity = k.B - k.slope_v * ratio
-        ahead = min(max(stiffness * (displacement - memory.front[n]), 0.0), ultimate)
-        behind = min(max(stiffness * (memory.back[n] - displacement), 0.0), ultimate)
-        F_n = behind - ahead - soil.drag[n] * velocity * abs(velocity)
-        F += F_n
-        M -= F_n * (k.lever_d * ratio + k.q)
-    return Reaction(F, M)
-
-
 @inlined
 def uniform_reaction(k: Kinematics, c: Constants) -> Reaction:
     """Force and moment of a uniform soil: element sums where the design asks for N, else the closed form."""
@@ -206,17 +163,6 @@ def soil_reaction(k: Kinematics, c: Any) -> Reaction:
     if isinstance(c, RememberingConstants):
         return reaction_of_remembering(k, c.soil, c.memory)
     return uniform_reaction(k, c)
-
-
-class Potential(NamedTuple):
-    """Elastic energy of the soil and its slopes."""
-
-    V: float
-    """Energy stored in the springs [J]."""
-    V_A: float
-    """Its derivative by the displacement at the soil line [N]."""
-    V_X: float
-    """Its derivative by the decrease of displacement over the depth [N]."""
 
 
 @inlined
@@ -281,38 +227,6 @@ def potential_of_elements(A: float, slope_x: float, soil: SoilElements) -> Poten
         V_A += pressed
         V_X -= ratio * pressed
     return Potential(V, V_A, V_X)
-
-
-@kernel
-def potential_of_remembering(A: float, slope_x: float, soil: SoilElements, memory: Memory) -> Potential:
-    """Least work that pushes elements to a displacement from where they would rest, given what they remember.
-
-    It is what their springs hold and what their sliders would take; see `closed_potential`, and `slider_energy` for
-    the second part alone. A sum of convex functions of the displacement, as without memory.
-    """
-    V = V_A = V_X = 0.0
-    for n in range(soil.ratio.size):
-        ratio, stiffness, ultimate = soil.ratio[n], soil.stiffness[n], soil.ultimate[n]
-        displacement = A - slope_x * ratio
-        ahead, behind = max(displacement - memory.front[n], 0.0), max(memory.back[n] - displacement, 0.0)
-        pressed = ahead - behind
-        over = max(ahead + behind - ultimate / stiffness, 0.0)
-        force = min(max(stiffness * pressed, -ultimate), ultimate)
-        V += 0.5 * stiffness * (pressed * pressed - over * over)
-        V_A += force
-        V_X -= ratio * force
-    return Potential(V, V_A, V_X)
-
-
-@kernel
-def slider_energy(k: Kinematics, soil: SoilElements, memory: Memory) -> float:
-    """Part of `potential_of_remembering` that the sliders take since the memory was written: plastic work [J]."""
-    work = 0.0
-    for n in range(soil.ratio.size):
-        displacement = k.A - k.slope_x * soil.ratio[n]
-        pressed = max(displacement - memory.front[n], 0.0) + max(memory.back[n] - displacement, 0.0)
-        work += soil.ultimate[n] * max(pressed - soil.ultimate[n] / soil.stiffness[n], 0.0)
-    return work
 
 
 @inlined

@@ -29,8 +29,9 @@ from .dynamics import Acceleration, State
 from .memory import LAST, PEAK, SWING, WORK, RememberingConstants, push
 from .modes import Switches
 from .outcomes import Status, highest
+from .remembering_soil import slider_energy
 from .settling import boulder_energy, least_remembering_energy
-from .soil import slider_energy, soil_kinematics
+from .soil import soil_kinematics
 from .trigonometry import sine_versine
 
 REST = math.radians(0.1)

@@ -25,6 +25,10 @@ _RESISTANCE, _LIFT, _UPLIFT = (
     f"boulder_sweep/{name}.py" for name in ("judge/resistance", "judge/uplift", "impact/uplift")
 )
 
+_REMEMBERING, _MEMORY, _UNLOADING = (
+    f"kernels/boulder_kernels/{name}.py" for name in ("remembering_soil", "memory", "unloading")
+)
+
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return 0.25 * math.pi + 0.5 * phi", "return 0.25 * math.pi - 0.5 * phi"),
     Mutation((2,), _DESIGN, "* (design.d - element_depth(", "* (design.d + element_depth("),
@@ -89,4 +93,10 @@ MUTATIONS = (
     Mutation((111,), _VEHICLE, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
     Mutation((111,), _STAGES, "(a_2 - w.a * v_2) * odd", "(a_2 + w.a * v_2) * odd"),
     Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),
+    Mutation((121,), _REMEMBERING, "F_n = behind - ahead", "F_n = -behind - ahead"),
+    Mutation((122,), _MEMORY, "= max(front, u - y)", "= max(front, u)"),
+    Mutation((122,), _MEMORY, "min(max(front, u - y), u + y)", "min(max(front, u), u + y)"),
+    Mutation((123,), _REMEMBERING, "work += soil.ultimate[n] * max(", "work += 0.5 * soil.ultimate[n] * max("),
+    Mutation((124,), _REMEMBERING, "(pressed * pressed - over * over)", "(pressed * pressed)"),
+    Mutation((124,), _UNLOADING, "c.C_cos * abs(sin) + c.C_sin", "c.C_cos * abs(sin) - c.C_sin"),
 )

@@ -4,26 +4,38 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import boulder_kernels as bk
+from boulder_kernels import unloading
 from boulder_kernels.dynamics import State
 from boulder_kernels.layered import SoilElements
 from boulder_kernels.memory import LAST, Memory, push
 from boulder_kernels.plastic import simulate_plastic
-from boulder_kernels.soil import Kinematics, potential_of_remembering, reaction_of_remembering, slider_energy
+from boulder_kernels.remembering_soil import potential_of_remembering, reaction_of_remembering, slider_energy
+from boulder_kernels.soil import soil_kinematics
+from boulder_kernels.soil_records import Kinematics, Reaction
 from boulder_kernels.unloading import rest_of
 from tests import oracle
+from tests.oracle.restoring import gravity_energy
 from tests.oracle.soil import Motion, Soil
 
 from .samples import design_of, random_design, random_designs, random_state
 
 LAWS = {"plastic": bk.PLASTIC, "plastic_with_gap": bk.PLASTIC_WITH_GAP}
 N = 8
+
+
+def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a kernel as it is written, which takes no time to compile."""
+    return getattr(kernel, "py_func", kernel)
 
 
 def memory_of(elements: int, gap: bool) -> Memory:
@@ -40,9 +52,9 @@ def forces_along(path: list[float], gap: bool) -> list[float]:
     soil, memory = one_element(), memory_of(1, gap)
     found = []
     for u in path:
-        push.py_func(0, u, 1.0, memory)
+        plain(push)(0, u, 1.0, memory)
         k = Kinematics(A=u, slope_x=0.0, B=0.0, slope_v=0.0, q=1.0, lever_d=0.0)
-        found.append(-reaction_of_remembering.py_func(k, soil, memory).F)
+        found.append(-plain(reaction_of_remembering)(k, soil, memory).F)
     return found
 
 
@@ -94,7 +106,7 @@ def test_sums_are_those_of_the_oracle_whatever_was_remembered(gap: bool) -> None
         slopes = [(line[-1] - line[0]) / per for line in (dx, v, lever)]
         starts = [line[0] - s * elements.ratio[0] for line, s in zip((dx, v, lever), slopes, strict=True)]
         k = Kinematics(starts[0], -slopes[0], starts[1], -slopes[1], starts[2], slopes[2])
-        found = reaction_of_remembering.py_func(k, elements, memory_of(N, gap)._replace(front=front, back=back))
+        found = plain(reaction_of_remembering)(k, elements, memory_of(N, gap)._replace(front=front, back=back))
         assert pytest.approx(known.F, rel=1e-9, abs=1e-6 * elements.ultimate.sum()) == found.F
         assert pytest.approx(known.M, rel=1e-9, abs=1e-6 * elements.ultimate.sum()) == found.M
 
@@ -106,17 +118,17 @@ def test_no_way_takes_less_work_than_the_straight_one(gap: bool) -> None:
     for _ in range(200):
         memory = memory_of(1, gap)
         for u in rng.normal(0.0, 2.0, 3):
-            push.py_func(0, u, 1.0, memory)
+            plain(push)(0, u, 1.0, memory)
         at, end = float(u), float(rng.normal())
-        needed = [potential_of_remembering.py_func(place, 0.0, soil, memory).V for place in (at, end)]
+        needed = [plain(potential_of_remembering)(place, 0.0, soil, memory).V for place in (at, end)]
         work = 0.0
         for target in (*rng.normal(0.0, 2.0, rng.integers(0, 4)), end):
             fine = np.linspace(at, target, 101)
             forces = []
             for u in fine:
-                push.py_func(0, u, 1.0, memory)
+                plain(push)(0, u, 1.0, memory)
                 k = Kinematics(u, 0.0, 0.0, 0.0, 1.0, 0.0)
-                forces.append(-reaction_of_remembering.py_func(k, soil, memory).F)
+                forces.append(-plain(reaction_of_remembering)(k, soil, memory).F)
             work += sum(
                 0.5 * (a + b) * (v - u) for (a, b), (u, v) in zip(pairwise(forces), pairwise(fine), strict=True)
             )
@@ -130,17 +142,17 @@ def test_work_is_stored_or_taken_by_the_sliders(gap: bool) -> None:
     memory, at, force, work, taken = memory_of(1, gap), 0.0, 0.0, 0.0, 0.0
     for target in rng.normal(0.0, 2.0, 20):
         for u in np.linspace(at, target, 401)[1:]:
-            taken += push.py_func(0, u, 1.0, memory)  # times 1 N
+            taken += plain(push)(0, u, 1.0, memory)  # times 1 N
             k = Kinematics(u, 0.0, 0.0, 0.0, 1.0, 0.0)
-            now = -reaction_of_remembering.py_func(k, soil, memory).F
+            now = -plain(reaction_of_remembering)(k, soil, memory).F
             work, at, force = work + 0.5 * (force + now) * (u - at), u, now
-        stored = potential_of_remembering.py_func(at, 0.0, soil, memory)
+        stored = plain(potential_of_remembering)(at, 0.0, soil, memory)
         assert stored.V + taken == pytest.approx(work, abs=2e-3)
         assert pytest.approx(force, abs=1e-12) == stored.V_A
-        assert slider_energy.py_func(k, soil, memory) == pytest.approx(0.0, abs=1e-12)
+        assert plain(slider_energy)(k, soil, memory) == pytest.approx(0.0, abs=1e-12)
         pushed = memory.front[0] + 3.0  # 1 m by the spring, 2 m by the slider
-        assert slider_energy.py_func(Kinematics(pushed, 0.0, 0.0, 0.0, 1.0, 0.0), soil, memory) == pytest.approx(2.0)
-        stored = potential_of_remembering.py_func(pushed, 0.0, soil, memory)
+        assert plain(slider_energy)(Kinematics(pushed, 0.0, 0.0, 0.0, 1.0, 0.0), soil, memory) == pytest.approx(2.0)
+        stored = plain(potential_of_remembering)(pushed, 0.0, soil, memory)
         assert pytest.approx(2.5) == stored.V
 
 
@@ -202,6 +214,31 @@ def test_estimated_errors_cover_the_true_ones(law: int) -> None:
     assert covered[standing].mean() >= 0.98
     rest = found.rest_error + known.rest_error >= np.abs(found.theta_rest - known.theta_rest)
     assert rest[standing].all()
+
+
+def test_the_weight_is_lifted_to_where_the_boulder_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unloading, "least_remembering_energy", lambda slope_x, c: 1000.0 * slope_x)
+    lumped = oracle.constants(oracle.RWG, oracle.CORRECTED, N)
+    c = bk.constants_of(design_of(oracle.RWG), bk.corrected(), N)
+    for theta in (-0.3, 0.0, 0.1, 0.5):
+        known = gravity_energy(oracle.RWG, lumped, theta) + 1000.0 * oracle.RWG.d * math.sin(theta)
+        assert plain(unloading.resting_energy)(theta, c) == pytest.approx(known, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_the_place_of_rest_is_where_forces_balance() -> None:
+    """Held without motion where the sliders were left, the boulder has neither net force nor net moment."""
+    found = simulate_plastic(design_of(oracle.RWG), bk.corrected(), control(0.004, bk.PLASTIC), bk.no_record())
+    c = found.constants
+    sin, versin = math.sin(found.theta_rest), 1.0 - math.cos(found.theta_rest)
+
+    def reaction(x_b: float) -> Reaction:
+        return reaction_of_remembering(soil_kinematics(x_b, 0.0, 0.0, sin, versin, c), c.soil, c.memory)
+
+    x_b = brentq(lambda x: reaction(x).F, -1.0, 1.0, xtol=1e-14)
+    weight = c.C_cos * math.cos(found.theta_rest) + c.C_sin * sin  # the couple that turns it back
+    assert found.theta_rest > math.radians(5.0)
+    assert pytest.approx(weight, rel=1e-4) == reaction(x_b).M
 
 
 @pytest.mark.slow
