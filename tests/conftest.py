@@ -16,7 +16,7 @@ from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.settings.model import PRESETS
 
 # A busy machine is no reason to fail.
-hypothesis.settings.register_profile("patient", deadline=None)
+hypothesis.settings.register_profile("patient", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
 hypothesis.settings.load_profile("patient")
 
 QUICK = (

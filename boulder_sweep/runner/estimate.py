@@ -193,6 +193,7 @@ def estimated(
     jobs: int,
     out: Place | None,
     rows_per_part: int = ROWS_PER_PART,
+    cores: int | None = None,
 ) -> Estimate:
     """Estimate what a run needs from a sample.
 
@@ -208,9 +209,12 @@ def estimated(
         Output folder, for the free space on its disk.
     rows_per_part
         Rows of a part.
+    cores
+        Cores that the workers share; None where each has its own.
     """
     per_block = rows_per_block(sample.seconds_per_row, rows_to_compute, jobs)
-    seconds = rows_to_compute * sample.seconds_per_row / jobs
+    rows_per_second = min(jobs, cores or jobs) / sample.seconds_per_row
+    seconds = rows_to_compute / rows_per_second
     parts = max(-(-rows_to_compute // rows_per_part), int(seconds / COMMIT_EVERY_S))
     memory = _BYTES_IN_PROGRESS * rows_in_progress(per_block, jobs, rows_per_part) + peak_memory()
     return Estimate(
@@ -221,7 +225,7 @@ def estimated(
         disk_free_bytes=None if out is None else _disk_free(out),
         memory_bytes=memory,
         memory_free_bytes=_memory_free(),
-        rows_per_second=jobs / sample.seconds_per_row,
+        rows_per_second=rows_per_second,
         rows_per_block=per_block,
         jobs=jobs,
     )

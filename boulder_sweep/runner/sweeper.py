@@ -208,6 +208,7 @@ def estimate(
         jobs=jobs or available_cores(),
         out=folder,
         rows_per_part=rows_per_part,
+        cores=available_cores(),
     )
 
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner import estimate as limits
+from boulder_sweep.runner import sweeper
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.estimate import (
     LARGEST_BLOCK,
@@ -174,6 +175,15 @@ def test_an_estimate_is_in_proportion():
     assert ten.disk_bytes == pytest.approx(10 * one.disk_bytes, rel=0.05)
     assert ten.memory_bytes == pytest.approx(one.memory_bytes, rel=0.05)
     assert estimated(sample, rows=10**7, rows_to_compute=10**6, **common).seconds == one.seconds
+
+
+def test_more_workers_than_cores_are_not_faster(monkeypatch):
+    monkeypatch.setattr(sweeper, "take_sample", lambda *_: Sample(1e-3, 50.0, 10_000.0))
+    monkeypatch.setattr(sweeper, "available_cores", lambda: 2)
+    one, two, eight = (estimate(grid(), jobs=jobs, simulate=plausible) for jobs in (1, 2, 8))
+    assert one.seconds == pytest.approx(0.441)
+    assert two.seconds == eight.seconds == pytest.approx(0.441 / 2)
+    assert two.rows_per_second == eight.rows_per_second == pytest.approx(2000)
 
 
 def test_objections_name_the_numbers():
