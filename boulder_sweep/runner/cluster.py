@@ -6,6 +6,7 @@ import logging
 import queue
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
@@ -80,14 +81,16 @@ class Cluster:
             raise BackendError("the backend dask needs a package: pip install 'boulder-sweep[dask]'") from None
         self._levels = _silenced_loggers()
         if scheduler is None:
-            self._local = distributed.LocalCluster(
-                processes=False,
-                n_workers=1,
-                threads_per_worker=jobs,
-                dashboard_address=dashboard,
-                worker_dashboard_address=_LOOPBACK,
-            )
-            return distributed.Client(self._local, set_as_default=False)
+            with warnings.catch_warnings():  # a machine without a network is no reason for a warning
+                warnings.filterwarnings("ignore", "Couldn't detect a suitable IP address", RuntimeWarning)
+                self._local = distributed.LocalCluster(
+                    processes=False,
+                    n_workers=1,
+                    threads_per_worker=jobs,
+                    dashboard_address=dashboard,
+                    worker_dashboard_address=_LOOPBACK,
+                )
+                return distributed.Client(self._local, set_as_default=False)
         try:
             client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as problem:
