@@ -30,6 +30,7 @@ MODULES = {
     "numbalsoda_solvers": "numbalsoda",
     "diffrax_solvers": "diffrax",
     "heyoka_solvers": "heyoka",
+    "heyoka_events": "heyoka",
 }
 """Modules of solvers, with the package each needs."""
 
@@ -165,7 +166,7 @@ def measure_all(problem: Problem) -> tuple[list[Measured], list[str]]:
             missing.append(f"{package} is missing here and was not measured ({reason})")
             continue
         measured += [measure_solver(solver, problem) for solver in solvers]
-    return measured, missing
+    return measured, list(dict.fromkeys(missing))
 
 
 def finite(points: list[tuple[float, float, float]]) -> list[tuple[float, float]]:

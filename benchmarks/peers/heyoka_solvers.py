@@ -28,9 +28,27 @@ def _clipped(x: Any, low: Any, high: Any) -> Any:
     return hy.select(hy.lt(x, low), low, hy.select(hy.gt(x, high), high, x))
 
 
-def _away_from_zero(x: Any) -> Any:
+def away_from_zero(x: Any) -> Any:
+    """Return a slope, or another one where it is so small that no series could divide by it."""
     size = hy.select(hy.lt(x, 0.0), -x, x)
     return hy.select(hy.lt(size, TINY), hy.expression(TINY), x)
+
+
+def soil_sums(
+    c: Constants, A: Any, B: Any, s: Any, p: Any, y: Any, R: Any, r_1: Any, r_2: Any, r_0: Any
+) -> tuple[Any, Any]:
+    """Force of the soil and its moment over the depth, by the break points r, as the kernels' closed form has them.
+
+    Products, because the series of a power divides by its base.
+    """
+    below, above = y - A, y + A
+    a_1, a_2, a_0 = r_1 * r_1, r_2 * r_2, r_0 * r_0
+    spring = 0.5 * (below * a_1 + above * a_2 - y) + s * (a_1 * r_1 - a_2 * r_2) / 3.0
+    spring_r = (below * a_1 * r_1 + above * a_2 * r_2 - y) / 3.0 + 0.25 * s * (a_1 * a_1 - a_2 * a_2)
+    first, second, third, fourth = 2 * r_0 - 1, 2 * a_0 - 1, 2 * a_0 * r_0 - 1, 2 * a_0 * a_0 - 1
+    drag = B * B * first - B * p * second + p * p * third / 3.0
+    drag_r = 0.5 * B * B * second - B * p * third * (2.0 / 3.0) + 0.25 * p * p * fourth
+    return c.K_soil * spring + R * drag, c.K_soil * spring_r + R * drag_r
 
 
 def _motion(c: Constants) -> list[tuple[Any, Any]]:
@@ -41,19 +59,12 @@ def _motion(c: Constants) -> list[tuple[Any, Any]]:
     versin = 1.0 - cos
     lever_d, q = c.d * cos, c.l_n * sin - c.z_0 * cos
     A, B = x_b - c.l_n * versin + c.z_0 * sin, v_b - omega * q
-    s, p = _away_from_zero(c.d * sin), _away_from_zero(omega * lever_d)
+    s, p = away_from_zero(c.d * sin), away_from_zero(omega * lever_d)
     y = hy.select(hy.lt(s, 0.0), -c.x_yield, c.x_yield)
     below, above = y - A, y + A
     r_1, r_2, r_0 = _clipped(-below / s, zero, one), _clipped(above / s, zero, one), _clipped(B / p, zero, one)
-    # Products, because the series of a power divides by its base.
-    a_1, a_2, a_0 = r_1 * r_1, r_2 * r_2, r_0 * r_0
-    spring = 0.5 * (below * a_1 + above * a_2 - y) + s * (a_1 * r_1 - a_2 * r_2) / 3.0
-    spring_r = (below * a_1 * r_1 + above * a_2 * r_2 - y) / 3.0 + 0.25 * s * (a_1 * a_1 - a_2 * a_2)
-    first, second, third, fourth = 2 * r_0 - 1, 2 * a_0 - 1, 2 * a_0 * r_0 - 1, 2 * a_0 * a_0 - 1
-    drag = B * B * first - B * p * second + p * p * third / 3.0
-    drag_r = 0.5 * B * B * second - B * p * third * (2.0 / 3.0) + 0.25 * p * p * fourth
     R = hy.select(hy.lt(p, 0.0), -c.R_soil, c.R_soil)
-    pressed, pressed_r = c.K_soil * spring + R * drag, c.K_soil * spring_r + R * drag_r
+    pressed, pressed_r = soil_sums(c, A, B, s, p, y, R, r_1, r_2, r_0)
     compressed = x_v - x_b - c.h * sin - c.g_x * versin - c.tau_v * (c.v_0 - v_v)
     u = hy.select(hy.gt(compressed, 0.0), compressed, zero)
     F_v = c.k_v * u
@@ -98,4 +109,4 @@ def _prepare(problem: Problem) -> Callable[[float], np.ndarray]:
 
 
 SOLVERS = [Solver("heyoka Taylor, batches of 8, closed form", 256, _prepare, LONGEST_STEPS_S, in_steps=True)]
-"""Without events, as the others have none."""
+"""Without events, as most of the others have none."""
