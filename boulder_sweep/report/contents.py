@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import SIMULATED, Control, Readings, Status
+from boulder_kernels import SIMULATED, Control, Readings, SecondSpring, Status
 from boulder_kernels.design import G
-from boulder_sweep.columns import INPUTS, OUTCOMES
+from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls
@@ -73,7 +73,7 @@ def page_data(
         "layout": _layout(),
         "settings": [float(value) for value in (*readings, *control._replace(elements=0))],
         "rules": _rules(control.theta_limit, settings),
-        "inputs": [_input(spec.name, start, settings) for spec in INPUTS],
+        "inputs": [_input(spec.name, start, settings) for spec in (*INPUTS, *OPTIONAL_INPUTS) if spec.name in start],
         "outcomes": [
             {"name": spec.name, "unit": spec.unit, "label": OUTCOME_WORDS[spec.name]}
             for spec in OUTCOMES
@@ -153,7 +153,7 @@ def _layout() -> dict[str, Any]:
         "settings": entry_points.SETTINGS,
         "outcome": entry_points.OUTCOME,
         "history": entry_points.HISTORY,
-        "columns": SOURCES,
+        "columns": {**SOURCES, **dict(zip(SecondSpring._fields, OPTIONAL_COLUMNS, strict=True))},
     }
 
 

@@ -22,19 +22,22 @@ from boulder_kernels import (
     OutcomeTable,
     Readings,
     Record,
+    SecondSpring,
     constants_of,
-    simulate_design,
 )
 from boulder_kernels._jit import array_kernel, inlined
 from boulder_kernels.design import design_in
 from boulder_kernels.dynamics import State, acceleration
 from boulder_kernels.energy import stored_energies
+from boulder_kernels.impact import simulate_on_springs
 from boulder_kernels.modes import Modes, switches_of
 from boulder_kernels.outcomes import write_outcome
+from boulder_kernels.second_spring import on_second_spring, spent_energy
 from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
 
-DESIGN = Design._fields
-"""Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
+DESIGN = (*Design._fields, *SecondSpring._fields)
+"""Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
+first, from a crush on that it never reaches: its results have the same bits."""
 SETTINGS = (*Readings._fields, *Control._fields)
 """Settings of the simulation, in this order; booleans are 0 or 1."""
 SETTINGS_COUNT = len(SETTINGS)
@@ -52,7 +55,7 @@ ENERGY = HISTORY.index("vehicle_kinetic")
 _DOUBLES = types.CPointer(types.float64)
 EXPORTS = {
     "outcomes": (_DOUBLES, types.int32, _DOUBLES, _DOUBLES, _DOUBLES),
-    "history": (_DOUBLES, _DOUBLES, types.int32, *(_DOUBLES,) * 6),
+    "history": (_DOUBLES, _DOUBLES, types.int32, *(_DOUBLES,) * 7),
 }
 """The functions that the page calls, and the types of their arguments."""
 
@@ -100,15 +103,15 @@ def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at:
     """
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, estimated = readings_from(s), s[9] > 0.0
-    designs, finer, coarser = carray(designs_at, (15, n)), carray(fine_at, (10, n)), carray(coarse_at, (10, n))
+    designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (10, n)), carray(coarse_at, (10, n))
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
     for row in range(n):
-        design = design_in(designs, row)
+        design, second = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
         finer[:, row] = np.nan
-        write_outcome(finer, row, simulate_design(design, readings, control_from(s, estimated), record))
+        write_outcome(finer, row, simulate_on_springs(design, readings, control_from(s, estimated), record, second))
         if estimated:
-            write_outcome(coarser, row, simulate_design(design, readings, control_from(s, False), record))
+            write_outcome(coarser, row, simulate_on_springs(design, readings, control_from(s, False), record, second))
     if not estimated:
         return
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
@@ -136,6 +139,7 @@ def history(
     states_at: Any,
     modes_at: Any,
     exchanged_at: Any,
+    offset_at: Any,
     history_at: Any,
     centre_at: Any,
 ) -> None:
@@ -151,8 +155,8 @@ def history(
         Number of samples.
     times_at
         Their times, ascending [s], shape (n,).
-    states_at, modes_at, exchanged_at
-        Room for the record, shapes (n, 6), (2, n) and (n, 4).
+    states_at, modes_at, exchanged_at, offset_at
+        Room for the record, shapes (n, 6), (2, n), (n, 4) and (n,).
     history_at
         Where the results go, shape (len(HISTORY), n); NaN where the simulation does not get.
     centre_at
@@ -160,16 +164,17 @@ def history(
     """
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, control = readings_from(s), control_from(s, s[9] > 0.0)
-    design = design_in(carray(design_from, (15, 1)), 0)
+    given = carray(design_from, (17, 1))
+    design, second = design_in(given, 0), SecondSpring(given[15, 0], given[16, 0])
     out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
-    exchanged, nothing = carray(exchanged_at, (n, 4)), carray(exchanged_at, (0,))
-    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, nothing)
+    exchanged, offset = carray(exchanged_at, (n, 4)), carray(offset_at, (n,))
+    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
     out[:] = np.nan
     record.states[:] = np.nan
-    simulate_design(design, readings, control, record)
-    c = constants_of(design, readings, control.elements)
+    simulate_on_springs(design, readings, control, record, second)
+    first = constants_of(design, readings, control.elements)
     centre = carray(centre_at, (2,))
-    centre[0], centre[1] = c.c_x, c.c_y
+    centre[0], centre[1] = first.c_x, first.c_y
     for i in range(n):
         y = State(
             record.states[i, 0],
@@ -181,6 +186,7 @@ def history(
         )
         if np.isnan(y.x_b):
             break
+        c = first if offset[i] == 0.0 else on_second_spring(first, second.k_2, offset[i])
         mode = modes_of(y, record.turning[i], record.touching[i], c)
         rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(mode, readings, c), c)
         # Printed separation: the spring keeps pulling the truck after release, so it always holds energy.
@@ -203,4 +209,6 @@ def history(
         )
         out[12, i] = stored.crush_elastic
         out[13, i] = stored.gravity if readings.restoring_gravity else restoring
-        out[14, i], out[15, i], out[16, i] = drag, damper, -pull
+        # What is spent where the second spring takes over is lasting crush, as what the damper takes up.
+        lasting = damper + spent_energy(offset[i], design.k_v, second.k_2)
+        out[14, i], out[15, i], out[16, i] = drag, lasting, -pull

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.pilot import accuracy_of
@@ -69,7 +68,6 @@ def write_report(
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
     identity, kept = rows.finished.identity, thinned(rows)
-    _require_one_spring(identity["settings"])
     control, readings = Control(**identity["control"]), Readings(**identity["readings"])
     notes = []
     if identity["kernels_sha256"] != kernels_sha256():
@@ -126,7 +124,6 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         raise ReportError(f"design {number} cannot be computed: {block.reasons[0]}")
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     settings, control = sweep.resolved(), control_of(sweep, accuracy_of(sweep))
-    _require_one_spring(settings)
     text = assembled(
         title=sweep.name,
         settings=settings,
@@ -138,18 +135,6 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         units=units,
     )
     return _written(Path(page), text)
-
-
-def _require_one_spring(settings: Mapping[str, Any]) -> None:
-    """Refuse vehicles that the simulator in the page does not know.
-
-    Raises
-    ------
-    ReportError
-        They have a second spring.
-    """
-    if SECOND_SPRING in settings["inputs"]:
-        raise ReportError("the simulator in the page knows vehicles with one spring only, and these have a second one")
 
 
 def example() -> Sweep:
@@ -175,7 +160,8 @@ def _page_maker() -> Callable[..., str]:
 
 def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
-    return {"title": one.title, "number": one.number, "inputs": {name: row[name] for name in INPUT_COLUMNS}}
+    inputs = {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
+    return {"title": one.title, "number": one.number, "inputs": inputs}
 
 
 def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:

@@ -89,7 +89,7 @@ MUTATIONS = (
     Mutation((103,), _LIFT, "table.d**2 * table.L", "table.d**2 * table.W"),
     Mutation((104,), _UPLIFT, "- (across + over) * omega**2", "+ (across + over) * omega**2"),
     Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
-    Mutation((111,), _SECOND, "c.k_m * (k_2 / c.k_v)", "c.k_m"),
+    Mutation((111,), _SECOND, "k_m=c.k_m * (k_2 / c.k_v)", "k_m=c.k_m"),
     Mutation((111,), _VEHICLE, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
     Mutation((111,), _STAGES, "(a_2 - w.a * v_2) * odd", "(a_2 + w.a * v_2) * odd"),
     Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),

@@ -98,18 +98,18 @@ class Kernel {
   history(one, settings, times) {
     const { design, history } = this.layout;
     const n = times.length;
-    const { at, views } = this.room([2, design.length, settings.length, n, 6 * n, 2 * n, 4 * n, history.length * n, 2]);
+    const { at, views } = this.room([2, design.length, settings.length, n, 6 * n, 2 * n, 4 * n, n, history.length * n, 2]);
     design.forEach((name, field) => (views[1][field] = one[name]));
     views[2].set(settings);
     views[3].set(times);
     this.call("history", [at[1], at[2], n, ...at.slice(3)]);
-    const end = views[7].subarray(0, n).findIndex(Number.isNaN);
+    const end = views[8].subarray(0, n).findIndex(Number.isNaN);
     const reached = end < 0 ? n : end;
     return {
       time: times.slice(0, reached),
-      columns: Object.fromEntries(history.map((name, k) => [name, views[7].slice(k * n, k * n + reached)])),
-      c_x: views[8][0],
-      c_y: views[8][1],
+      columns: Object.fromEntries(history.map((name, k) => [name, views[8].slice(k * n, k * n + reached)])),
+      c_x: views[9][0],
+      c_y: views[9][1],
     };
   }
 }

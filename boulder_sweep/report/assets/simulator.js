@@ -2,6 +2,8 @@
 "use strict";
 
 const SAMPLES = 400;
+/** A crush that no vehicle reaches [m]. */
+const NEVER = 1e300;
 /** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
 const BEFORE_THE_END = 1 - 1e-14;
 /** Columns that `sweep simulate`, which goes on beyond the limit, takes from a row of `sweep run`, which stops there. */
@@ -50,7 +52,9 @@ class Simulator {
         return [field, field === "phi" ? value / DEGREES : value];
       }),
     );
-    return { ...design, K_epsilon: design.K_epsilon * resistanceFactor(resistance, design) };
+    // Without a second spring it is like the first, from a crush on that is never reached.
+    const springs = { k_2: design.k_2 ?? design.k_v, s_2: design.s_2 ?? NEVER };
+    return { ...design, ...springs, K_epsilon: design.K_epsilon * resistanceFactor(resistance, design) };
   }
 
   /**
@@ -63,6 +67,7 @@ class Simulator {
     const [bumper, hood] = [inputs.bumper_height_m, inputs.hood_height_m];
     const impact = this.data.face ? 0.5 * (Math.min(exposed, hood) + bumper) : inputs.impact_height_m;
     let refused = 0;
+    if (inputs.vehicle_second_spring_N_m < inputs.vehicle_spring_N_m) refused = 4;
     if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
     if (hood < bumper) refused = 2;
     if (exposed <= 0) refused = 1;
