@@ -21,9 +21,11 @@ if TYPE_CHECKING:
 def grid_lines(sweep: Sweep) -> list[str]:
     """Return a description of the designs: how many, and over which axes."""
     count = counted(sweep.n_designs, "design")
+    words = sweep.model.ground.words
+    ground = [f"  {words}"] if words else []
     if sweep.table is not None:
         carried = f", with {', '.join(sweep.table.labels)}" if sweep.table.labels else ""
-        return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep)]
+        return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep), *ground]
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
         unit = BY_NAME[axis.name].unit if axis.name in BY_NAME else "1"
@@ -32,7 +34,7 @@ def grid_lines(sweep: Sweep) -> list[str]:
             continue
         ends = f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis) > 1 else f"{axis.values[0]:g}"
         lines.append(f"  {axis.name:<26}{len(axis):>9,} values  {ends}{'' if unit == '1' else ' ' + unit}")
-    return [*lines, *_uncertain_lines(sweep)]
+    return [*lines, *_uncertain_lines(sweep), *ground]
 
 
 def _uncertain_lines(sweep: Sweep) -> list[str]:

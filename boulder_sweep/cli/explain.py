@@ -69,13 +69,15 @@ def why_lines(found: Explanation) -> list[str]:
     """Return what decided a row, and how near it came to every limit."""
     from boulder_sweep.judge.validity import BY_FLAG
     from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-    from boulder_sweep.views.wording import REASON_WORDS
+    from boulder_sweep.views.wording import REASON_WORDS, ground_words
 
     row, history = found.stored, found.trajectory
     reason = REASON_WORDS.get(row["reason"], row["reason"])
     lines = ["why", f"  {row['verdict']}{f': {reason}' if reason else ''}"]
     if history is None or row["max_rotation_deg"] is None:
         return lines
+    ground = ground_words(history.settings)
+    lines += [f"  soil: {ground}"] if ground else []
     limit = math.degrees(history.motion.control.theta_limit)
     if row["time_to_limit_s"] is not None:
         lines.append(

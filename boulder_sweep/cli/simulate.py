@@ -57,6 +57,8 @@ def simulate(
     if reason:
         say(f"design {number} cannot be computed: {reason}")
         return EXIT_SOME_ROWS_FAILED
+    if words := sweep.model.ground.words:
+        say(f"note: {words}")
     if verbose:
         say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design

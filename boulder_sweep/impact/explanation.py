@@ -20,7 +20,7 @@ from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import UNLOADINGS, Criterion, Model, ReadingChoice, SolverSettings
+from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings
 from boulder_sweep.store.errors import OtherVersionError
 from boulder_sweep.store.manifest import load as load_manifest
 from boulder_sweep.store.provenance import differences, identity
@@ -116,7 +116,8 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         raise OtherVersionError(folder, why, version_of({"identity": there})) from unfamiliar
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
-    evaluation = Evaluation(readings, control, limits, resistance=sweep.model.resistance)
+    model = sweep.model
+    evaluation = Evaluation(readings, control, limits, resistance=model.resistance, ground=model.ground)
     judged = evaluation(block)
     again = part_table(block, judged, {}).to_pylist()[0]
     computable = not block.reasons[0]
@@ -133,7 +134,8 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
 
 def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
     """Return a sweep of the one design, with the model and the step its row was computed with."""
-    readings = ReadingChoice(**settings["model"]["readings"])
+    model = settings["model"]
+    readings, ground = ReadingChoice(**model["readings"]), Ground.of_dict(model.get("ground", {}))
     return Sweep(
         name=settings["name"],
         path=None,
@@ -143,9 +145,10 @@ def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], contr
         model=Model(
             readings,
             control.elements,
-            settings["model"]["calibrated_crush_m"],
-            settings["model"]["resistance"],
+            model["calibrated_crush_m"],
+            model["resistance"],
             UNLOADINGS[control.unloading],
+            **ground.fields(),
         ),
         solver=SolverSettings(
             accuracy=None,

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from boulder_kernels import Constants, Design, Readings, Record, SecondSpring
 from boulder_kernels.dynamics import Acceleration, State, acceleration
 from boulder_kernels.energy import stored_energies
-from boulder_kernels.memory import at_sample
+from boulder_kernels.layered import SoilLayers
+from boulder_kernels.memory import RememberingConstants, at_sample
 from boulder_kernels.modes import (
     FREE,
     HELD,
@@ -249,11 +251,31 @@ def soil_profile(record: Record, sample: int, slices: int, c: Constants) -> Soil
     versine = 2.0 * np.sin(0.5 * theta) ** 2
     k = soil_kinematics(x_b, v_b, omega, float(np.sin(theta)), float(versine), c)
     ratio = (np.arange(slices) + 0.5) / slices
-    height = c.d / slices
     displacement = k.A - k.slope_x * ratio
     velocity = k.B - k.slope_v * ratio
+    if not isinstance(c, Constants):
+        pressed = _pressed_at(ratio, displacement, velocity, at_sample(c, sample)) / slices
+        return SoilProfile(ratio * c.d, displacement, -pressed)
+    height = c.d / slices
     force = [
         -(spring_force(float(u), float(r * c.d), height, c) + drag_force(float(v), height, c))
         for u, v, r in zip(displacement, velocity, ratio, strict=True)
     ]
     return SoilProfile(ratio * c.d, displacement, np.array(force))
+
+
+def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:
+    """What layers or elements press with at ratios of the depth, per ratio [N]; of elements, those they lie in."""
+    soil, front, back = c.soil, 0.0, 0.0
+    if isinstance(soil, SoilLayers):
+        at = np.searchsorted(soil.to, ratio)
+        spring, ultimate, drag = soil.K[at] * ratio, soil.P_0[at] + soil.P_1[at] * ratio, soil.R[at]
+    else:
+        elements = len(soil.ratio)
+        at = np.minimum((ratio * elements).astype(int), elements - 1)
+        spring, ultimate, drag = (elements * values[at] for values in (soil.stiffness, soil.ultimate, soil.drag))
+        if isinstance(c, RememberingConstants):
+            front, back = c.memory.front[at], c.memory.back[at]
+    ahead = np.clip(spring * (displacement - front), 0.0, ultimate)
+    behind = np.clip(spring * (back - displacement), 0.0, ultimate)
+    return ahead - behind + drag * velocity * np.abs(velocity)

@@ -13,25 +13,23 @@ import numpy as np
 from boulder_kernels import (
     ELASTIC,
     Control,
-    Design,
     DesignTable,
     Outcome,
     OutcomeTable,
     Readings,
     Record,
     SecondSpring,
-    constants_of,
     no_record,
-    simulate_design,
 )
 from boulder_kernels.design import design_at
-from boulder_kernels.impact import simulate_on_springs
+from boulder_kernels.layered import LayeredTable, constants_at
 from boulder_kernels.outcomes import empty_outcomes, write_outcome
 from boulder_kernels.plastic import simulate_plastic
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors, simulate_row
 from boulder_sweep.columns import AT_REST, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
+from boulder_sweep.judge.ground import plain
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, Judged
 from boulder_sweep.judge.pilot import accuracy_of
@@ -117,7 +115,7 @@ def simulate(
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    designs = designs_of(block, None, sweep.model.resistance)
+    designs = designs_of(block, None, sweep.model.resistance, sweep.model.ground)
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     decided = evaluation.judged(designs)
@@ -125,11 +123,11 @@ def simulate(
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
     second = None if designs.springs is None else SecondSpring(*(float(column[0]) for column in designs.springs))
-    outcome, c = _simulated(one, how, control, record, second)
+    outcome, c = _simulated(designs.table, how, control, record, second)
     row = _outcome_row(outcome)
     if control.error_estimate:
-        coarser, _ = _simulated(one, how, control._replace(halved=False), no_record(), second)
-        _estimate(row, _outcome_row(coarser), designs.table, how)
+        coarser, _ = _simulated(designs.table, how, control._replace(halved=False), no_record(), second)
+        _estimate(row, _outcome_row(coarser), plain(designs.table), how)
     judged = judge(row, designs, evaluation.limits, reported_step_s(control))
     if judged.verdict[0] != ERROR:
         judged = _as_decided(judged, decided)
@@ -138,16 +136,15 @@ def simulate(
 
 
 def _simulated(
-    design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None
+    table: DesignTable, readings: Readings, control: Control, record: Record, second: SecondSpring | None
 ) -> tuple[Outcome, Any]:
     """Simulate one design; return also the constants of its motion, with what its soil remembered at each sample."""
     if control.unloading != ELASTIC:
-        found = simulate_plastic(design, readings, control, record, second)
+        layers = table.layers[0] if isinstance(table, LayeredTable) else None
+        found = simulate_plastic(design_at(table, 0), readings, control, record, second, layers)
         return found.outcome, found.constants
-    c = constants_of(design, readings, control.elements)
-    if second is None:
-        return simulate_design(design, readings, control, record), c
-    return simulate_on_springs(design, readings, control, record, second), c
+    outcome = simulate_row(table, 0, readings, control, record, second)
+    return outcome, constants_at(table, 0, readings, control.elements)
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:

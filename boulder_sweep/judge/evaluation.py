@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,11 +17,12 @@ import numpy as np
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
+from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
-from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS
+from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -66,6 +67,8 @@ class Evaluation:
         Law of the ultimate resistance of the soil.
     second_spring
         Whether the vehicles have a second spring, for which other kernels are compiled.
+    ground
+        Layers, water, cohesion and slope of the soil.
     """
 
     readings: Readings
@@ -75,6 +78,7 @@ class Evaluation:
     only: tuple[str, ...] = ()
     resistance: str = RESISTANCES[0]
     second_spring: bool = False
+    ground: Ground = field(default_factory=Ground)
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -90,13 +94,13 @@ class Evaluation:
             n rows, in the same order.
         """
         if not block.reasons.any:
-            return self.judged(designs_of(block, None, self.resistance))
+            return self.judged(designs_of(block, None, self.resistance, self.ground))
         codes = np.asarray(block.reasons.codes)
         computable = codes == 0
         refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1, self.columns)
         if not computable.any():
             return joined([refused])
-        both = joined([self.judged(designs_of(block, computable, self.resistance)), refused])
+        both = joined([self.judged(designs_of(block, computable, self.resistance, self.ground)), refused])
         # In `both` the refused rows follow the others; restore the order of the block.
         place = np.empty(len(codes), dtype=np.int64)
         place[computable] = np.arange(computable.sum())
@@ -146,7 +150,9 @@ class Evaluation:
     def warm_up(self) -> None:
         """Load or compile the kernels by simulating one step of a plain design."""
         begun = time.monotonic()
-        plain = PLAIN_DESIGN._replace(springs=PLAIN_SPRINGS if self.second_spring else None)
+        springs = PLAIN_SPRINGS if self.second_spring else None
+        table = with_soil(PLAIN_DESIGN.table, self.resistance, self.ground)
+        plain = PLAIN_DESIGN._replace(table=table, springs=springs)
         self.simulate(plain.table, self.readings, self.control._replace(horizon=self.control.h), *plain.laws)
         _warm_ups_s.append(time.monotonic() - begun)
 
@@ -193,6 +199,7 @@ def evaluation_of(
         simulate=simulate,
         resistance=sweep.model.resistance,
         second_spring=SECOND_SPRING in sweep.plan.columns,
+        ground=sweep.model.ground,
     )
 
 

@@ -16,10 +16,10 @@ import numpy as np
 from boulder_kernels import DesignTable, Readings, as_printed, corrected
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
 from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, sampled_designs, simulated
+from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, plain_designs, sampled_designs, simulated
 from boulder_sweep.judge.refinement import reported_step_s
-from boulder_sweep.judge.resistance import with_law
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.judge.verdict import judge
 
@@ -104,18 +104,24 @@ def firmness_of(sweep: Sweep) -> Firmness:
         changed = designs._replace(table=table)
         return judge(simulated(changed, read, fast), changed, limits, steps.step_s)
 
+    def by(law: str, change: float = 0.0) -> DesignTable:
+        """Return the designs by a law, with all friction angles changed [rad]."""
+        phi = np.maximum(given.phi + change, least)
+        return with_soil(given._replace(phi=phi), law, ground, change)
+
+    given, ground = plain_designs(sweep, count).table, sweep.model.ground
+    least = math.radians(LEAST_ANGLE_DEG)
     table = designs.table
     found = verdicts(table, readings)
     passes = found.verdict == PASS
-    angle = table.phi - math.radians(ANGLE_DEG)
     variants = {
         "reading": [(table, other)],
         "friction_angle": [
-            (table._replace(phi=np.maximum(angle, math.radians(LEAST_ANGLE_DEG))), readings),
-            (table._replace(phi=table.phi + math.radians(ANGLE_DEG)), readings),
+            (by(law, -math.radians(ANGLE_DEG)), readings),
+            (by(law, math.radians(ANGLE_DEG)), readings),
         ],
         "speed": [(table._replace(v_0=table.v_0 * factor), readings) for factor in (1.0 - SPEED, 1.0 + SPEED)],
-        "resistance": [(with_law(table, other_law(law), law), readings)],
+        "resistance": [(by(other_law(law)), readings)],
     }
     changed = {}
     for name, tables in variants.items():

@@ -8,8 +8,8 @@ import numpy as np
 
 from boulder_kernels import DesignTable, SecondSprings
 from boulder_sweep.designs import SECOND_SPRING
-from boulder_sweep.judge.resistance import with_law
-from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.judge.ground import with_soil
+from boulder_sweep.settings.model import RESISTANCES, Ground
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -38,7 +38,8 @@ class Designs(NamedTuple):
     """Designs that can be computed, n of them."""
 
     table: DesignTable
-    """What the kernels simulate: contiguous float64 arrays of shape (n,); SI, phi in rad, beta in MN/m^3."""
+    """What the kernels simulate: contiguous float64 arrays of shape (n,); SI, phi in rad, beta in MN/m^3. Where the
+    soil is not the same at every depth, a `LayeredTable`, whose other fields hold the uppermost layer."""
     bed_offset: np.ndarray
     """Distance from the front bumper to the leading edge of the cargo bed [m], shape (n,)."""
     springs: SecondSprings | None = None
@@ -51,7 +52,7 @@ class Designs(NamedTuple):
 
     def rows(self, chosen: np.ndarray | slice) -> Designs:
         """Return some of the designs, chosen by a mask, by their places or by a slice."""
-        table = DesignTable(*(np.ascontiguousarray(column[chosen]) for column in self.table))
+        table = type(self.table)(*(np.ascontiguousarray(column[chosen]) for column in self.table))
         springs = self.springs
         if springs is not None:
             springs = SecondSprings(*(np.ascontiguousarray(column[chosen]) for column in springs))
@@ -63,7 +64,9 @@ class Designs(NamedTuple):
         return () if self.springs is None else (self.springs,)
 
 
-def designs_of(block: DesignBlock, rows: np.ndarray | None = None, resistance: str = RESISTANCES[0]) -> Designs:
+def designs_of(
+    block: DesignBlock, rows: np.ndarray | None = None, resistance: str = RESISTANCES[0], ground: Ground | None = None
+) -> Designs:
     """Return the designs of a block.
 
     Parameters
@@ -74,6 +77,8 @@ def designs_of(block: DesignBlock, rows: np.ndarray | None = None, resistance: s
         Which of them (bool, shape (n,)); all by default.
     resistance
         Law of the ultimate resistance of the soil.
+    ground
+        Layers, water, cohesion and slope of the soil; none by default.
     """
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
@@ -82,7 +87,8 @@ def designs_of(block: DesignBlock, rows: np.ndarray | None = None, resistance: s
         springs = SecondSprings(
             _values(block, SECOND_SPRING, rows), _values(block, "vehicle_second_spring_from_m", rows)
         )
-    return Designs(with_law(DesignTable(**columns), resistance), _values(block, "bed_offset_m", rows), springs)
+    table = with_soil(DesignTable(**columns), resistance, ground or Ground())
+    return Designs(table, _values(block, "bed_offset_m", rows), springs)
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

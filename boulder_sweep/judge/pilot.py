@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
+from boulder_kernels.layered import LayeredTable
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, LADDER, Accuracy, Steps, steps_of
 from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.sampling import sampled_rows
 
 if TYPE_CHECKING:
+    from boulder_sweep.designs import DesignBlock
     from boulder_sweep.settings import Sweep
 
 DESIGNS = 4096
@@ -91,13 +93,24 @@ def pilot_size(elements: int) -> int:
 
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
     """Return about this many designs of a sweep, without those that cannot be computed."""
+    return designs_of(*_sampled(sweep, count), sweep.model.resistance, sweep.model.ground)
+
+
+def plain_designs(sweep: Sweep, count: int) -> Designs:
+    """Return the same designs in the soil that their inputs describe, by the paper's law of the resistance."""
+    return designs_of(*_sampled(sweep, count))
+
+
+def _sampled(sweep: Sweep, count: int) -> tuple[DesignBlock, np.ndarray]:
+    """Return a block of about this many designs, and which of them can be computed."""
     block = sweep.plan.selection(sampled_rows(sweep, count))
-    return designs_of(block, np.asarray(block.reasons.codes) == 0, sweep.model.resistance)
+    return block, np.asarray(block.reasons.codes) == 0
 
 
 def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate designs in pieces, so that an interruption need not wait long."""
-    size = AT_ONCE if control.elements or designs.laws else AT_ONCE_CLOSED
+    one_by_one = control.elements or designs.laws or isinstance(designs.table, LayeredTable)
+    size = AT_ONCE if one_by_one else AT_ONCE_CLOSED
     rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
     pieces = [simulate_table(some.table, readings, control, *some.laws) for some in rows]
     return type(pieces[0])(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))

@@ -31,7 +31,7 @@ from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, PARTS
 from boulder_sweep.report.rows import SIZES, Rows, Thinned
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.settings.model import RESISTANCES, Ground
 from boulder_sweep.settings.notes import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.views.wording import REASON_WORDS
@@ -66,6 +66,9 @@ def page_data(
     units: str,
 ) -> dict[str, Any]:
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
+    ground = Ground.of_dict(settings["model"].get("ground", {}))
+    water = [] if ground.water_table_m is None else [f"water_table: {ground.water_table_m} m"]
+    slope = [f"slope: {ground.slope_deg} deg"] if ground.slope_deg else []
     return {
         "title": title,
         "units": units,
@@ -81,6 +84,7 @@ def page_data(
         ],
         "start": dict(start),
         "resistance": settings["model"].get("resistance", RESISTANCES[0]),
+        "ground": ground.as_dict(),
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": REASONS,
         "words": REASON_WORDS,
@@ -93,6 +97,7 @@ def page_data(
         "colours": COLOURS,
         "yaml": _yaml(settings),
         "vehicle": [f"calibrated_crush: {settings['model']['calibrated_crush_m']} m"],
+        "soil": [*water, *slope],
         "chosen": [dict(one) for one in chosen],
         "kernel": base64.b64encode(KERNEL.read_bytes()).decode(),
     }

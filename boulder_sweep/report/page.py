@@ -14,10 +14,12 @@ from bokeh.embed.util import standalone_docs_json_and_render_items
 from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
+from boulder_sweep.errors import ReportError
 from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, verdict_map
+from boulder_sweep.settings.model import Ground
 from boulder_sweep.text import script_data
-from boulder_sweep.views.wording import LAW_WORDS
+from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
 if TYPE_CHECKING:
     from boulder_sweep.report.answers import Sentence
@@ -26,6 +28,10 @@ if TYPE_CHECKING:
 ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = ("kernel", "verdict", "simulator", "units", "plots", "scene", "maps", "walker", "controls", "texts", "page")
 """Our own script, in this order."""
+NO_LAYERS = (
+    "the simulator in the page knows neither layers, nor cohesion, nor a water table below the soil line; "
+    "`sweep plot`, `sweep simulate` and `sweep explain` do"
+)
 MAIN = (
     "embedment_depth_m",
     "friction_angle_deg",
@@ -83,7 +89,14 @@ def assembled(
     -------
     str
         HTML.
+
+    Raises
+    ------
+    ReportError
+        The simulator in the page does not know the soil.
     """
+    if not Ground.of_dict(settings["model"].get("ground", {})).is_proportional:
+        raise ReportError(NO_LAYERS)
     panels = ["live", *(f"chosen{place}" for place in range(len(chosen)))]
     document = Document()
     for plot in [*(plot for panel in panels for plot in curves(panel)), verdict_map("live")]:
@@ -125,6 +138,7 @@ def assembled(
         settings=settings,
         lines=setting_lines(settings),
         readings=reading_words(settings),
+        ground=ground_words(settings),
         law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),
         data=script_data(data),
         style=(ASSETS / "page.css").read_text(),

@@ -7,6 +7,7 @@ from typing import Any
 
 from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.fields import BY_NAME, MAX_ELEMENTS, Field
+from boulder_sweep.settings.layers import read_layers
 from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
 from boulder_sweep.settings.model import (
     ACCURACIES,
@@ -124,6 +125,7 @@ _READERS: dict[str, Callable[[Node], Any]] = {
     "soil_elements": _read_soil,
     "resistance": _read_resistance,
     "unloading": _read_unloading,
+    "layers": read_layers,
     "accuracy": _read_accuracy,
 }
 """Readers by name; an entry without one is a single number within its admitted range."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
+from boulder_sweep.settings.layers import WATER_KG_M3
 from boulder_sweep.settings.model import SolverSettings
 
 
@@ -48,6 +51,7 @@ def check_pairs(entries: Entries) -> None:
     _check_second_spring(entries)
     _check_solver(entries)
     _check_uncertain(entries)
+    _check_ground(entries)
 
 
 def _check_impact_height(entries: Entries, bumper: float | None) -> None:
@@ -99,3 +103,24 @@ def _check_uncertain(entries: Entries) -> None:
         place = entries.key_place("partial_factor", "friction_angle")
         message = "give a partial factor or a distribution of soil.friction_angle, not both"
         entries.problems.add(place, "partial_factor.friction_angle", message)
+
+
+def _check_ground(entries: Entries) -> None:
+    """Report ground that falls as steeply as its friction angle, and soil that would float below the water table."""
+    layers = entries.settings.get("layers", ())
+    slope, water = entries.settings.get("slope_deg", 0.0), entries.settings.get("water_table_m")
+    if slope > 0.0:
+        factor = entries.settings.get("partial_factor", 1.0)
+        angles = [*entries.values("friction_angle_deg"), *(layer.friction_angle_deg for layer in layers)]
+        least = math.degrees(math.atan(math.tan(math.radians(min(angles))) / factor)) if len(angles) else math.inf
+        if slope >= least:
+            message = f"must be less than every friction angle (the least is {least:.4g} deg), or the ground slides"
+            entries.problems.add(entries.key_place("soil", "slope"), "soil.slope", message)
+    if water is not None:
+        top_is_wet = not layers or layers[0].from_m > water
+        bottoms = [*(layer.from_m for layer in layers[1:]), math.inf]
+        densities = [layer.density_kg_m3 for layer, bottom in zip(layers, bottoms, strict=False) if bottom > water]
+        densities += [*entries.values("soil_density_kg_m3")] if top_is_wet else []
+        if densities and min(densities) <= WATER_KG_M3:
+            message = f"soil of {min(densities):g} kg/m^3 would float; give the density of the saturated soil below it"
+            entries.problems.add(entries.key_place("soil", "water_table"), "soil.water_table", message)

@@ -128,7 +128,11 @@ class Entries:
                 field = known.get(inner.key)
                 if inner.key == "name":
                     continue
-                if field is None or field not in fields.INPUTS:
+                if field is not None and field not in fields.INPUTS:
+                    message = f"is not a key of {section} in a named set: it is one for all designs of a file"
+                    self.problems.add(inner.place, field.path, message)
+                    continue
+                if field is None:
                     self._unknown(inner, section, ("name", *(key for key in known if known[key] in fields.INPUTS)))
                     continue
                 self.given.add(field.path)
@@ -166,7 +170,8 @@ class Entries:
         """Report an unknown key, with the nearest known one."""
         word = entry.key.lower()
         synonym = next((field.key for field in fields.fields_of(section) if word in field.also), None)
-        meant = synonym or (None if self.problems.full else nearest(entry.key, known))
+        elsewhere = bool(section) and any(field.key == word for field in fields.FIELDS)
+        meant = synonym or (None if self.problems.full or elsewhere else nearest(entry.key, known))
         hint = f"; did you mean {meant}?" if meant else ""
         if meant and not section:
             self.misspelled |= {field.path for field in fields.fields_of(meant)}
@@ -192,6 +197,13 @@ class Entries:
         if leaf is None:
             return None if field.path in self.given else field.default
         return None if leaf.is_axis else float(leaf.values[0])
+
+    def values(self, name: str) -> np.ndarray:
+        """Return all values of an input, however it is given; none where it has a mistake."""
+        if self.table is not None and name in self.table.columns:
+            return self.table.columns[name]
+        leaf = self.leaves.get(name)
+        return np.empty(0) if leaf is None else leaf.values
 
     def place_of(self, field: fields.Field) -> Place:
         """Return where a quantity stands, else its block, else the beginning of the file."""

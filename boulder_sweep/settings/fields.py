@@ -249,6 +249,34 @@ SETTINGS: tuple[Field, ...] = (
         "correlation of friction angle and subgrade reaction, where both have a distribution",
         Bound(-0.99, 0.99, "the correlation of two different soil properties"),
     ),
+    Field("soil", "layers", "layers", "", "layers below the uppermost, which the other entries describe"),
+    Field(
+        "soil",
+        "cohesion",
+        "cohesion_kPa",
+        "kPa",
+        "effective cohesion of the uppermost layer",
+        Bound(0.0, 1000.0, "more is rock"),
+        also=("c", "c'"),
+    ),
+    Field(
+        "soil",
+        "water_table",
+        "water_table_m",
+        "m",
+        "depth of the water table below the soil line; densities below it are those of the saturated soil",
+        Bound(0.0, 1000.0, "counted downwards from the soil line"),
+        also=("water", "ground_water", "groundwater", "water_level"),
+    ),
+    Field(
+        "soil",
+        "slope",
+        "slope_deg",
+        "deg",
+        "angle at which the ground falls away behind the boulder",
+        Bound(0.0, 60.0, "less than the friction angle, or the ground does not stand"),
+        also=("ground_slope", "inclination"),
+    ),
     Field(
         "partial_factor",
         "friction_angle",
@@ -316,6 +344,16 @@ SETTINGS: tuple[Field, ...] = (
     ),
 )
 """What holds for all designs of a file: one value each."""
+
+LAYER_TOP = Field(
+    "soil.layers",
+    "from",
+    "from_m",
+    "m",
+    "depth of the layer's upper boundary",
+    Bound(1e-6, 20.0, "a depth"),
+)
+"""The entry of a layer that no other has; the rest of it are entries of the soil."""
 
 FIELDS: tuple[Field, ...] = (*INPUTS, *SETTINGS)
 SECTIONS: dict[str, str] = {

@@ -126,6 +126,12 @@ def _apply_partial_factor(entries: Entries, factor: float) -> None:
     leaf = entries.leaves.get(field.name)
     if leaf is not None:
         entries.leaves[field.name] = replace(leaf, values=design(leaf.values))
+    if "layers" in entries.settings:
+        layers = entries.settings["layers"]
+        angles = design(np.array([layer.friction_angle_deg for layer in layers]))
+        entries.settings["layers"] = tuple(
+            replace(layer, friction_angle_deg=float(angle)) for layer, angle in zip(layers, angles, strict=True)
+        )
     if entries.table is not None and field.name in entries.table.columns:
         entries.table.columns[field.name] = design(entries.table.columns[field.name])
 

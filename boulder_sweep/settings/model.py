@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 PRESETS = ("as_printed", "corrected")
 
@@ -87,6 +88,82 @@ class ReadingChoice:
 
 
 @dataclass(frozen=True, slots=True)
+class Layer:
+    """One layer of soil below the uppermost, down to the next.
+
+    Attributes
+    ----------
+    from_m : float
+        Depth of its upper boundary below the soil line [m].
+    density_kg_m3, friction_angle_deg, subgrade_reaction_MN_m3, cohesion_kPa : float
+        Its soil.
+    """
+
+    from_m: float
+    density_kg_m3: float
+    friction_angle_deg: float
+    subgrade_reaction_MN_m3: float
+    cohesion_kPa: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """In what the soil differs from a dry, level one without cohesion that is the same at every depth.
+
+    Attributes
+    ----------
+    layers : tuple of Layer
+        Layers below the uppermost, from the top down; the uppermost is the soil that the inputs describe.
+    cohesion_kPa : float
+        Effective cohesion of the uppermost layer [kPa].
+    water_table_m : float or None
+        Depth of the water table below the soil line [m]; None where it is out of reach.
+    slope_deg : float
+        Angle at which the ground falls away behind the boulder [deg].
+    """
+
+    layers: tuple[Layer, ...] = ()
+    cohesion_kPa: float = 0.0
+    water_table_m: float | None = None
+    slope_deg: float = 0.0
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether there is nothing of it."""
+        return self == Ground()
+
+    @property
+    def is_proportional(self) -> bool:
+        """Whether the resistance grows in proportion to depth, as in the paper's soil."""
+        return not self.layers and self.cohesion_kPa == 0.0 and self.water_table_m in (None, 0.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return asdict(self)
+
+    @property
+    def words(self) -> str:
+        """What there is of it; empty where there is nothing."""
+        cohesions = [self.cohesion_kPa, *(layer.cohesion_kPa for layer in self.layers)]
+        parts = (
+            f"{len(self.layers) + 1} layers of soil" if self.layers else "",
+            f"cohesion {' / '.join(f'{cohesion:g}' for cohesion in cohesions)} kPa" if any(cohesions) else "",
+            "" if self.water_table_m is None else f"water table {self.water_table_m:g} m down",
+            f"ground falling by {self.slope_deg:g}° behind the boulder" if self.slope_deg else "",
+        )
+        return ", ".join(part for part in parts if part)
+
+    def fields(self) -> dict[str, Any]:
+        """Return everything by name, the layers as they are."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @classmethod
+    def of_dict(cls, given: dict[str, Any]) -> Ground:
+        """Return the ground that `as_dict` returned; the usual one of no data."""
+        return cls(**given | {"layers": tuple(Layer(**layer) for layer in given.get("layers", ()))})
+
+
+@dataclass(frozen=True, slots=True)
 class Model:
     """Which reading of the paper and which representation of the soil.
 
@@ -102,6 +179,8 @@ class Model:
         Law of the ultimate resistance of the soil, one of `RESISTANCES`.
     unloading : str
         How the soil unloads, one of `UNLOADINGS`.
+    layers, cohesion_kPa, water_table_m, slope_deg
+        As of `Ground`.
     """
 
     readings: ReadingChoice = ReadingChoice()
@@ -109,12 +188,21 @@ class Model:
     calibrated_crush_m: float = 1.0
     resistance: str = RESISTANCES[0]
     unloading: str = UNLOADINGS[0]
+    layers: tuple[Layer, ...] = ()
+    cohesion_kPa: float = 0.0
+    water_table_m: float | None = None
+    slope_deg: float = 0.0
 
     @property
     def elements(self) -> int:
         """Number of soil elements that is computed with; 0 for the closed form, which soil that remembers has not."""
         remembers = self.unloading != UNLOADINGS[0]
         return REMEMBERING_ELEMENTS if remembers and self.soil_elements == 0 else self.soil_elements
+
+    @property
+    def ground(self) -> Ground:
+        """In what the soil differs from the paper's."""
+        return Ground(self.layers, self.cohesion_kPa, self.water_table_m, self.slope_deg)
 
     @property
     def preset(self) -> str:

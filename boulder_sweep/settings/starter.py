@@ -22,6 +22,11 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "soil.density": ("1860 kg/m^3", "116 pcf"),
     "soil.friction_angle": ("[36 deg, 40 deg]",) * 2,
     "soil.subgrade_reaction": ("60 MN/m^3", "220 pci"),
+    "soil.layers": (
+        "[{from: 1.2 m, density: 2 t/m^3, friction_angle: 38 deg, subgrade_reaction: 50 MN/m^3}]",
+        "[{from: 4 ft, density: 125 pcf, friction_angle: 38 deg, subgrade_reaction: 180 pci}]",
+    ),
+    "soil.water_table": ("0.8 m", "2.6 ft"),
     "vehicle.mass": ("6800 kg", "15000 lb"),
     "vehicle.spring": ("3103.3 kN/m", "17720 lb/in"),
     "vehicle.damper": ("138.91 kN*s/m", "793 lb*s/in"),

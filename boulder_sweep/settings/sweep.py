@@ -196,6 +196,7 @@ class Sweep:
             more["labels"] = {name: _texts_listed(label) for name, label in self.plan.labels.items()}
         if self.partial_factor != 1.0:
             more["partial_factor"] = {"friction_angle": self.partial_factor}
+        ground = self.model.ground
         return {
             "name": self.name,
             "n_designs": self.n_designs,
@@ -214,6 +215,7 @@ class Sweep:
                 "calibrated_crush_m": self.model.calibrated_crush_m,
                 "resistance": self.model.resistance,
                 "unloading": self.model.unloading,
+                **({} if ground.is_usual else {"ground": ground.as_dict()}),
             },
             "solver": {
                 "accuracy": accuracy if isinstance(accuracy, str) else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.settings.model import UNLOADINGS
+from boulder_sweep.settings.model import UNLOADINGS, Ground
 from boulder_sweep.views.labels import sized, value_text
 
 if TYPE_CHECKING:
@@ -53,12 +53,22 @@ def terms_line(settings: Mapping[str, Any]) -> str:
 
 
 def model_words(settings: Mapping[str, Any]) -> str:
-    """Return the readings of the paper, and the laws of the soil where they are not the paper's."""
+    """Return the readings of the paper, and the laws of the soil and its ground where they are not the paper's."""
     model = settings["model"]
     law = LAW_WORDS.get(model.get("resistance", ""), "")
-    words = [f"readings {model['preset'].replace('_', ' ')}", *([f"resistance {law}"] if law else [])]
     unloading = UNLOADINGS.index(model.get("unloading", UNLOADINGS[0]))
-    return ", ".join([*words, *([UNLOADING_WORDS[unloading]] if unloading else [])])
+    words = (
+        f"readings {model['preset'].replace('_', ' ')}",
+        f"resistance {law}" if law else "",
+        UNLOADING_WORDS[unloading] if unloading else "",
+        ground_words(settings),
+    )
+    return ", ".join(word for word in words if word)
+
+
+def ground_words(settings: Mapping[str, Any]) -> str:
+    """Return in what the soil is not a dry, level one that is the same at every depth; empty where it is one."""
+    return Ground.of_dict(settings["model"].get("ground", {})).words
 
 
 def design_line(trajectory: Trajectory, units: str = "si") -> str:

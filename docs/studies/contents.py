@@ -153,6 +153,10 @@ def _soil_tests(_: Path) -> str:
     return soil.tests_table().markdown()
 
 
+def _soil_ground(_: Path) -> str:
+    return soil.ground_table().markdown()
+
+
 def _soil_grid(root: Path) -> str:
     return soil.grid_table(root / GRID).markdown()
 
@@ -213,6 +217,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "validity-shares": _validity_shares,
     "soil-tests": _soil_tests,
     "soil-grid": _soil_grid,
+    "soil-ground": _soil_ground,
     "pushover": _pushover,
     "post-speeds": _post_speeds,
     "uplift-tests": _uplift_tests,

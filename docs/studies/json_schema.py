@@ -11,6 +11,7 @@ from boulder_sweep.settings.defaults import default_of
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
+from boulder_sweep.settings.layers import LAYER_FIELDS, MOST_LAYERS
 from boulder_sweep.settings.leaf import MAX_AXIS
 from boulder_sweep.settings.model import (
     ACCURACIES,
@@ -183,6 +184,15 @@ _FORMS: dict[str, Schema] = {
     },
     "resistance": _words(*RESISTANCES),
     "unloading": _words(*UNLOADINGS),
+    "layers": {
+        "type": "array",
+        "minItems": 1,
+        "maxItems": MOST_LAYERS,
+        "items": _object(
+            {key: _value(field) for key, field in LAYER_FIELDS.items()},
+            tuple(key for key in LAYER_FIELDS if key != "cohesion"),
+        ),
+    },
     "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
 }
 """Entries that are more than a quantity."""

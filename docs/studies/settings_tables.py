@@ -21,6 +21,7 @@ FORMS = {
     "soil_elements": "`closed_form`, or `{elements: 5000}` ([soil elements](convergence.md))",
     "resistance": ", ".join(f"`{law}`" for law in RESISTANCES) + " ([soil](soil.md))",
     "unloading": ", ".join(f"`{way}`" for way in UNLOADINGS) + " ([unloading](soil.md#unloading))",
+    "layers": "a list of layers ([soils as they lie](soil.md#soils-as-they-lie))",
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }
 """What a setting may be, where it is not a plain quantity."""

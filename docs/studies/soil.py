@@ -1,4 +1,4 @@
-"""What the laws of the soil's ultimate resistance do: to both crash tests, and to the verdicts of a grid."""
+"""What the laws of the soil's ultimate resistance do to crash tests and a grid, and other ground to the tests."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import accuracy_of, sampled_designs
 from boulder_sweep.judge.resistance import LAWS
 from boulder_sweep.settings import Sweep, load
-from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.settings.model import RESISTANCES, Ground, Layer
 
 DESIGNS = 4096
+TOP = ("soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3")
 
 
 def _by(law: str, sweep: Sweep) -> Sweep:
@@ -37,6 +38,38 @@ def tests_table() -> Table:
             table.add(
                 title, f"`{law}`", coefficient, found["verdict"], rotation, number(found["max_displacement_m"], 3)
             )
+    return table
+
+
+LOOSE = {"density_kg_m3": 1700.0, "friction_angle_deg": 34.0, "subgrade_reaction_MN_m3": 20.0}
+"""A loose sand."""
+GROUNDS: dict[str, tuple[Ground, dict[str, float]]] = {
+    "as given": (Ground(), {}),
+    "water table 1 m down": (Ground(water_table_m=1.0), {}),
+    "water table at the soil line": (Ground(water_table_m=0.0), {}),
+    "cohesion 5 kPa": (Ground(cohesion_kPa=5.0), {}),
+    "cohesion 10 kPa": (Ground(cohesion_kPa=10.0), {}),
+    "ground falling by 10°": (Ground(slope_deg=10.0), {}),
+    "ground falling by 26.57° (2H:1V)": (Ground(slope_deg=26.57), {}),
+    "loose sand below 1 m": (Ground((Layer(1.0, **LOOSE),)), {}),
+    "loose sand down to 0.5 m": (
+        Ground((Layer(0.5, *(crash_test("rwg").constants[name] for name in TOP)),)),
+        dict(zip(TOP, LOOSE.values(), strict=True)),
+    ),
+}
+"""What is changed about the ground of the crash tests: the ground, and inputs of the uppermost layer."""
+
+
+def ground_table() -> Table:
+    """Return the crash tests in other grounds, by the paper's law and corrected readings."""
+    table = Table(("test", "ground", "verdict", "max rotation [deg]", "max x_b [m]"))
+    for name, title in NAMES.items():
+        sweep = crash_test(name)
+        for words, (ground, changed) in GROUNDS.items():
+            model = replace(sweep.model, **ground.fields())
+            found = simulate(replace(sweep, model=model, constants=sweep.constants | changed)).summary()
+            rotation = number(found["max_rotation_deg"], 2)
+            table.add(title, words, found["verdict"], rotation, number(found["max_displacement_m"], 3))
     return table
 
 

@@ -77,7 +77,7 @@ class DesignTable(NamedTuple):
 
 def design_at(table: DesignTable, row: int) -> Design:
     """Return one row of a table as a `Design`."""
-    return Design(*(column[row] for column in table))
+    return Design(*(column[row] for column in table[: len(Design._fields)]))
 
 
 def design_in(designs: np.ndarray, row: int) -> Design:

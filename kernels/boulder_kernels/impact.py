@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from .design import Constants, Design, constants_of, is_computable
 from .dormand_prince import step
 from .energy import Exchanged, add_exchanged, nothing_exchanged
 from .events import NONE, SHORTEN, locate_limit
+from .layered import constants_in
 from .memory import ELASTIC
 from .modes import Modes, Switches
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
@@ -226,6 +227,22 @@ def simulate_on_springs(
     if design.H - design.d <= design.e_bumper:
         return failed(Status.NO_CONTACT.value)
     return simulate_with_springs(constants_of(design, readings, control.elements), readings, control, record, second)
+
+
+@kernel
+def simulate_layered(
+    design: Design,
+    layers: np.ndarray,
+    soil: Any,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    second: SecondSpring | None,
+) -> Outcome:
+    """Simulate one impact in a soil of layers; see `simulate_on_springs` and `boulder_kernels.layered.constants_in`."""
+    if design.H - design.d <= design.e_bumper:
+        return failed(Status.NO_CONTACT.value)
+    return simulate_with_springs(constants_in(design, layers, soil, readings), readings, control, record, second)
 
 
 @kernel

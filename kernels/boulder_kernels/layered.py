@@ -1,16 +1,18 @@
-"""Soils that are not the same at every depth: layers, water, cohesion (Eqs 105 to 107).
+"""Soils that are not the same at every depth: layers, water, cohesion (Eqs 105 to 108).
 
 A layer has its own density, friction angle and subgrade reaction, and with them its own spring (Eqs 24, 25), wedge
 (Eqs 1, 2) and drag (Eq 36). Its ultimate pressure is linear in the depth, p_0 + p_1 alpha, whatever law it comes from:
 vertical stress grows linearly within a layer, above or below the water. Without layers, water and cohesion p_0 is 0 and
 p_1 is the paper's K_p^2 rho_s g (Eq 27).
 
-A displacement at which all of the soil yields does not exist then. The soil is N elements with numbers of their own,
-in arrays beside the constants of the design; `boulder_kernels.soil` chooses by their type.
+A displacement at which all of the soil yields does not exist then. The soil is either N elements with numbers of their
+own, or the layers themselves, for which `boulder_kernels.layered_soil` is exact: arrays beside the constants of the
+design, and `boulder_kernels.soil` chooses by their type.
 """
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -22,10 +24,14 @@ from ._jit import array_kernel, exact_kernel, function_of
 from .design import (
     Constants,
     Design,
+    DesignTable,
     SoilMass,
+    constants_of,
     constants_with,
+    design_at,
     element_depth,
     element_mass,
+    shear_wedge_angle,
     spring_per_depth,
     ultimate_pressure,
 )
@@ -35,6 +41,10 @@ TO, DENSITY, FRICTION, SUBGRADE, PRESSURE, PRESSURE_SLOPE = range(6)
 """Columns of the layers of a design, shape (M, 6), from the top down: depth of the lower boundary [m], density that has
 inertia [kg/m^3], friction angle [rad], constant of subgrade reaction [MN/m^3], and ultimate pressure p_0 + p_1 alpha
 without the effect of the strain rate [Pa], [Pa/m]. The last layer reaches down without end."""
+
+
+LEAST_RATIO = 1e-30
+"""Stands in for the depth of the soil line, where a soil with cohesion never yields."""
 
 
 class SoilElements(NamedTuple):
@@ -50,11 +60,30 @@ class SoilElements(NamedTuple):
     """Drag over the velocity squared [kg/m] (Eq 36)."""
 
 
+class SoilLayers(NamedTuple):
+    """M layers of soil per ratio r = alpha/d of the depth, each down to its lower boundary; arrays of shape (M,).
+
+    Spring, ultimate force and drag of a thin slice are K r, P_0 + P_1 r and R times its height over d.
+    """
+
+    to: np.ndarray
+    """Lower boundary as a ratio of the depth, at most 1; 1 in the last layer [-]."""
+    K: np.ndarray
+    """Spring per ratio of the depth, squared [N/m] (Eqs 24, 25)."""
+    P_0: np.ndarray
+    P_1: np.ndarray
+    """Ultimate force per ratio of the depth [N] (Eqs 28, 105)."""
+    R: np.ndarray
+    """Drag over the velocity squared, per ratio of the depth [kg/m] (Eq 36)."""
+
+
 _record: Any = namedtuple
 LayeredConstants = _record("LayeredConstants", (*Constants._fields, "soil"))
-"""The fields of `Constants`, and ``soil``, the `SoilElements`. Of the soil as a whole they hold bounds: K_soil and
-R_soil are those of the stiffest and of the heaviest element all the way down, x_yield the last displacement at which
-an element reaches its ultimate resistance."""
+"""The fields of `Constants`, and ``soil``, its `SoilElements` or `SoilLayers`. Of the soil as a whole they hold
+bounds: K_soil and R_soil are those of the stiffest and of the heaviest element all the way down, x_yield the last
+displacement at which an element reaches its ultimate resistance."""
+LayeredTable = _record("LayeredTable", (*DesignTable._fields, "layers"))
+"""Many designs in soils of layers: the fields of `DesignTable`, and ``layers`` of shape (n, M, 6)."""
 
 
 def layered(c: Constants, soil: SoilElements) -> Any:
@@ -93,7 +122,7 @@ def in_layer(design: Design, layer: np.ndarray) -> Design:
 
 @exact_kernel
 def fill_elements(design: Design, layers: np.ndarray, soil: SoilElements) -> SoilMass:
-    """Give N elements the values of the layers that their middles lie in, and return what they weigh.
+    """Give N elements the values of the layers that their middles lie in (Eq 105), and return what they weigh.
 
     Parameters
     ----------
@@ -125,9 +154,9 @@ def fill_elements(design: Design, layers: np.ndarray, soil: SoilElements) -> Soi
     return SoilMass(mass, first, second)
 
 
-@array_kernel
-def layered_constants(design: Design, layers: np.ndarray, readings: Readings, elements: int) -> Any:
-    """Constants of the motion of one design in a soil of layers, as N elements.
+@exact_kernel
+def fill_layers(design: Design, layers: np.ndarray, soil: SoilLayers) -> SoilMass:
+    """Give M layers their values (Eq 105), and return what the wedge of Eqs 1, 2 weighs in them, N -> infinity.
 
     Parameters
     ----------
@@ -135,24 +164,133 @@ def layered_constants(design: Design, layers: np.ndarray, readings: Readings, el
         The design, SI; density, friction angle and subgrade reaction of its soil are those of the layers.
     layers
         Layers of its soil, shape (M, 6).
+    soil
+        Layers to fill.
+    """
+    d = design.d
+    mass = first = second = 0.0
+    upper = d
+    for m in range(len(layers)):
+        local = in_layer(design, layers[m])
+        ultimate = design.K_epsilon * design.W * d
+        soil.to[m] = min(layers[m, TO] / d, 1.0) if m < len(layers) - 1 else 1.0
+        soil.K[m] = spring_per_depth(local) * d * d
+        soil.P_0[m] = layers[m, PRESSURE] * ultimate
+        soil.P_1[m] = layers[m, PRESSURE_SLOPE] * d * ultimate
+        soil.R[m] = local.rho_s * design.W * d
+        # The wedge at a height over the base is that height times tan(theta_w) long.
+        lower = d * (1.0 - soil.to[m])
+        wedge = local.rho_s * design.W * math.tan(shear_wedge_angle(local.phi))
+        mass += wedge * (upper**2 - lower**2) / 2.0
+        first += wedge * (upper**3 - lower**3) / 3.0
+        second += wedge * (upper**4 - lower**4) / 4.0
+        upper = lower
+    return SoilMass(mass, first, second)
+
+
+class Bounds(NamedTuple):
+    """Number of elements, and bounds of the soil as a whole, as of `LayeredConstants`."""
+
+    elements: int
+    K_soil: float
+    R_soil: float
+    x_yield: float
+
+
+@exact_kernel
+def bounds_of_elements(soil: SoilElements) -> Bounds:
+    """Bounds of a soil of elements."""
+    K_soil = R_soil = x_yield = 0.0
+    elements = soil.ratio.size
+    for n in range(elements):
+        K_soil = max(K_soil, soil.stiffness[n] / soil.ratio[n] * elements)
+        R_soil = max(R_soil, soil.drag[n] * elements)
+        x_yield = max(x_yield, soil.ultimate[n] / soil.stiffness[n])
+    return Bounds(elements, K_soil, R_soil, x_yield)
+
+
+@exact_kernel
+def bounds_of_layers(soil: SoilLayers) -> Bounds:
+    """Bounds of a soil of layers; where the soil line has strength, it never yields there."""
+    K_soil = R_soil = x_yield = 0.0
+    low = 0.0
+    for m in range(soil.to.size):
+        high = soil.to[m]
+        if low < high:
+            K_soil, R_soil = max(K_soil, soil.K[m]), max(R_soil, soil.R[m])
+            # (P_0 + P_1 r) / (K r) changes one way along a layer.
+            for end in (max(low, LEAST_RATIO), high):
+                x_yield = max(x_yield, (soil.P_0[m] / end + soil.P_1[m]) / soil.K[m])
+        low = high
+    return Bounds(0, K_soil, R_soil, x_yield)
+
+
+def fill_soil(design: Design, layers: np.ndarray, soil: Any) -> SoilMass:
+    """Fill elements or layers, whichever they are."""
+    return (fill_layers if isinstance(soil, SoilLayers) else fill_elements)(design, layers, soil)
+
+
+def bounds_of(soil: Any) -> Bounds:
+    """Bounds of elements or layers, whichever they are."""
+    return (bounds_of_layers if isinstance(soil, SoilLayers) else bounds_of_elements)(soil)
+
+
+@overload(fill_soil, inline="always", strict=False)
+def _fill_soil(design: Any, layers: Any, soil: Any) -> Callable[..., Any]:
+    if soil.instance_class is SoilLayers:
+        return lambda design, layers, soil: fill_layers(design, layers, soil)
+    return lambda design, layers, soil: fill_elements(design, layers, soil)
+
+
+@overload(bounds_of, inline="always", strict=False)
+def _bounds_of(soil: Any) -> Callable[..., Any]:
+    if soil.instance_class is SoilLayers:
+        return lambda soil: bounds_of_layers(soil)
+    return lambda soil: bounds_of_elements(soil)
+
+
+@exact_kernel
+def constants_in(design: Design, layers: np.ndarray, soil: Any, readings: Readings) -> Any:
+    """Constants of the motion of one design in a soil of layers.
+
+    Parameters
+    ----------
+    design
+        The design, SI; density, friction angle and subgrade reaction of its soil are those of the layers.
+    layers
+        Layers of its soil, shape (M, 6).
+    soil
+        Elements or layers to fill, see `empty_soil`; the constants keep them.
     readings
         Which formulas are read as printed.
-    elements
-        Number N of soil elements; positive.
 
     Returns
     -------
     LayeredConstants
         Non-finite or non-positive where the design is impossible, as of `boulder_kernels.design.is_computable`.
     """
-    soil = SoilElements(np.empty(elements), np.empty(elements), np.empty(elements), np.empty(elements))
-    mass = fill_elements(design, layers, soil)
-    K_soil = R_soil = x_yield = 0.0
-    for n in range(elements):
-        K_soil = max(K_soil, soil.stiffness[n] / soil.ratio[n] * elements)
-        R_soil = max(R_soil, soil.drag[n] * elements)
-        x_yield = max(x_yield, soil.ultimate[n] / soil.stiffness[n])
-    return layered(constants_with(design, readings, elements, mass, K_soil, R_soil, x_yield), soil)
+    mass = fill_soil(design, layers, soil)
+    b = bounds_of(soil)
+    return layered(constants_with(design, readings, b.elements, mass, b.K_soil, b.R_soil, b.x_yield), soil)
+
+
+def empty_soil(layers: int, elements: int) -> SoilLayers | SoilElements:
+    """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact."""
+    if elements > 0:
+        return SoilElements(*np.empty((4, elements)))
+    return SoilLayers(*np.empty((5, layers)))
+
+
+def constants_at(table: DesignTable, row: int, readings: Readings, elements: int) -> Any:
+    """Constants of one row of a table, `Constants` or `LayeredConstants`; see `boulder_kernels.design.constants_of`."""
+    if isinstance(table, LayeredTable):
+        return layered_constants(design_at(table, row), table.layers[row], readings, elements)
+    return constants_of(design_at(table, row), readings, elements)
+
+
+def layered_constants(design: Design, layers: np.ndarray, readings: Readings, elements: int) -> Any:
+    """Constants of one design in a soil of layers, by N elements or, where N is 0, exactly; see `constants_in`."""
+    return constants_in(design, layers, empty_soil(len(layers), elements), readings)
 
 
 @array_kernel

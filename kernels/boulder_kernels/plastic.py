@@ -9,7 +9,7 @@ import numpy as np
 from .design import Design, DesignTable, design_at
 from .dynamics import State
 from .impact import Control, Record, failed, no_record, simulate_with_springs
-from .layered import layered_constants, uniform_layers
+from .layered import LayeredTable, layered_constants, uniform_layers
 from .memory import LAST, PLASTIC_WITH_GAP, SWING, remembering
 from .outcomes import SIMULATED, Outcome, OutcomesAtRest, Status, empty_outcomes, write_outcome
 from .readings import Readings
@@ -33,7 +33,12 @@ class PlasticImpact(NamedTuple):
 
 
 def simulate_plastic(
-    design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None = None
+    design: Design,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    second: SecondSpring | None = None,
+    layers: np.ndarray | None = None,
 ) -> PlasticImpact:
     """Simulate one impact in soil that remembers.
 
@@ -50,8 +55,11 @@ def simulate_plastic(
         Filled with the time history at the times it names.
     second
         Second spring of the vehicle, if it has one.
+    layers
+        Layers of the soil, shape (M, 6), see `boulder_kernels.layered`; that of the design by default.
     """
-    layered = layered_constants(design, uniform_layers(design), readings, control.elements)
+    layers = uniform_layers(design) if layers is None else layers
+    layered = layered_constants(design, layers, readings, control.elements)
     c = remembering(layered, control.unloading == PLASTIC_WITH_GAP, len(record.times))
     if design.H - design.d <= design.e_bumper:
         return PlasticImpact(failed(Status.NO_CONTACT.value), c, np.nan, np.nan, np.nan)
@@ -80,7 +88,8 @@ def simulate_plastic_rows(
     out, rest = empty_outcomes(n), np.full((3, n), np.nan)
     for row in range(n):
         second = None if springs is None else SecondSpring(springs.k_2[row], springs.s_2[row])
-        found = simulate_plastic(design_at(table, row), readings, control, no_record(), second)
+        layers = table.layers[row] if isinstance(table, LayeredTable) else None
+        found = simulate_plastic(design_at(table, row), readings, control, no_record(), second, layers)
         write_outcome(out, row, found.outcome)
         rest[:, row] = found.theta_rest, found.swing_back, found.doubt
     return OutcomesAtRest(out[0].astype(np.int8), *out[1:], *rest)

@@ -26,8 +26,16 @@ from numba.extending import overload
 
 from ._jit import inlined, kernel, summing_kernel
 from .design import Constants
-from .layered import LayeredConstants, SoilElements
-from .memory import RememberingConstants
+from .layered import LayeredConstants, SoilLayers
+from .layered_soil import (
+    potential_of_elements,
+    potential_of_layers,
+    power_of_elements,
+    power_of_layers,
+    reaction_of_elements,
+    reaction_of_layers,
+)
+from .memory import Memory, RememberingConstants
 from .remembering_soil import potential_of_remembering, reaction_of_remembering
 from .soil_records import TINY, Kinematics, Potential, Reaction
 
@@ -134,20 +142,6 @@ def closed_form(k: Kinematics, c: Constants) -> Reaction:
     return Reaction(-pressed, k.lever_d * pressed_r + k.q * pressed)
 
 
-@summing_kernel
-def reaction_of_elements(k: Kinematics, soil: SoilElements) -> Reaction:
-    """Sum force and moment over elements with values of their own (Eqs 19-21, 26, 28, 36)."""
-    F = M = 0.0
-    for n in range(soil.ratio.size):
-        ratio = soil.ratio[n]
-        spring = soil.stiffness[n] * (k.A - k.slope_x * ratio)
-        v = k.B - k.slope_v * ratio
-        pressed = min(max(spring, -soil.ultimate[n]), soil.ultimate[n]) + soil.drag[n] * v * abs(v)
-        F -= pressed
-        M += pressed * (k.lever_d * ratio + k.q)
-    return Reaction(F, M)
-
-
 @inlined
 def uniform_reaction(k: Kinematics, c: Constants) -> Reaction:
     """Force and moment of a uniform soil: element sums where the design asks for N, else the closed form."""
@@ -159,7 +153,8 @@ def uniform_reaction(k: Kinematics, c: Constants) -> Reaction:
 def soil_reaction(k: Kinematics, c: Any) -> Reaction:
     """Force and moment of the soil that the constants describe, see `LayeredConstants`."""
     if isinstance(c, LayeredConstants):
-        return reaction_of_elements(k, c.soil)
+        of_soil = reaction_of_layers if isinstance(c.soil, SoilLayers) else reaction_of_elements
+        return of_soil(k, c.soil)
     if isinstance(c, RememberingConstants):
         return reaction_of_remembering(k, c.soil, c.memory)
     return uniform_reaction(k, c)
@@ -213,22 +208,6 @@ def summed_potential(A: float, slope_x: float, c: Constants) -> Potential:
     return Potential(share * V, share * V_A, share * V_X)
 
 
-@kernel
-def potential_of_elements(A: float, slope_x: float, soil: SoilElements) -> Potential:
-    """Elastic energy of elements with values of their own, as convex as that of each; see `closed_potential`."""
-    V = V_A = V_X = 0.0
-    for n in range(soil.ratio.size):
-        ratio = soil.ratio[n]
-        displacement = A - slope_x * ratio
-        stiffness, ultimate = soil.stiffness[n], soil.ultimate[n]
-        over = max(abs(displacement) - ultimate / stiffness, 0.0)
-        pressed = min(max(stiffness * displacement, -ultimate), ultimate)
-        V += 0.5 * stiffness * (displacement * displacement - over * over)
-        V_A += pressed
-        V_X -= ratio * pressed
-    return Potential(V, V_A, V_X)
-
-
 @inlined
 def uniform_potential(A: float, slope_x: float, c: Constants) -> Potential:
     """Elastic energy of a uniform soil by the same representation as the forces."""
@@ -240,19 +219,11 @@ def uniform_potential(A: float, slope_x: float, c: Constants) -> Potential:
 def soil_potential(A: float, slope_x: float, c: Any) -> Potential:
     """Elastic energy of the soil by the same representation as the forces, a convex function of both displacements."""
     if isinstance(c, LayeredConstants):
-        return potential_of_elements(A, slope_x, c.soil)
+        of_soil = potential_of_layers if isinstance(c.soil, SoilLayers) else potential_of_elements
+        return of_soil(A, slope_x, c.soil)
     if isinstance(c, RememberingConstants):
         return potential_of_remembering(A, slope_x, c.soil, c.memory)
     return uniform_potential(A, slope_x, c)
-
-
-@kernel
-def power_of_elements(k: Kinematics, soil: SoilElements) -> float:
-    """Power that the drag of elements with values of their own takes out of the motion [W]."""
-    total = 0.0
-    for n in range(soil.ratio.size):
-        total += soil.drag[n] * abs(k.B - k.slope_v * soil.ratio[n]) ** 3
-    return total
 
 
 @kernel
@@ -275,8 +246,17 @@ def uniform_drag_power(k: Kinematics, c: Constants) -> float:
 def drag_power(k: Kinematics, c: Any) -> float:
     """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
     if isinstance(c, LayeredConstants | RememberingConstants):
-        return power_of_elements(k, c.soil)
+        of_soil = power_of_layers if isinstance(c.soil, SoilLayers) else power_of_elements
+        return of_soil(k, c.soil)
     return uniform_drag_power(k, c)
+
+
+def _record_of(c: Any) -> Any:
+    """The last record of constants that have one beside those of `Constants`, from their Numba type; else None.
+
+    It is `SoilElements`, `SoilLayers` or `Memory`, and tells how the soil is computed.
+    """
+    return c[-1].instance_class if c.instance_class in (LayeredConstants, RememberingConstants) else None
 
 
 # Inside kernels the three are chosen when they are compiled, by the type of the constants.
@@ -284,25 +264,34 @@ def drag_power(k: Kinematics, c: Any) -> float:
 
 @overload(soil_reaction, inline="always", strict=False)
 def _soil_reaction(k: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is LayeredConstants:
-        return lambda k, c: reaction_of_elements(k, c.soil)
-    if c.instance_class is RememberingConstants:
+    record = _record_of(c)
+    if record is SoilLayers:
+        return lambda k, c: reaction_of_layers(k, c.soil)
+    if record is Memory:
         return lambda k, c: reaction_of_remembering(k, c.soil, c.memory)
+    if record is not None:
+        return lambda k, c: reaction_of_elements(k, c.soil)
     return lambda k, c: uniform_reaction(k, c)
 
 
 @overload(soil_potential, inline="always", strict=False)
 def _soil_potential(A: Any, slope_x: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is LayeredConstants:
-        return lambda A, slope_x, c: potential_of_elements(A, slope_x, c.soil)
-    if c.instance_class is RememberingConstants:
+    record = _record_of(c)
+    if record is SoilLayers:
+        return lambda A, slope_x, c: potential_of_layers(A, slope_x, c.soil)
+    if record is Memory:
         return lambda A, slope_x, c: potential_of_remembering(A, slope_x, c.soil, c.memory)
+    if record is not None:
+        return lambda A, slope_x, c: potential_of_elements(A, slope_x, c.soil)
     return lambda A, slope_x, c: uniform_potential(A, slope_x, c)
 
 
 @overload(drag_power, inline="always", strict=False)
 def _drag_power(k: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class in (LayeredConstants, RememberingConstants):
+    record = _record_of(c)
+    if record is SoilLayers:
+        return lambda k, c: power_of_layers(k, c.soil)
+    if record is not None:
         return lambda k, c: power_of_elements(k, c.soil)
     return lambda k, c: uniform_drag_power(k, c)
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ._jit import array_kernel, kernel
-from .design import DesignTable, design_in
-from .impact import Control, no_record, simulate_design, simulate_on_springs
+from .design import DesignTable, design_at, design_in
+from .impact import Control, Record, no_record, simulate_design, simulate_layered, simulate_on_springs
 from .lanes import simulate_lanes
 from .last_resort import last_resort_on_springs, simulate_last_resort
+from .layered import LayeredTable, empty_soil
 from .memory import ELASTIC
-from .outcomes import OutcomeTable, Status, empty_outcomes, write_outcome
+from .outcomes import Outcome, OutcomeTable, Status, empty_outcomes, write_outcome
 from .plastic import add_rest_error, simulate_plastic_rows
 from .readings import Readings
 from .second_spring import SecondSpring, SecondSprings
@@ -59,12 +62,72 @@ def simulate_rows_on_springs(
     return out
 
 
+@array_kernel
+def simulate_layered_rows(
+    designs: np.ndarray,
+    layers: np.ndarray,
+    soil: Any,
+    springs: np.ndarray | None,
+    readings: Readings,
+    control: Control,
+) -> np.ndarray:
+    """Simulate designs in soils of layers one by one.
+
+    Parameters
+    ----------
+    designs
+        As of `simulate_lanes`.
+    layers
+        Layers of every design, shape (n, M, 6), see `boulder_kernels.layered`.
+    soil
+        Elements or layers that every design fills anew.
+    springs
+        Rows as of `SecondSprings`, or None for vehicles without a second spring.
+    readings, control
+        As of `simulate_table`.
+    """
+    out = empty_outcomes(designs.shape[1])
+    for row in range(designs.shape[1]):
+        design = design_in(designs, row)
+        if springs is None:
+            found = simulate_layered(design, layers[row], soil, readings, control, no_record(), None)
+        else:
+            second = SecondSpring(springs[0, row], springs[1, row])
+            found = simulate_layered(design, layers[row], soil, readings, control, no_record(), second)
+        write_outcome(out, row, found)
+    return out
+
+
+def simulate_row(
+    table: DesignTable,
+    row: int,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    second: SecondSpring | None = None,
+) -> Outcome:
+    """Simulate one row of a table with its time history; arguments as of `simulate_table` and `simulate_design`."""
+    design = design_at(table, row)
+    if isinstance(table, LayeredTable):
+        layers = table.layers[row]
+        soil = empty_soil(len(layers), control.elements)
+        return simulate_layered(design, layers, soil, readings, control, record, second)
+    if second is not None:
+        return simulate_on_springs(design, readings, control, record, second)
+    return simulate_design(design, readings, control, record)
+
+
 def simulate_once(
     table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
 ) -> OutcomeTable:
     """Simulate every design of a table once: in lanes where they can be, else one by one."""
     if control.unloading != ELASTIC:
         return simulate_plastic_rows(table, readings, control, springs)
+    if isinstance(table, LayeredTable):
+        soil = empty_soil(table.layers.shape[1], control.elements)
+        stacked = None if springs is None else np.stack(springs)
+        out = simulate_layered_rows(np.stack(table[:-1]), table.layers, soil, stacked, readings, control)
+        return OutcomeTable(out[0].astype(np.int8), *out[1:])
     if springs is not None:
         out = simulate_rows_on_springs(np.stack(table), np.stack(springs), readings, control)
         return OutcomeTable(out[0].astype(np.int8), *out[1:])
@@ -127,7 +190,7 @@ def simulate_table(
     Parameters
     ----------
     table
-        Designs, SI, arrays of shape (n,).
+        Designs, SI, arrays of shape (n,); or a `LayeredTable`, whose designs have no last resort.
     readings
         Which formulas are read as printed.
     control
@@ -146,7 +209,7 @@ def simulate_table(
         return out
     fine = simulate_once(table, readings, control._replace(halved=True), springs)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
-    estimate_errors(out, fine, table, safety)
+    estimate_errors(out, fine, DesignTable(*table[: len(DesignTable._fields)]), safety)
     if control.unloading != ELASTIC:
         add_rest_error(out, fine, safety)
     return fine

@@ -24,6 +24,8 @@ _STAGES = "boulder_sweep/crash_tests/stiffening_wall.py"
 _RESISTANCE, _LIFT, _UPLIFT = (
     f"boulder_sweep/{name}.py" for name in ("judge/resistance", "judge/uplift", "impact/uplift")
 )
+_GROUND = "boulder_sweep/judge/ground.py"
+_LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
 
 _REMEMBERING, _MEMORY, _UNLOADING = (
     f"kernels/boulder_kernels/{name}.py" for name in ("remembering_soil", "memory", "unloading")
@@ -88,6 +90,26 @@ MUTATIONS = (
     Mutation((103,), _LIFT, "(table.L**2 + table.H**2)", "(table.L**2 - table.H**2)"),
     Mutation((103,), _LIFT, "table.d**2 * table.L", "table.d**2 * table.W"),
     Mutation((104,), _UPLIFT, "- (across + over) * omega**2", "+ (across + over) * omega**2"),
+    Mutation((105,), _GROUND, "2e3 * cohesion * np.sqrt(K_p)", "1e3 * cohesion * np.sqrt(K_p)"),
+    Mutation((105,), _GROUND, "K_p * (stress - weight * top)", "K_p * stress"),
+    Mutation(
+        (105,), _LAYERED, "soil.P_1[m] = layers[m, PRESSURE_SLOPE] * d", "soil.P_1[m] = layers[m, PRESSURE_SLOPE]"
+    ),
+    Mutation((105,), _LAYERED, "pressure * design.W * h_e", "pressure * h_e"),
+    Mutation((106,), _GROUND, "if top >= water else", "if top > water else"),
+    Mutation(
+        (106,), _GROUND, "stress = stress + weight * (bottom - top)", "stress = stress + G * rho_s * (bottom - top)"
+    ),
+    Mutation((107,), _GROUND, "/ np.cos(slope))", ")"),
+    Mutation((108,), _LAYERS, "pressed_r += r * spring", "pressed_r += middle * spring"),
+    Mutation((108,), _LAYERS, "0.5 if within else 1.0", "0.5"),
+    Mutation((108,), _LAYERS, "stored += P_0 * P_0 * math.log", "stored -= P_0 * P_0 * math.log"),
+    Mutation(
+        (108,),
+        _LAYERS,
+        "roots_within(K * s, -P_1 - K * A, -P_0, low, high)",
+        "roots_within(K * s, P_1 - K * A, -P_0, low, high)",
+    ),
     Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
     Mutation((111,), _SECOND, "k_m=c.k_m * (k_2 / c.k_v)", "k_m=c.k_m"),
     Mutation((111,), _VEHICLE, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-EQUATIONS = (*range(1, 56), *range(101, 105), 111, 112, *range(121, 125))
+EQUATIONS = (*range(1, 56), *range(101, 109), 111, 112, *range(121, 125))
 """Those of the paper, and those added to it."""
 WAYS = ("implemented", "derived", "explained")
 SWITCHES = ("inertia", "impact_arm", "contact", "restoring", "separation")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from .inputs import Inputs, Readings
+from .inputs import Inputs, Readings, layer_at
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,10 @@ def element_masses(inputs: Inputs, elements: int) -> NDArray[np.float64]:
     """Masses m_n [kg] of the soil elements, n = 1 at the top, Eq 2."""
     n = np.arange(1.0, elements + 1)
     h_e = inputs.d / elements
+    if inputs.ground is not None:
+        layers = [layer_at(inputs.ground, float(alpha)) for alpha in element_depths(inputs.d, elements)]
+        length = np.array([layer.rho_s * tan(shear_wedge_angle(layer.phi)) for layer in layers])
+        return np.asarray(length * inputs.W * h_e * (inputs.d - h_e * (n - 0.5)))
     theta_w = shear_wedge_angle(inputs.phi)
     return np.asarray(inputs.rho_s * inputs.W * h_e * tan(theta_w) * (inputs.d - h_e * (n - 0.5)))
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .constants import Constants, constants, impact_lever
+from .ground import LayeredSoil
 from .inputs import Inputs, Readings
 from .restoring import gravity_couple, gravity_hold, printed_forward, printed_limit, printed_sign
 from .soil import Motion, Soil, SoilTotals
@@ -63,7 +64,7 @@ class Problem:
     inputs: Inputs
     readings: Readings
     constants: Constants
-    soil: Soil
+    soil: Soil | LayeredSoil
 
     @property
     def start(self) -> Array:
@@ -91,7 +92,8 @@ class Loads:
 def problem(inputs: Inputs, readings: Readings, elements: int | None = None) -> Problem:
     """Prepare an impact, with N soil elements or in the limit N -> infinity."""
     lumped = constants(inputs, readings, elements)
-    return Problem(inputs, readings, lumped, Soil(inputs, lumped))
+    soil = Soil(inputs, lumped) if inputs.ground is None else LayeredSoil(inputs, lumped)
+    return Problem(inputs, readings, lumped, soil)
 
 
 def motion_of(y: Array) -> Motion:

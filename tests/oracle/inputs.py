@@ -9,6 +9,32 @@ GRAVITY = 9.80665  # standard acceleration of gravity g [m/s^2], Eqs 27 and 37
 
 
 @dataclass(frozen=True)
+class Layer:
+    """One layer of soil from its upper boundary `top` [m] down: density, friction angle, subgrade reaction as of
+    `Inputs`, and cohesion [Pa]."""
+
+    top: float
+    rho_s: float
+    phi: float
+    beta: float
+    cohesion: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Layers from the soil line down, depth of the water table [m], angle at which the ground falls behind [rad]."""
+
+    layers: tuple[Layer, ...]
+    water: float = inf
+    slope: float = 0.0
+
+
+def layer_at(ground: Ground, alpha: float) -> Layer:
+    """Return the layer at a depth [m]."""
+    return [layer for layer in ground.layers if layer.top <= alpha][-1]
+
+
+@dataclass(frozen=True)
 class Inputs:
     """One impact, with the symbols of the paper, in SI units, except beta in MN/m^3 as in Eq 24.
 
@@ -38,6 +64,8 @@ class Inputs:
         Law of the ultimate soil pressure: Eq 27, or one of the two that are not the paper's.
     k_2, s_2 : float
         Second spring of the vehicle [N/m], and the crush [m] from which it takes the place of k_v; none by default.
+    ground : Ground, optional
+        The soil where it is not the same at every depth; rho_s, phi and beta are those of `Inputs` without it.
     """
 
     L: float
@@ -57,6 +85,7 @@ class Inputs:
     resistance: str = "kp_squared"
     k_2: float = inf
     s_2: float = inf
+    ground: Ground | None = None
 
     def spring(self, stage: int) -> float:
         """Spring of the vehicle [N/m] in a stage of its crush, 1 or 2."""

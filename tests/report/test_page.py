@@ -275,6 +275,17 @@ def test_a_law_of_the_resistance_acts_in_the_simulator_and_is_copied(tmp_path, o
     assert f"Ultimate resistance of the soil: {LAW_WORDS[law]}" in page.inner_text("main")
 
 
+def test_a_slope_and_water_at_the_soil_line_act_in_the_simulator_and_are_copied(tmp_path, opened):
+    sweep = boulder_sweep.load("configs/rwg.yaml", ["soil.slope=8 deg", "soil.water_table=0", "model.resistance=broms"])
+    page = opened(write_explorer(sweep, 0, tmp_path / "ground.html"))
+    found = page.evaluate("page.simulator.whole(page.design).judged")
+    theirs = boulder_sweep.simulate(sweep).summary()
+    assert found["max_rotation_deg"] == pytest.approx(theirs["max_rotation_deg"], rel=1e-9)
+    assert "The soil as it lies: water table 0 m down, ground falling by 8°" in page.inner_text("main")
+    (tmp_path / "copied.yaml").write_text(page.input_value("#yaml"))
+    assert boulder_sweep.load(tmp_path / "copied.yaml").model.ground == sweep.model.ground
+
+
 def test_print_has_every_section_and_no_switches(report, opened):
     page = opened(report)
     page.emulate_media(media="print")

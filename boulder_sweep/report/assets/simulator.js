@@ -22,6 +22,19 @@ function resistanceFactor(law, { phi, W, d }) {
   return 1;
 }
 
+/**
+ * What a slope and water up to the soil line leave of the resistance: `boulder_sweep.judge.ground`.
+ * @param {{slope_deg: number, water_table_m: number | null}} ground
+ * @param {KernelDesign} design
+ * @returns {number}
+ */
+function groundFactor({ slope_deg, water_table_m }, { phi, rho_s }) {
+  const slope = slope_deg / DEGREES;
+  const falling = 1 - Math.sqrt((Math.sin(phi) * Math.sin(Math.max(phi - slope, 0))) / Math.cos(slope));
+  const submerged = water_table_m === 0 ? 1 - 1000 / rho_s : 1;
+  return (slope ? ((1 - Math.sin(phi)) / falling) ** 2 : 1) * submerged;
+}
+
 /** Designs by the columns of the table in, judged rows and motions out. */
 class Simulator {
   /** @param {any} data of the page @param {Kernel} kernel */
@@ -44,7 +57,7 @@ class Simulator {
    * @returns {KernelDesign}
    */
   kernelDesign(inputs) {
-    const { layout, resistance } = this.data;
+    const { layout, resistance, ground } = this.data;
     /** @type {KernelDesign} */
     const design = Object.fromEntries(
       layout.design.map((/** @type {string} */ field) => {
@@ -54,7 +67,8 @@ class Simulator {
     );
     // Without a second spring it is like the first, from a crush on that is never reached.
     const springs = { k_2: design.k_2 ?? design.k_v, s_2: design.s_2 ?? NEVER };
-    return { ...design, ...springs, K_epsilon: design.K_epsilon * resistanceFactor(resistance, design) };
+    const factor = groundFactor(ground, design) * resistanceFactor(resistance, design);
+    return { ...design, ...springs, K_epsilon: design.K_epsilon * factor };
   }
 
   /**

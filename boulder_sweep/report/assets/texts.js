@@ -16,6 +16,7 @@ function yamlOf(data, design) {
     (sections[section] ??= []).push(`${key}: ${design[name]}${words}`);
   }
   sections.vehicle.push(...data.vehicle);
+  sections.soil.push(...data.soil);
   return [
     `name: ${JSON.stringify(data.title)}`,
     ...Object.entries(sections).map(([section, entries]) => `${section}: {${entries.join(", ")}}`),

@@ -1,0 +1,112 @@
+"""Soils as they lie: layers, a water table, cohesion, ground that falls away behind the boulder.
+
+The ultimate pressure at the depth alpha is
+
+    p_u = S (K_p sigma' + 2 c sqrt(K_p)) K_epsilon
+
+with the effective vertical stress sigma', Rankine's pressure with Bell's term for the cohesion c (Eq 105), and the
+factor S = K/K_p by which the law of the resistance, K, exceeds a wall's passive pressure. Water takes its own weight
+from the stress below the table (Eq 106), and nothing from the inertia of the soil. Ground that falls away reduces both
+terms as it reduces Coulomb's plane wedge (Eq 107). A slope alone, and water up to the soil line, leave the pressure
+proportional to depth: each is then a factor on K_epsilon, as another law is, and the closed form holds. The page
+``docs/soil.md`` says where the equations come from.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from boulder_kernels import DesignTable
+from boulder_kernels.design import G
+from boulder_kernels.layered import LayeredTable
+from boulder_sweep.judge.resistance import LAWS, passive_coefficient, with_law
+from boulder_sweep.settings.layers import WATER_KG_M3
+from boulder_sweep.settings.model import Ground
+
+
+def slope_factor(phi: np.ndarray, slope: float) -> np.ndarray:
+    """Return the passive pressure where the ground falls by `slope` [rad] over that where it is level (Eq 107).
+
+    Coulomb's coefficient for a smooth vertical wall is cos^2(phi) / (1 - sqrt(sin(phi) sin(phi - i) / cos(i)))^2.
+
+    Parameters
+    ----------
+    phi
+        Friction angles [rad]. A settings file has none below the slope; one that is drawn counts as equal to it.
+    slope
+        Angle of the ground [rad].
+    """
+    falling = 1.0 - np.sqrt(np.sin(phi) * np.sin(np.maximum(phi - slope, 0.0)) / np.cos(slope))
+    return ((1.0 - np.sin(phi)) / falling) ** 2
+
+
+def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0) -> Any:
+    """Return n designs with the ultimate resistance of a law in the soil as it lies.
+
+    Parameters
+    ----------
+    table
+        The designs, SI; their soil is the uppermost layer.
+    law
+        A name of `boulder_sweep.judge.resistance.LAWS`.
+    ground
+        The rest.
+    turned
+        Change of the friction angles of the deeper layers [rad].
+
+    Returns
+    -------
+    DesignTable or LayeredTable
+        The former where the resistance is proportional to depth.
+    """
+    if ground.is_usual:
+        return with_law(table, law)
+    slope = np.radians(ground.slope_deg)
+    if ground.is_proportional:
+        submerged = 1.0 - WATER_KG_M3 / table.rho_s if ground.water_table_m == 0.0 else 1.0
+        changed = table._replace(K_epsilon=table.K_epsilon * slope_factor(table.phi, slope) * submerged)
+        return with_law(changed, law)
+    return LayeredTable(*table, layers_of(table, law, ground, turned))
+
+
+def layers_of(table: DesignTable, law: str, ground: Ground, turned: float = 0.0) -> np.ndarray:
+    """Return the layers of n designs as `boulder_kernels.layered` takes them, shape (n, M, 6) (Eqs 105, 106).
+
+    Parameters as of `with_soil`. A layer that the water table cuts becomes two.
+    """
+    n, slope = table.d.size, np.radians(ground.slope_deg)
+    water = np.inf if ground.water_table_m is None else ground.water_table_m
+    tops = [0.0, *(layer.from_m for layer in ground.layers)]
+    wet = [water] if 0.0 < water < np.inf and water not in tops else []
+    bounds = np.array(sorted([*tops, *wet, np.inf]))
+    found = np.empty((n, len(bounds) - 1, 6))
+    stress = np.zeros(n)
+    for m, (top, bottom) in enumerate(pairwise(bounds)):
+        below = int(np.searchsorted(tops, top, side="right")) - 1
+        if below == 0:
+            rho_s, phi, beta, cohesion = table.rho_s, table.phi, table.beta, ground.cohesion_kPa
+        else:
+            layer = ground.layers[below - 1]
+            angle = np.radians(layer.friction_angle_deg) + turned
+            rho_s, phi, beta = (
+                np.full(n, value) for value in (layer.density_kg_m3, angle, layer.subgrade_reaction_MN_m3)
+            )
+            cohesion = layer.cohesion_kPa
+        K_p = passive_coefficient(phi)
+        factor = LAWS[law](table._replace(phi=phi)) / K_p * slope_factor(phi, slope)
+        weight = G * (rho_s - (WATER_KG_M3 if top >= water else 0.0))
+        # sigma' is the stress at the upper boundary, and from there on the weight times the depth below it.
+        found[:, m, 0] = bottom
+        found[:, m, 1], found[:, m, 2], found[:, m, 3] = rho_s, phi, beta
+        found[:, m, 4] = factor * (K_p * (stress - weight * top) + 2e3 * cohesion * np.sqrt(K_p))
+        found[:, m, 5] = factor * K_p * weight
+        stress = stress + weight * (bottom - top)
+    return found
+
+
+def plain(table: Any) -> DesignTable:
+    """Return designs without the layers that they may have."""
+    return DesignTable(*table[: len(DesignTable._fields)])

@@ -1,0 +1,152 @@
+"""Soils as they lie: pressures against the oracle, whole sweeps, what folds into one factor, and the energy ledger."""
+
+from dataclasses import replace
+from math import inf, radians
+
+import numpy as np
+import pytest
+
+import boulder_sweep
+from boulder_kernels import DesignTable
+from boulder_kernels.layered import LayeredTable
+from boulder_sweep.cli.explain import why_lines
+from boulder_sweep.impact.explanation import explain
+from boulder_sweep.impact.history import soil_profile
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.ground import layers_of, slope_factor, with_soil
+from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.pilot import accuracy_of, sampled_designs, simulated
+from boulder_sweep.judge.resistance import LAWS
+from boulder_sweep.settings.model import Ground, Layer
+from tests import oracle
+from tests.oracle import ground as by_hand
+
+LAYERS = (Layer(0.5, 2000.0, 36.0, 40.0, 2.0), Layer(1.2, 2100.0, 40.0, 80.0))
+GROUND = Ground(LAYERS, cohesion_kPa=4.0, water_table_m=0.8, slope_deg=10.0)
+IN_FILE = (
+    "soil.layers=[{from: 0.5 m, density: 2000, friction_angle: 36 deg, subgrade_reaction: 40, cohesion: 2 kPa}, "
+    "{from: 120 cm, density: 2.1 t/m^3, friction_angle: 40, subgrade_reaction: 80 MN/m^3}]",
+    "soil.cohesion=4 kPa",
+    "soil.water_table=0.8 m",
+    "soil.slope=10 deg",
+)
+
+
+def table_of(phi_deg: float = 42.0) -> DesignTable:
+    inputs = replace(oracle.RWG, phi=radians(phi_deg))
+    values = {name: getattr(inputs, name, 0.5) for name in DesignTable._fields}
+    return DesignTable(**{name: np.array([value]) for name, value in values.items()})
+
+
+def oracle_ground(table: DesignTable, ground: Ground) -> oracle.inputs.Ground:
+    top = oracle.inputs.Layer(0.0, table.rho_s[0], table.phi[0], table.beta[0], 1e3 * ground.cohesion_kPa)
+    below = (
+        oracle.inputs.Layer(
+            layer.from_m,
+            layer.density_kg_m3,
+            radians(layer.friction_angle_deg),
+            layer.subgrade_reaction_MN_m3,
+            1e3 * layer.cohesion_kPa,
+        )
+        for layer in ground.layers
+    )
+    water = inf if ground.water_table_m is None else ground.water_table_m
+    return oracle.inputs.Ground((top, *below), water, radians(ground.slope_deg))
+
+
+@pytest.mark.parametrize("law", list(LAWS))
+@pytest.mark.parametrize("water_m", [None, 0.0, 0.5, 0.8, 5.0])
+def test_pressures_are_those_of_the_oracle(law: str, water_m: float | None) -> None:
+    """By every law, with the water in, at a boundary of, above and below the layers (Eqs 105 to 107)."""
+    table, ground = table_of(), replace(GROUND, water_table_m=water_m)
+    inputs = replace(oracle.RWG, phi=table.phi[0], resistance=law)
+    layers = layers_of(table, law, ground)[0]
+    known = oracle_ground(table, ground)
+    for depth in (0.0, 0.1, 0.49, 0.51, 0.79, 0.81, 1.19, 1.21, 1.9):
+        row = layers[np.searchsorted(layers[:, 0], depth, side="right")]
+        found = row[4] + row[5] * depth
+        assert found == pytest.approx(by_hand.ultimate_pressure(inputs, known, depth) / inputs.K_epsilon, rel=1e-9)
+        layer = oracle.inputs.layer_at(known, depth)
+        np.testing.assert_allclose(row[1:4], (layer.rho_s, layer.phi, layer.beta))
+
+
+@pytest.mark.parametrize("slope_deg", [0.0, 5.0, 20.0, 29.0])
+def test_slope_is_coulombs_weakest_wedge(slope_deg: float) -> None:
+    """The closed form against the weakest of all plane wedges (Eq 107)."""
+    for phi_deg in (30.0, 40.0, 47.0):
+        found = slope_factor(np.radians([phi_deg]), radians(slope_deg))[0]
+        assert found == pytest.approx(by_hand.slope_factor(radians(phi_deg), radians(slope_deg)), rel=1e-9)
+    assert slope_factor(np.radians([40.0]), radians(20.0))[0] == pytest.approx(0.4787, abs=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", list(LAWS))
+@pytest.mark.parametrize("ground", [Ground(slope_deg=15.0), Ground(water_table_m=0.0), Ground((), 0.0, 0.0, 8.0)])
+def test_what_is_proportional_to_depth_is_a_factor(law: str, ground: Ground) -> None:
+    """The lanes with a factor on the strength, and the layers with the pressures themselves: one result."""
+    table = table_of()
+    folded = with_soil(table, law, ground)
+    assert isinstance(folded, DesignTable)
+    evaluation = evaluation_of(
+        boulder_sweep.load("configs/rwg.yaml"), accuracy_of(boulder_sweep.load("configs/rwg.yaml"))
+    )
+    layered = LayeredTable(*table, layers_of(table, law, ground))
+    designs = (Designs(table, np.zeros(1)) for table in (folded, layered))
+    one, other = (simulated(some, evaluation.readings, evaluation.control) for some in designs)
+    assert one.status == other.status
+    np.testing.assert_allclose(one[1:6], other[1:6], rtol=1e-8)
+
+
+def test_usual_ground_changes_nothing() -> None:
+    """The very same table, for which the lanes are compiled."""
+    table = table_of()
+    assert with_soil(table, "kp_squared", Ground()) is table
+    assert boulder_sweep.load("configs/rwg.yaml").model.ground.is_usual
+    assert "ground" not in boulder_sweep.load("configs/rwg.yaml").resolved()["model"]
+
+
+def test_settings_become_layers() -> None:
+    """Units, and the uppermost layer from the entries that every soil has."""
+    sweep = boulder_sweep.load("configs/rwg.yaml", IN_FILE)
+    assert sweep.model.ground == GROUND
+    assert Ground.of_dict(sweep.resolved()["model"]["ground"]) == GROUND
+    table = sampled_designs(sweep, 1).table
+    assert isinstance(table, LayeredTable)
+    assert table.layers.shape == (1, 4, 6)
+    np.testing.assert_allclose(table.layers[0, :, 0], (0.5, 0.8, 1.2, inf))
+    factored = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, "partial_factor.friction_angle=1.25"))
+    assert np.tan(np.radians(36.0)) / 1.25 == pytest.approx(
+        np.tan(np.radians(factored.model.layers[0].friction_angle_deg))
+    )
+
+
+@pytest.mark.slow
+def test_run_simulate_and_explain_agree(tmp_path) -> None:
+    """To the last bit, by layers and by elements; and the energy of the truck is all accounted for."""
+    for name, more in (("layers", ()), ("elements", ("model.soil={elements: 60}",))):
+        sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, *more))
+        boulder_sweep.run(sweep, tmp_path / name)
+        found = explain(tmp_path / name, 0)
+        assert found.unequal == ()
+        assert any(line.startswith("  soil: 3 layers of soil, cohesion 4 / 2 / 0 kPa") for line in why_lines(found))
+        history = boulder_sweep.simulate(sweep)
+        assert history.summary()["max_rotation_deg"] >= found.stored["max_rotation_deg"]
+        assert history.energy().largest_residual < 1e-6
+        profile = soil_profile(history.motion.record, 100, 4000, history.motion.constants)
+        assert profile.force_N.sum() == pytest.approx(history.soil_force_N[100], rel=2e-2)
+    sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, "model.unloading=plastic", "model.soil={elements: 60}"))
+    boulder_sweep.run(sweep, tmp_path / "plastic")
+    assert explain(tmp_path / "plastic", 0).unequal == ()
+    history = boulder_sweep.simulate(sweep)
+    assert history.energy().largest_residual < 1e-4
+    profile = soil_profile(history.motion.record, 600, 60, history.motion.constants)
+    assert profile.force_N.sum() == pytest.approx(history.soil_force_N[600], rel=1e-9)
+    stiffer = ("vehicle.second_spring=9 MN/m", "vehicle.second_spring_from=0.5 m")
+    sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, *stiffer))
+    boulder_sweep.run(sweep, tmp_path / "springs")
+    assert explain(tmp_path / "springs", 0).unequal == ()
+    history = boulder_sweep.simulate(sweep)
+    assert history.summary()["peak_force_kN"] > 1.03 * found.stored["peak_force_kN"]
+    assert history.energy().largest_residual < 1e-6
+    weaker = boulder_sweep.simulate(sweep).summary()["max_rotation_deg"]
+    assert weaker > boulder_sweep.simulate("configs/rwg.yaml").summary()["max_rotation_deg"]
