@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import against_tests, answers, energy, scale, soil, uplift
+from docs.studies import against_tests, answers, energy, scale, soil, unloading, uplift
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -161,6 +161,18 @@ def _soil_grid(root: Path) -> str:
     return soil.grid_table(root / GRID).markdown()
 
 
+def _unloading_tests(_: Path) -> str:
+    return unloading.tests_table().markdown()
+
+
+def _unloading_grid(root: Path) -> str:
+    return unloading.grid_table(root / GRID).markdown()
+
+
+def _unloading_elements(root: Path) -> str:
+    return unloading.elements_table(root / GRID).markdown()
+
+
 def _pushover(_: Path) -> str:
     return against_tests.pushover_table().markdown()
 
@@ -218,6 +230,9 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "soil-tests": _soil_tests,
     "soil-grid": _soil_grid,
     "soil-ground": _soil_ground,
+    "unloading-tests": _unloading_tests,
+    "unloading-grid": _unloading_grid,
+    "unloading-elements": _unloading_elements,
     "pushover": _pushover,
     "post-speeds": _post_speeds,
     "uplift-tests": _uplift_tests,
