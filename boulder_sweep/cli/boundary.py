@@ -6,8 +6,8 @@ import json
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
+from boulder_sweep.cli.options import jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
@@ -19,7 +19,7 @@ Examples:
 
 @click.command("boundary", short_help="A map from a few per cent of a grid.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
-@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
+@jobs_option
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all designs.")
 @click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Map (.png, .svg or .pdf).")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
@@ -42,17 +42,10 @@ def boundary(
     along the longest axis; `sweep run` assumes nothing.
     """
     from boulder_sweep.answers.boundary import boundary as find
-    from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.cli.progress import working
 
     sweep = load_sweep(grid, overrides, quiet)
-    if out is not None:
-        checked_parquet(out)
-    if picture is not None:
-        from boulder_sweep.views.figures import checked_kind, require_matplotlib
-
-        require_matplotlib()
-        checked_kind(picture)
+    refuse_unwritable(out, picture)
     with working(quiet):
         found = find(sweep, jobs=jobs)
     counts = found.counts()

@@ -20,3 +20,16 @@ def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
         for note in sweep.notes:
             say(f"note: {note}")
     return sweep
+
+
+def refuse_unwritable(table: str | None, picture: str | None = None) -> None:
+    """Refuse a table or a picture that cannot be written, before anything is computed; None where none is wanted."""
+    if table is not None:
+        from boulder_sweep.answers.tables import checked_parquet
+
+        checked_parquet(table)
+    if picture is not None:
+        from boulder_sweep.views.figures import checked_kind, require_matplotlib
+
+        require_matplotlib()
+        checked_kind(picture)

@@ -6,8 +6,8 @@ import json
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import cluster_options, json_option, set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
+from boulder_sweep.cli.options import cluster_options, jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
@@ -34,7 +34,7 @@ Examples:
 )
 @click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
 @click.option("--own-readings", is_flag=True, help="Omit the answers for the other readings of the paper.")
-@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
+@jobs_option
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Design chart (.png, .svg or .pdf).")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
@@ -70,19 +70,12 @@ def need(
     """
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.printing import need_lines
-    from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.cli.console import counted
     from boulder_sweep.cli.progress import working
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
     sweep = load_sweep(grid, overrides, quiet)
-    if out is not None:
-        checked_parquet(out)
-    if picture is not None:
-        from boulder_sweep.views.figures import checked_kind, require_matplotlib
-
-        require_matplotlib()
-        checked_kind(picture)
+    refuse_unwritable(out, picture)
     with working(quiet) as told:
         found = find(
             sweep,

@@ -93,6 +93,11 @@ def set_option(function: Command) -> Command:
     )(function)
 
 
+def jobs_option(function: Command) -> Command:
+    """Add ``--jobs``, a number of threads."""
+    return click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")(function)
+
+
 def json_option(function: Command) -> Command:
     """Add ``--json``."""
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")(function)

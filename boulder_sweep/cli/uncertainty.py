@@ -7,8 +7,8 @@ from dataclasses import asdict
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import cluster_options, json_option, set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
+from boulder_sweep.cli.options import cluster_options, jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
@@ -40,7 +40,7 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
     "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
-@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
+@jobs_option
 @click.option(
     "-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table; indices and samples next to it."
 )
@@ -86,19 +86,12 @@ def uncertainty(
     until the interval is narrow enough.
     """
     from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
-    from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
     from boulder_sweep.cli.console import counted
     from boulder_sweep.cli.progress import working
 
     sweep = load_sweep(grid, overrides, quiet)
-    if out is not None:
-        checked_parquet(out)
-    if picture is not None:
-        from boulder_sweep.views.figures import checked_kind, require_matplotlib
-
-        require_matplotlib()
-        checked_kind(picture)
+    refuse_unwritable(out, picture)
     with working(quiet) as told:
         found = estimate(
             sweep,

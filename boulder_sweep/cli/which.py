@@ -6,8 +6,8 @@ import json
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import json_option, set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
+from boulder_sweep.cli.options import jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
@@ -19,7 +19,7 @@ Examples:
 
 @click.command("which", short_help="Which truck and soil every design withstands.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
-@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")
+@jobs_option
 @click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all designs.")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
 @units_option
@@ -35,12 +35,10 @@ def which(
     """
     from boulder_sweep.answers.printing import reserve_lines
     from boulder_sweep.answers.reserves import reserves
-    from boulder_sweep.answers.tables import checked_parquet
     from boulder_sweep.cli.progress import working
 
     sweep = load_sweep(grid, overrides, quiet)
-    if out is not None:
-        checked_parquet(out)
+    refuse_unwritable(out)
     with working(quiet) as told:
         found = reserves(sweep, jobs=jobs, told=told)
     show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found, units=units)))
