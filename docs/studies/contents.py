@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import against_tests, answers, energy, scale, soil, unloading, uplift
+from docs.studies import against_tests, answers, energy, moves, scale, soil, unloading, uplift
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -177,6 +177,10 @@ def _pushover(_: Path) -> str:
     return against_tests.pushover_table().markdown()
 
 
+def _moves(root: Path) -> str:
+    return moves.moves_table(root).markdown()
+
+
 def _post_speeds(_: Path) -> str:
     return against_tests.post_table().markdown()
 
@@ -251,6 +255,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "uncertainty-cases": answers.uncertainty_of_cases,
     "need-probability": answers.need_with_probability,
     "doubts-site": answers.doubts_of_site,
+    "moves": _moves,
     "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
     "published-spreads": answers.published_spreads,
