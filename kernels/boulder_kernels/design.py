@@ -254,13 +254,18 @@ def spring_per_depth(design: Design) -> float:
 
 
 @exact_kernel
+def ultimate_per_depth(design: Design) -> float:
+    """Ultimate resistance of a soil element of unit height per metre of its depth [N/m^2] (Eqs 26, 27)."""
+    return ultimate_pressure(1.0, design.phi, design.rho_s, design.K_epsilon) * design.W
+
+
+@exact_kernel
 def yield_displacement(design: Design) -> float:
     """Displacement at which a soil element reaches its ultimate resistance [m] (Eqs 26-28).
 
     Spring and ultimate resistance both grow in proportion to depth, so it is the same for all elements.
     """
-    per_depth = ultimate_pressure(1.0, design.phi, design.rho_s, design.K_epsilon) * design.W
-    return per_depth / spring_per_depth(design)
+    return ultimate_per_depth(design) / spring_per_depth(design)
 
 
 @exact_inlined
@@ -344,18 +349,19 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
         Non-finite or non-positive where the design is impossible: see `is_computable`.
     """
     d = design.d
+    spring = spring_per_depth(design)
     return constants_with(
         design,
         readings,
         elements,
         soil_mass(design, elements),
-        spring_per_depth(design) * d * d,
+        spring * d * d,
         design.rho_s * design.W * d,
-        yield_displacement(design),
+        ultimate_per_depth(design) / spring,
     )
 
 
-@exact_kernel
+@exact_inlined
 def is_computable(c: Constants) -> bool:
     """Whether every constant is finite and every mass, stiffness and length that divides is positive."""
     positive = (

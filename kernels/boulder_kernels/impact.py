@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, kernel
+from ._jit import array_kernel, inlined, kernel
 from .after_step import (
     RUNNING,
     Decided,
@@ -169,7 +169,7 @@ def attempt_budget(h: float, horizon: float) -> float:
     return ATTEMPTS_PER_STEP * horizon / h + ATTEMPTS_SPARE
 
 
-@kernel
+@inlined
 def first_step(control: Control, theta_stop: float, c: Constants) -> tuple[float, int]:
     """Step of a design [s], and the status it is refused with or ACCEPTED."""
     rates = rates_of(theta_stop, c)

@@ -62,7 +62,7 @@ def proof_is_possible(readings: Readings) -> bool:
     return readings.restoring_gravity and readings.separation_released
 
 
-@kernel
+@inlined
 def least_elastic_energy(slope_x: float, c: Constants) -> float:
     """Lower bound of the elastic energy at a rotation, wherever the boulder stands [J].
 
@@ -148,7 +148,7 @@ def _least_soil_energy(slope_x: Any, c: Any) -> Callable[..., Any]:
     return lambda slope_x, c: least_elastic_energy(slope_x, c)
 
 
-@kernel
+@inlined
 def energy_to_turn(theta_max: float, c: Constants) -> float:
     """Lower bound of the potential energy at theta = +-theta_max [J].
 
@@ -171,7 +171,7 @@ def bound_at(
     return p.V + p.V_A * (x_max - c.l_n * versin + c.z_0 * sin - A) + p.V_X * (c.d * sin - X) + lift * abs(sin)
 
 
-@kernel
+@inlined
 def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     """Lower bound of the potential energy on x_b = x_max for |theta| <= theta_max [J].
 
@@ -205,7 +205,7 @@ def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     return least
 
 
-@kernel
+@inlined
 def barrier_energy(m: Maxima, c: Constants) -> float:
     """Energy below which a motion can exceed none of its maxima so far [J].
 

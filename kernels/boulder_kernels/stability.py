@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ._jit import exact_kernel
+from ._jit import exact_inlined
 from .design import Constants
 from .outcomes import Status
 from .trigonometry import sine_versine
@@ -49,14 +49,14 @@ class Rates(NamedTuple):
     """Rate [1/s] of the drag of the soil at its fastest."""
 
 
-@exact_kernel
+@exact_inlined
 def largest_force(c: Constants) -> float:
     """Upper bound of the contact force [N]: the damper passes on no more, nor does the spring stop it by more."""
     stored = c.v_0 * c.k_v / math.sqrt(c.k_m)
     return min(stored, c.v_0 * c.k_v / (c.k_m * c.tau_v)) if c.tau_v > 0.0 else stored
 
 
-@exact_kernel
+@exact_inlined
 def largest_speed(reach: float, inverse_J: float, c: Constants) -> float:
     """Upper bound of the speed of the boulder anywhere in the soil [m/s].
 
@@ -81,7 +81,7 @@ def largest_speed(reach: float, inverse_J: float, c: Constants) -> float:
     return c.v_0 * min(by_energy, by_blow)
 
 
-@exact_kernel
+@exact_inlined
 def rates_of(theta_stop: float, c: Constants) -> Rates:
     """Upper bounds of the rates of a design.
 
@@ -125,14 +125,14 @@ def rates_of(theta_stop: float, c: Constants) -> Rates:
     return Rates(soil, truck, turning * inverse_J, c.k_m * c.tau_v, drag)
 
 
-@exact_kernel
+@exact_inlined
 def stable_step(r: Rates) -> float:
     """Longest step that is stable for a design [s]."""
     oscillation = math.sqrt(r.soil + r.truck + r.turning)
     return min(STABLE_OSCILLATION / oscillation, STABLE_DECAY / (r.relaxation + r.drag))
 
 
-@exact_kernel
+@exact_inlined
 def refusal(h: float, h_asked: float, horizon: float, r: Rates) -> int:
     """Status with which a design is refused because of its steps, or ACCEPTED.
 
