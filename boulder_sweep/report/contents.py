@@ -31,7 +31,7 @@ from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, PARTS
 from boulder_sweep.report.rows import SIZES, Rows, Thinned
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.model import RESISTANCES, Ground
+from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 from boulder_sweep.settings.notes import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.views.wording import REASON_WORDS
@@ -246,6 +246,7 @@ def _yaml(settings: Mapping[str, Any]) -> list[str]:
     return [
         f"criterion: {{max_rotation: {criterion['max_rotation_deg']} deg, rating: {criterion['rating']}, "
         f"min_overlap: {criterion['min_overlap_m']} m}}",
-        f"model: {{readings: {readings}, soil: {soil}, resistance: {model.get('resistance', RESISTANCES[0])}}}",
+        f"model: {{readings: {readings}, soil: {soil}, resistance: {model.get('resistance', RESISTANCES[0])}, "
+        f"unloading: {model.get('unloading', UNLOADINGS[0])}}}",
         f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",
     ]
