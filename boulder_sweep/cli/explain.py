@@ -13,6 +13,7 @@ from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.explanation import Explanation
+    from boulder_sweep.impact.trajectory import Trajectory
 
 EXAMPLES = """\b
 Examples:
@@ -99,9 +100,20 @@ def why_lines(found: Explanation) -> list[str]:
             f"  afterwards: swings back by {row['swing_back_deg']:.3g} deg and comes to rest at "
             f"{row['permanent_tilt_deg']:.3g} deg, to within {row['permanent_tilt_error_deg']:.1g} deg"
         )
+    lines += _second_spring_line(history)
     if row["rotation_error_deg"] is not None:
         lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
     if row.get("validity"):
         lines.append("  outside what the model was tested on (docs/validity.md):")
         lines += [f"    {name}: {BY_FLAG[name].meaning}" for name in row["validity"].split(";")]
     return lines
+
+
+def _second_spring_line(history: Trajectory) -> list[str]:
+    """Return when the second spring of the vehicle took over; nothing for a vehicle without."""
+    motion = history.motion
+    if motion.second is None:
+        return []
+    reached = history.time_s[motion.record.offset > 0.0]
+    when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
+    return [f"  front: its second spring acts from a crush of {motion.second.s_2:.4g} m on, {when}"]

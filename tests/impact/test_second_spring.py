@@ -70,6 +70,18 @@ def test_rows_carry_the_spring_and_come_out_again(sweep: Sweep, tmp_path: Path) 
     assert (table.max_rotation_deg < 0.9 * alone).all()
 
 
+def test_explain_says_when_it_took_over(
+    sweep: Sweep, known: oracle.Impact, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    boulder_sweep.run(load(CONFIG, [STAGES.replace("[0.4 m, 0.6 m]", "[0.4 m, 5 m]")]), tmp_path / "two.sweep")
+    for row in ("0", "1"):
+        assert execute(["explain", str(tmp_path / "two.sweep"), row]) == 0
+    text = capsys.readouterr().out
+    when = 0.5 * np.ceil(2e3 * known.time_of("second spring"))  # the next sample [ms]
+    assert f"front: its second spring acts from a crush of 0.4 m on, reached {when:.0f} ms after contact" in text
+    assert "front: its second spring acts from a crush of 5 m on, not reached" in text
+
+
 def test_a_mapping_needs_both_numbers(found: Trajectory) -> None:
     design = {name: value for name, value in found.inputs.items() if name != OPTIONAL_COLUMNS[1]}
     with pytest.raises(ValueError, match=OPTIONAL_COLUMNS[1]):
