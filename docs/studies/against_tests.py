@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq
@@ -19,6 +20,7 @@ from boulder_sweep.settings.model import RESISTANCES
 
 Soil = Callable[[float, float], float]
 """From the displacement [m] at a depth [m] to the force of the soil per metre of depth [N/m]."""
+OPENPILE = Path(__file__).with_name("openpile_pushover.csv")
 SLICES = 400
 ROTATIONS_DEG = (1.0, 2.0, 5.0, 10.0, 13.8, 20.0)
 SPEEDS_M_S = (5.5, 8.9, 13.4)
@@ -90,6 +92,18 @@ def pushover_table() -> Table:
     for degrees in ROTATIONS_DEG:
         forces = [pushed(designs[0], soil, math.radians(degrees)) for soil in soils]
         table.add(f"{degrees:g}°", *(f"{force / 1e3:.0f}" for force in forces))
+    return table
+
+
+def openpile_table() -> Table:
+    """Return rotations under a slow push by openpile, see ``benchmarks/openpile_pushover.py``, and by `api_sand`."""
+    table = Table(("force [kN]", "openpile [deg]", "formula [deg]"))
+    design = design_at(sampled_designs(crash_test("rwg"), 1).table, 0)
+    soil = api_sand(design)
+    for line in OPENPILE.read_text(encoding="utf-8").splitlines()[1:]:
+        force, rotation = map(float, line.split(","))
+        own = brentq(lambda turned, force=force: pushed(design, soil, turned) - 1e3 * force, 1e-5, 0.5)
+        table.add(f"{force:g}", f"{rotation:.3f}", f"{math.degrees(own):.3f}")
     return table
 
 

@@ -181,6 +181,10 @@ def _moves(root: Path) -> str:
     return moves.moves_table(root).markdown()
 
 
+def _openpile(_: Path) -> str:
+    return against_tests.openpile_table().markdown()
+
+
 def _post_speeds(_: Path) -> str:
     return against_tests.post_table().markdown()
 
@@ -238,6 +242,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "unloading-grid": _unloading_grid,
     "unloading-elements": _unloading_elements,
     "pushover": _pushover,
+    "openpile": _openpile,
     "post-speeds": _post_speeds,
     "uplift-tests": _uplift_tests,
     "uplift-grid": _uplift_grid,
