@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
 Kernels = Literal["table", "design"]
-COMPILED = {"table": ("lanes.simulate_lanes", 40.0), "design": ("impact.simulate_design", 20.0)}
+COMPILED = {"table": ("lanes.simulate_lanes", 15.0), "design": ("impact.simulate_design", 20.0)}
 """Kernels for tables, and for one design over time: the function that is compiled last, and seconds where unknown."""
 
 

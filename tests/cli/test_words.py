@@ -79,7 +79,7 @@ def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatc
     folder = tmp_path / "kernels-1"
     folder.mkdir()
     monkeypatch.setattr("boulder_kernels._jit.CACHE_FOLDER", str(folder))
-    assert progress.cold_start("table") == f"{COMPILING}40 s"
+    assert progress.cold_start("table") == f"{COMPILING}15 s"
     progress._remember("table", 12.3)
     assert progress.cold_start("table") == f"{COMPILING}12 s"
     assert progress.cold_start("design") == f"{COMPILING}20 s"
