@@ -106,7 +106,7 @@ def whole_run(checkout: Path, cache: Path, accuracy: str, folder: Path) -> tuple
     with tempfile.TemporaryDirectory(dir=folder) as name:
         words = ("run", str(grid), "-o", f"{name}/table", "--jobs", "2", "--accuracy", accuracy, "--quiet")
         command = [sys.executable, "-m", "boulder_sweep", *words]
-        process = subprocess.Popen(command, env=_environment(checkout, cache), stdout=subprocess.DEVNULL)
+        process = subprocess.Popen(command, cwd=checkout, env=_environment(checkout, cache), stdout=subprocess.DEVNULL)
         _, status, used = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
