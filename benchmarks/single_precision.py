@@ -36,14 +36,15 @@ SOURCES = Path(bk.__file__).parent
 KEPT = ("design", "readings", "stability")
 """Modules that stay in double precision: what is computed once per design."""
 ORDER = (
-    *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "soil", "tableau"),
+    *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "tableau"),
+    *("soil_records", "layered", "memory", "layered_soil", "remembering_soil", "soil"),
     *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
-    *("energy", "settling", "after_step", "workspace", "impact", "lane_events", "lane_steps"),
-    "lanes",
+    *("energy", "settling", "after_step", "second_spring", "unloading", "workspace", "impact"),
+    *("lane_events", "lane_steps", "lanes"),
 )
 CHANGES = {
+    "soil_records": (("TINY = 1e-30", "TINY = 1e-15"),),  # its square must not be zero
     "soil": (
-        ("TINY = 1e-30", "TINY = 1e-15"),  # its square must not be zero
         ("    if c.elements > 0:\n        return element_sums(k, c)\n", ""),
         ("    if c.elements > 0:\n        return summed_potential(A, slope_x, c)\n", ""),
     ),

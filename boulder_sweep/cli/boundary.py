@@ -42,11 +42,11 @@ def boundary(
     along the longest axis; `sweep run` assumes nothing.
     """
     from boulder_sweep.answers.boundary import boundary as find
-    from boulder_sweep.cli.progress import working
+    from boulder_sweep.cli.progress import kernels_for, working
 
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out, picture)
-    with working(quiet):
+    with working(quiet, kernels_for(sweep)):
         found = find(sweep, jobs=jobs)
     counts = found.counts()
     if as_json:

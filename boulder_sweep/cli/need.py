@@ -71,12 +71,12 @@ def need(
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.printing import need_lines
     from boulder_sweep.cli.console import counted
-    from boulder_sweep.cli.progress import working
+    from boulder_sweep.cli.progress import kernels_for, working
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out, picture)
-    with working(quiet) as told:
+    with working(quiet, kernels_for(sweep)) as told:
         found = find(
             sweep,
             least,

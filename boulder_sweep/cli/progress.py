@@ -16,21 +16,44 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from boulder_sweep.runner.summary import Progress
+    from boulder_sweep.settings import Sweep
 
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
-Kernels = Literal["table", "design"]
-COMPILED = {"table": ("lanes.simulate_lanes", 15.0), "design": ("impact.simulate_design", 20.0)}
+COMPILED = {
+    "table": ("lanes.simulate_lanes", 15.0),
+    "design": ("impact.simulate_design", 20.0),
+    "elements-table": ("table.simulate_rows", 20.0),
+    "springs-table": ("table.simulate_rows_on_springs", 20.0),
+    "springs-design": ("impact.simulate_on_springs", 20.0),
+    "layers-table": ("table.simulate_layered_rows", 30.0),
+    "layers-design": ("impact.simulate_layered", 30.0),
+    "memory-table": ("impact.simulate_with_springs", 30.0),
+    "memory-design": ("impact.simulate_with_springs", 30.0),
+}
 """Kernels for tables, and for one design over time: the function that is compiled last, and seconds where unknown."""
 
 
-def cold_start(kernels: Kernels | None) -> str | None:
+def kernels_for(sweep: Sweep, of: Literal["table", "design"] = "table") -> str:
+    """Return which of the kernels above a sweep needs, for tables or for one design over time."""
+    from boulder_sweep.designs import SECOND_SPRING
+
+    if sweep.model.unloading != "elastic":
+        return f"memory-{of}"
+    if not sweep.model.ground.is_proportional:
+        return f"layers-{of}"
+    if SECOND_SPRING in sweep.plan.columns:
+        return f"springs-{of}"
+    return f"elements-{of}" if sweep.model.soil_elements and of == "table" else of
+
+
+def cold_start(kernels: str | None) -> str | None:
     """Return what to say before kernels are compiled; None if their compiled code is there.
 
     Parameters
     ----------
     kernels
-        Those for tables, or those for one design over time; None where no kernel is called.
+        Name in `COMPILED`; None where no kernel is called.
     """
     if kernels is None:
         return None
@@ -46,7 +69,7 @@ def cold_start(kernels: Kernels | None) -> str | None:
     return f"compiling kernels, once on this machine, about {max(seconds, 1.0):.0f} s"
 
 
-def _remembered(kernels: Kernels) -> Path:
+def _remembered(kernels: str) -> Path:
     """Return the file with the seconds that the last compilation took, of whatever version of the kernels."""
     from boulder_kernels._jit import CACHE_FOLDER
 
@@ -55,7 +78,7 @@ def _remembered(kernels: Kernels) -> Path:
 
 @contextmanager
 def working(
-    quiet: bool, kernels: Kernels | None = "table", doing: str = "simulating", of: str = "designs"
+    quiet: bool, kernels: str | None = "table", doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[int, int], None] | None]:
     """Give a function that shows how many of how many are done, called with 0 once the kernels are compiled.
 
@@ -94,7 +117,7 @@ def working(
 
 @contextmanager
 def progress(
-    quiet: bool, notes: Notes, kernels: Kernels | None = "table", doing: str = "simulating", of: str = "designs"
+    quiet: bool, notes: Notes, kernels: str | None = "table", doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[Progress], None] | None]:
     """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere.
 
@@ -123,12 +146,12 @@ def progress(
     if cold and kernels is not None:
         from boulder_sweep.judge.evaluation import warm_up_s
 
-        seconds = time.monotonic() - begun if kernels == "design" else warm_up_s()
+        seconds = time.monotonic() - begun if kernels.endswith("design") else warm_up_s()
         if seconds is not None:
             _remember(kernels, seconds)
 
 
-def _remember(kernels: Kernels, seconds: float) -> None:
+def _remember(kernels: str, seconds: float) -> None:
     """Keep how long a compilation took, for the next version of the kernels."""
     with suppress(OSError):
         _remembered(kernels).write_text(f"{seconds:.1f}")

@@ -39,7 +39,7 @@ def run(
 ) -> int:
     """Simulate every design of GRID and write the table of verdicts."""
     from boulder_sweep.cli import console
-    from boulder_sweep.cli.progress import Notes, progress
+    from boulder_sweep.cli.progress import Notes, kernels_for, progress
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite exclude each other")
@@ -56,7 +56,7 @@ def run(
     from boulder_sweep.runner.sweeper import run as run_sweep
 
     notes = Notes()
-    with progress(quiet, notes) as shown:
+    with progress(quiet, notes, kernels_for(sweep)) as shown:
         summary = run_sweep(
             sweep,
             target,

@@ -44,7 +44,7 @@ def simulate(
 ) -> int:
     """Simulate one design of CASE with its time history, beyond the rotation limit and to the end."""
     from boulder_sweep.cli import console
-    from boulder_sweep.cli.progress import working
+    from boulder_sweep.cli.progress import kernels_for, working
 
     sweep = load_sweep(case, overrides, quiet)
     number = design or 0
@@ -64,7 +64,7 @@ def simulate(
     from boulder_sweep.impact.simulation import simulate as simulate_design
     from boulder_sweep.settings.shown_units import shown_values
 
-    with working(quiet, "design"):
+    with working(quiet, kernels_for(sweep, "design")):
         result = simulate_design(sweep, number)
     # Before anything else: there may be nothing to draw, and a film takes a while.
     values = shown_values(result.summary(), units)

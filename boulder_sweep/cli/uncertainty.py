@@ -88,11 +88,11 @@ def uncertainty(
     from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
     from boulder_sweep.cli.console import counted
-    from boulder_sweep.cli.progress import working
+    from boulder_sweep.cli.progress import kernels_for, working
 
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out, picture)
-    with working(quiet) as told:
+    with working(quiet, kernels_for(sweep)) as told:
         found = estimate(
             sweep,
             half_width=half_width,

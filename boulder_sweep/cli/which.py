@@ -35,11 +35,11 @@ def which(
     """
     from boulder_sweep.answers.printing import reserve_lines
     from boulder_sweep.answers.reserves import reserves
-    from boulder_sweep.cli.progress import working
+    from boulder_sweep.cli.progress import kernels_for, working
 
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out)
-    with working(quiet) as told:
+    with working(quiet, kernels_for(sweep)) as told:
         found = reserves(sweep, jobs=jobs, told=told)
     show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found, units=units)))
     if out is not None:

@@ -11,6 +11,7 @@ from boulder_sweep.cli import progress
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.accuracy import Accuracy, Steps
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
+from boulder_sweep.settings import load
 
 
 def test_explain_tells_what_decided_and_how_near(sweep, possible_grid):
@@ -30,7 +31,8 @@ def test_explain_tells_what_decided_and_how_near(sweep, possible_grid):
 
 
 COMPILING = "compiling kernels, once on this machine, about "
-SITE = Path(__file__).parents[2] / "configs" / "site.yaml"
+CONFIGS = Path(__file__).parents[2] / "configs"
+SITE = CONFIGS / "site.yaml"
 ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
 
 
@@ -91,6 +93,39 @@ def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatc
 def test_compiled_kernels_are_those_that_are_looked_for(compiled):
     assert progress.cold_start("table") is None
     assert progress.cold_start("design") is None
+
+
+SPRING = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "kernels"),
+    [
+        ((), ("table", "design")),
+        (("model.soil={elements: 50}",), ("elements-table", "design")),
+        ((SPRING,), ("springs-table", "springs-design")),
+        (("soil.cohesion=5 kPa",), ("layers-table", "layers-design")),
+        (("soil.slope=10 deg",), ("table", "design")),
+        (("model.unloading=plastic", SPRING), ("memory-table", "memory-design")),
+    ],
+)
+def test_kernels_are_named_by_what_the_file_asks_for(overrides, kernels):
+    sweep = load(CONFIGS / "rwg.yaml", overrides)
+    assert (progress.kernels_for(sweep), progress.kernels_for(sweep, "design")) == kernels
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "override", ["model.soil={elements: 50}", SPRING, "soil.cohesion=5 kPa", "model.unloading=plastic"]
+)
+def test_kernels_of_other_laws_are_announced_until_they_are_compiled(sweep, override, tmp_path):
+    case = (CONFIGS / "rwg.yaml", "--set", override)
+    of_file = load(CONFIGS / "rwg.yaml", [override])
+    assert sweep("run", *case, "-o", tmp_path / "one.sweep")[0] == 0
+    assert sweep("simulate", *case)[0] == 0
+    assert progress.cold_start(progress.kernels_for(of_file)) is None
+    assert progress.cold_start(progress.kernels_for(of_file, "design")) is None
+    assert COMPILING not in sweep("run", *case, "-o", tmp_path / "two.sweep")[2]
 
 
 def test_a_run_ends_with_how_to_read_its_table(sweep, possible_grid):
