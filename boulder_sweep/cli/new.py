@@ -25,7 +25,7 @@ def new(file: Path, yes: bool) -> int:
     """Write FILE [my-site.yaml], a settings file with a comment for every entry, after three questions."""
     from boulder_sweep.errors import ExistingFileError
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.starter import CLASSES, UNITS, starter
+    from boulder_sweep.settings.starter import CLASSES, UNITS, UNPUBLISHED, starter
 
     if file.exists():
         raise ExistingFileError(f"{file} exists already; name another file")
@@ -33,8 +33,14 @@ def new(file: Path, yes: bool) -> int:
     vehicle, units = next(iter(CLASSES)), UNITS[0]
     if not yes and sys.stdin.isatty():
         name = click.prompt("Name of the study", default=name, err=True)
-        vehicle = click.prompt("Class of the truck", type=click.Choice(list(CLASSES)), default=vehicle, err=True)
+        vehicle = click.prompt("Class of the vehicle", type=click.Choice(list(CLASSES)), default=vehicle, err=True)
         units = click.prompt("Units", type=click.Choice(UNITS), default=units, err=True)
     file.write_text(starter(name, vehicle, "us" if units == "us" else "si", str(file)), encoding="utf-8")
+    if CLASSES[vehicle][0] != CLASSES[next(iter(CLASSES))][0]:
+        show(
+            f"{file}: fill in {', '.join(UNPUBLISHED)};",
+            f"none is published for {vehicle} (sweep fit-vehicle fits the first two). Then: sweep check {file}",
+        )
+        return 0
     show(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep need {file}")
     return 0

@@ -2,14 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from boulder_sweep.settings.defaults import default_text
 from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, Field, fields_of
 
 UNITS = ("si", "us")
-CLASSES = {"M30": "30 mph", "M40": "40 mph", "M50": "50 mph"}
-"""Speeds of the medium-duty truck of ASTM F2656, 15 000 lb."""
+
+
+class Category(NamedTuple):
+    """A vehicle of ASTM F2656, see ``docs/vehicle.md``."""
+
+    mass: tuple[str, str]
+    """In SI and US units."""
+    speeds_mph: tuple[int, ...]
+    """Nominal speeds."""
+
+
+CATEGORIES = {
+    "M": Category(("6800 kg", "15000 lb"), (30, 40, 50)),
+    "SC": Category(("1100 kg", "2430 lb"), (30, 40, 50, 60)),
+    "FS": Category(("2100 kg", "4630 lb"), (30, 40, 50, 60)),
+    "PU": Category(("2300 kg", "5070 lb"), (30, 40, 50, 60)),
+    "C7": Category(("7200 kg", "15873 lb"), (30, 40, 50)),
+    "H": Category(("29500 kg", "65000 lb"), (30, 40, 50)),
+}
+"""Small car, sedan, pick-up, class 7 and heavy truck, after the medium-duty truck of the paper's tests."""
+CLASSES = {f"{code}{mph}": (code, mph) for code, category in CATEGORIES.items() for mph in category.speeds_mph}
+"""Category and speed by designation."""
+UNPUBLISHED = ("vehicle.spring", "vehicle.damper", "vehicle.bed_offset")
+"""Entries without a published value but for the first category: left empty, so that a file is refused without them."""
 
 _EXAMPLES: dict[str, tuple[str, str]] = {
     "boulder.length": ("1.6 m", "5 ft"),
@@ -27,7 +49,6 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
         "[{from: 4 ft, density: 125 pcf, friction_angle: 38 deg, subgrade_reaction: 180 pci}]",
     ),
     "soil.water_table": ("0.8 m", "2.6 ft"),
-    "vehicle.mass": ("6800 kg", "15000 lb"),
     "vehicle.spring": ("3103.3 kN/m", "17720 lb/in"),
     "vehicle.damper": ("138.91 kN*s/m", "793 lb*s/in"),
     "vehicle.second_spring": ("9000 kN/m", "51000 lb/in"),
@@ -57,7 +78,7 @@ def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", 
     name : str
         Name of the sweep.
     vehicle : str
-        Class of the truck, a key of `CLASSES`.
+        Class of the vehicle, a key of `CLASSES`.
     units : {'si', 'us'}
         Units of the values.
     file : str
@@ -73,8 +94,12 @@ def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", 
 
 def _line(field: Field, vehicle: str, units: int) -> str:
     """Return one entry with its meaning, commented out where a file may do without it."""
-    value = CLASSES[vehicle] if field.path == "vehicle.speed" else ""
-    value = value or (_EXAMPLES[field.path][units] if field.path in _EXAMPLES else default_text(field))
-    needed = field in INPUTS and (not field.optional or field.name == EMBEDMENT[0])
+    code, mph = CLASSES[vehicle]
+    of_class = {"vehicle.mass": CATEGORIES[code].mass[units], "vehicle.speed": f"{mph} mph"}
+    if code != next(iter(CATEGORIES)):
+        of_class |= dict.fromkeys(UNPUBLISHED, "")
+    path = field.path
+    value = of_class[path] if path in of_class else _EXAMPLES[path][units] if path in _EXAMPLES else default_text(field)
+    needed = path in of_class or (field in INPUTS and (not field.optional or field.name == EMBEDMENT[0]))
     sign = "" if needed else "# "
     return f"  {sign}{field.key}: {value}".ljust(60) + f"# {field.meaning}"

@@ -274,6 +274,8 @@ class _Builder:
             return
         first = mapping.entries.get(key.text)
         if first is None:
+            if isinstance(node, Scalar) and not node.text and not node.quoted:
+                node = Scalar(key.place, "")  # YAML places an empty value where the next token begins
             mapping.entries[key.text] = Entry(key.text, key.place, node)
         else:
             words = [*(opened.key.text for opened in self.stack if opened.key), key.text]

@@ -7,12 +7,14 @@ import sys
 
 import pytest
 
-from boulder_sweep.settings import load
+from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.fields import FIELDS
-from boulder_sweep.settings.starter import CLASSES, UNITS, starter
+from boulder_sweep.settings.starter import CLASSES, UNITS, UNPUBLISHED, starter
+
+OF_THE_PAPER = [vehicle for vehicle, (code, _) in CLASSES.items() if code == "M"]
 
 
-@pytest.mark.parametrize("vehicle", CLASSES)
+@pytest.mark.parametrize("vehicle", OF_THE_PAPER)
 @pytest.mark.parametrize("units", UNITS)
 def test_the_file_is_valid_without_notes(tmp_path, vehicle, units):
     path = tmp_path / "new.yaml"
@@ -21,6 +23,28 @@ def test_the_file_is_valid_without_notes(tmp_path, vehicle, units):
     assert sweep.notes == ()
     assert sweep.n_designs > 100
     assert sweep.constants["impact_speed_m_s"] == pytest.approx(int(vehicle[1:]) * 0.44704)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "units"), [("SC60", "si"), ("FS30", "us"), ("PU40", "si"), ("C740", "us"), ("H50", "si")]
+)
+def test_other_vehicles_have_mass_and_speed_and_ask_for_what_is_not_published(tmp_path, vehicle, units):
+    path = tmp_path / "new.yaml"
+    text = starter("new", vehicle, units)
+    path.write_text(text)
+    lines = text.splitlines()
+    with pytest.raises(SettingsError) as refused:
+        load(path)
+    found = [(problem.key, problem.message.split(";")[0]) for problem in refused.value.problems]
+    assert found == [(name, "is empty") for name in UNPUBLISHED]
+    for problem in refused.value.problems:
+        assert lines[problem.line - 1].startswith(f"  {problem.key.removeprefix('vehicle.')}:")
+    sweep = load(path, ["vehicle.spring=3 MN/m", "vehicle.damper=1 MN*s/m", "vehicle.bed_offset=1 m"])
+    code, mph = CLASSES[vehicle]
+    assert vehicle == f"{code}{mph}"
+    assert sweep.constants["impact_speed_m_s"] == pytest.approx(mph * 0.44704)
+    masses_kg = {"SC": 1100, "FS": 2100, "PU": 2300, "C7": 7200, "H": 29500}
+    assert sweep.constants["vehicle_mass_kg"] == pytest.approx(masses_kg[code], rel=3e-3)
 
 
 @pytest.mark.parametrize("units", UNITS)
@@ -78,6 +102,19 @@ def test_it_asks_three_questions_on_a_terminal(sweep, tmp_path, monkeypatch):
     made = load("h.yaml")
     assert (made.name, made.constants["impact_speed_m_s"]) == ("harbour", pytest.approx(22.352))
     assert "162 pcf" in (tmp_path / "h.yaml").read_text()
+
+
+def test_it_says_what_to_fill_in_for_a_vehicle_without_published_values(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answers = iter(["harbour", "H50", "si"])
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("click.prompt", lambda text, **_: next(answers))
+    code, out, err = sweep("new", "h.yaml")
+    assert (code, err) == (0, "")
+    assert out.startswith(
+        "h.yaml: fill in vehicle.spring, vehicle.damper, vehicle.bed_offset;\nnone is published for H50"
+    )
+    assert "  mass: 29500 kg " in (tmp_path / "h.yaml").read_text()
 
 
 def _completed(**variables):
