@@ -57,7 +57,7 @@ def simulate(
     if reason:
         say(f"design {number} cannot be computed: {reason}")
         return EXIT_SOME_ROWS_FAILED
-    if words := sweep.model.ground.words:
+    if (words := sweep.model.ground.words) and not quiet:
         say(f"note: {words}")
     if verbose:
         say("\n".join(console.value_lines(sweep.resolved())))

@@ -78,6 +78,32 @@ def test_the_energy_ledger_closes_with_the_plastic_work(way):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "other",
+    [
+        "model.resistance=broms",
+        "model.resistance=width_capped",
+        "soil.slope=10 deg",
+        "soil.cohesion=5 kPa",
+        "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.3 m, stiffness: 9000 kN/m}]",
+    ],
+)
+def test_it_combines_with_every_other_law(other):
+    """On the way forward nothing unloads, whatever the law; and the ledger closes."""
+    given = ["model.soil={elements: 40}", "solver.step=0.5 ms", "solver.horizon=1 s", "vehicle.speed=20 mph"]
+    alone, elastic, plastic = (
+        boulder_sweep.simulate(boulder_sweep.load("configs/rwg.yaml", [*given, *more]))
+        for more in (["model.unloading=plastic"], [other], [other, "model.unloading=plastic"])
+    )
+    turned = [found.summary()["max_rotation_deg"] for found in (alone, elastic, plastic)]
+    assert turned[2] == pytest.approx(turned[1], rel=0.02)
+    assert abs(turned[2] - turned[0]) > 0.03 * turned[0]
+    ledger = plastic.energy()
+    assert ledger.largest_residual < 1e-6
+    assert ledger.soil_plastic_J[-1] > 0.05 * ledger.initial
+
+
+@pytest.mark.slow
 def test_forces_of_a_time_history_are_those_of_the_motion():
     """Momentum: what contact and soil push together is what the boulder gains."""
     found = boulder_sweep.simulate(boulder_sweep.load("configs/rwg.yaml", [*PLASTIC, "solver.horizon=0.5 s"]))
