@@ -1,4 +1,4 @@
-"""Run all benchmarks and write their tables into the README: ``python -m benchmarks``; takes about five minutes.
+"""Run all benchmarks and write their tables into the README: ``python -m benchmarks``; takes about six minutes.
 
 Some tables contain wall times, so the machine should be otherwise idle.
 """

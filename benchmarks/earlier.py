@@ -10,7 +10,7 @@ import importlib
 import io
 import subprocess
 import sys
-import tarfile
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
@@ -64,10 +64,10 @@ def commit_before(root: Path = ROOT) -> str | None:
 def kernels_of(commit: str, folder: Path, root: Path = ROOT) -> Any | None:
     """Import and compile the kernels of a commit, their sources written into a folder; None if called differently."""
     archive = subprocess.run(
-        ["git", "-C", str(root), "archive", "--format=tar", commit, SOURCES], check=True, capture_output=True
+        ["git", "-C", str(root), "archive", "--format=zip", commit, SOURCES], check=True, capture_output=True
     ).stdout
-    with tarfile.open(fileobj=io.BytesIO(archive)) as sources:
-        sources.extractall(folder, filter="data")
+    with zipfile.ZipFile(io.BytesIO(archive)) as sources:
+        sources.extractall(folder)
     (folder / SOURCES).rename(folder / NAME)
     sys.path.insert(0, str(folder))
     try:

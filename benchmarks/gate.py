@@ -3,8 +3,9 @@
 Run as ``python -m benchmarks.gate``; exit code 1 and a sentence for each path over its threshold. What depends on no
 clock is counted and compared with the record in ``counts.toml``. The kernels are timed in turn with those before their
 last change, key paths in turn with a reference loop that shares no code with the project, and only the ratios count:
-they hardly depend on the speed or the load of the machine. The thresholds are in ``gate.toml``, with room for other
-machines. ``--record`` renews the record.
+they hardly depend on the speed or the load of the machine. What is too slow by the clock is measured again and fails
+if it is too slow each time. The thresholds are in ``gate.toml``, with room for other machines. ``--record`` renews the
+record.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
@@ -36,8 +38,10 @@ THRESHOLDS = FOLDER / "gate.toml"
 PARTS = ("counts", "reference", "threads", "waiting", "earlier")
 """The last brings a second package of kernels into the process: Numba then tells the types of arguments more slowly."""
 ROUNDS = 9
+TRIES = 3
+"""How often a measurement by the clock must fail before the gate does."""
 ROWS = 4096
-SCALAR_ROWS = 512
+SCALAR_ROWS, SCALAR_STEP_S = 512, 0.008
 ELEMENTS = 5000
 SUMS = 3000
 RUN_ROWS = 20_000
@@ -133,7 +137,7 @@ def paths(folder: Path) -> dict[str, Callable[[], object]]:
         control = bk.Control(STEPS[name].step_s, HORIZON, ROTATION_LIMIT, 0, estimate)
         return lambda: bk.simulate_table(designs, readings, control)
 
-    one = bk.Control(STEPS["balanced"].step_s, HORIZON, ROTATION_LIMIT, 0, False)
+    one = bk.Control(SCALAR_STEP_S, HORIZON, ROTATION_LIMIT, 0, False)
     record = bk.no_record()
 
     def one_by_one() -> None:
@@ -223,18 +227,10 @@ def counted(found: counts.Counts, recorded: counts.Recorded, tolerance: float) -
     ]
 
 
-def against_earlier(thresholds: Mapping[str, float], folder: Path) -> list[Finding]:
-    """Time the kernels in turn with those before their last change; nothing where git does not have them."""
-    commit = earlier.commit_before()
-    if commit is None:
-        print("git does not have the kernels before their last change: only the reference is compared with")
-        return []
-    kernels = earlier.kernels_of(commit, folder)
-    if kernels is None:
-        print(f"the kernels of {commit[:9]} are called differently: only the reference is compared with")
-        return []
-    found = earlier.ratios_to(kernels)._asdict()
-    return [Finding(f"{name}, in lanes", ratio, thresholds[name], commit[:9]) for name, ratio in found.items()]
+def against(kernels: Any, name: str, thresholds: Mapping[str, float], rounds: int = earlier.ROUNDS) -> list[Finding]:
+    """Time the kernels in turn with others of that name."""
+    found = earlier.ratios_to(kernels, rounds)._asdict()
+    return [Finding(f"{cost}, in lanes", ratio, thresholds[cost], name) for cost, ratio in found.items()]
 
 
 def at_once(gain: float, rounds: int = together.ROUNDS) -> list[Finding]:
@@ -256,6 +252,32 @@ def idle(most: float, folder: Path, rounds: int = together.ROUNDS) -> list[Findi
     """Find out how much of the wall time of a whole run nothing is computed."""
     share = together.idle_share(paths(folder)["whole_run"], rounds)
     return [Finding("waiting in a whole run", share, most, "its wall time")]
+
+
+def confirmed(measure: Callable[[], list[Finding]], tries: int = TRIES) -> list[Finding]:
+    """Measure, and measure again what does not pass, unless it was counted: a change that costs speed fails every time.
+
+    Parameters
+    ----------
+    measure
+        Finds the same paths each time.
+    tries
+        How often at most.
+
+    Returns
+    -------
+    list of Finding
+        Of each path the first that passes, or the last.
+    """
+    found = measure()
+    for _ in range(tries - 1):
+        slow = [finding.name for finding in found if not finding.passes and not finding.counted]
+        if not slow:
+            break
+        print(f"too slow, so measured again: {_named([each for each in found if each.name in slow])}", flush=True)
+        again = {finding.name: finding for finding in measure()}
+        found = [again[finding.name] if finding.name in slow else finding for finding in found]
+    return found
 
 
 def thresholds_of(path: Path = THRESHOLDS, section: str = "largest_ratio") -> dict[str, float]:
@@ -300,7 +322,7 @@ def main() -> int:
     findings: list[Finding] = []
     with tempfile.TemporaryDirectory(prefix="sweep-gate-") as name:
         for part in arguments.only:
-            found = _findings(part, arguments.thresholds, arguments.rounds, Path(name))
+            found = confirmed(_measurement(part, arguments.thresholds, arguments.rounds, Path(name)))
             for finding in found:
                 print(finding, flush=True)
             findings += found
@@ -310,17 +332,30 @@ def main() -> int:
     return 1 if problem else 0
 
 
-def _findings(part: str, file: Path, rounds: int, folder: Path) -> list[Finding]:
-    """Findings of one of the `PARTS`."""
+def _measurement(part: str, file: Path, rounds: int, folder: Path) -> Callable[[], list[Finding]]:
+    """Prepare one of the `PARTS`; the result measures it."""
     if part == "counts":
-        return counted(counts.measured(), counts.read(), thresholds_of(file, "counts")["largest_change"])
+        return lambda: counted(counts.measured(), counts.read(), thresholds_of(file, "counts")["largest_change"])
     if part == "earlier":
-        return against_earlier(thresholds_of(file, "earlier"), folder)
+        return _against_earlier(thresholds_of(file, "earlier"), folder)
     if part == "reference":
-        return judged(paths(folder), thresholds_of(file), rounds)
+        return lambda: judged(paths(folder), thresholds_of(file), rounds)
     if part == "threads":
-        return at_once(thresholds_of(file, "threads")["least_gain"], rounds)
-    return idle(thresholds_of(file, "waiting")["whole_run"], folder, rounds)
+        return lambda: at_once(thresholds_of(file, "threads")["least_gain"], rounds)
+    return lambda: idle(thresholds_of(file, "waiting")["whole_run"], folder, rounds)
+
+
+def _against_earlier(thresholds: Mapping[str, float], folder: Path) -> Callable[[], list[Finding]]:
+    """Prepare the comparison with the kernels before their last change; with none where git does not have them."""
+    commit = earlier.commit_before()
+    if commit is None:
+        print("git does not have the kernels before their last change: only the reference is compared with")
+        return list
+    kernels = earlier.kernels_of(commit, folder)
+    if kernels is None:
+        print(f"the kernels of {commit[:9]} are called differently: only the reference is compared with")
+        return list
+    return lambda: against(kernels, commit[:9], thresholds)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 import boulder_kernels as bk
+from boulder_kernels.impact import STEP_RATIO
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
 
 from .accuracy import PRESETS, control, reference_of
@@ -31,7 +32,7 @@ def named_control(name: str, steps: Steps) -> bk.Control:
 def steps_text(name: str, steps: Steps) -> str:
     """Return the steps in words."""
     longer = 1e3 * steps.step_s
-    text = f"{longer:g} ms" if name == "fast" else f"{longer:g} and {longer / 2:g} ms"
+    text = f"{longer:g} ms" if name == "fast" else f"{longer:g} and {longer / STEP_RATIO:g} ms"
     return text + (", yield located" if steps.locate_yield else "")
 
 

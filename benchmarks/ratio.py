@@ -9,6 +9,7 @@ both alike.
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import subprocess
 import sys
@@ -26,20 +27,14 @@ RUN_ROWS = 1_000_000
 
 
 class Setting(NamedTuple):
-    """How designs are simulated."""
+    """How designs are simulated, by the steps that each checkout has for an accuracy."""
 
-    step_s: float
-    error_estimate: bool
-    locate_yield: bool
-    printed: bool
+    accuracy: str
+    printed: bool = False
 
 
-def settings() -> dict[str, Setting]:
-    """Settings whose costs are compared, by name."""
-    from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
-
-    found = {name: Setting(steps.step_s, name != "fast", steps.locate_yield, False) for name, steps in STEPS.items()}
-    return found | {"as_printed": Setting(STEPS_PRINTED["balanced"].step_s, True, False, True)}
+SETTINGS = {name: Setting(name) for name in ("fast", "balanced", "fine")} | {"as_printed": Setting("balanced", True)}
+"""Settings whose costs are compared."""
 
 
 def tables() -> dict[str, dict[str, np.ndarray]]:
@@ -71,7 +66,7 @@ class Kernels:
         """CPU time of one simulation of a table of designs [s]."""
         assert self._process.stdin is not None, "the pipe was asked for"
         assert self._process.stdout is not None, "the pipe was asked for"
-        self._process.stdin.write(f"{designs} {setting.step_s} {setting[1]:d} {setting[2]:d} {setting[3]:d}\n")
+        self._process.stdin.write(f"{designs} {setting.accuracy} {setting.printed:d}\n")
         self._process.stdin.flush()
         return float(self._process.stdout.readline())
 
@@ -84,13 +79,18 @@ def answer_requests(designs: Path) -> None:
     """Time the kernels of this process as its standard input asks; the designs are the files of a folder."""
     import boulder_kernels as bk
 
+    try:
+        accuracy = importlib.import_module("boulder_sweep.judge.accuracy")
+    except ModuleNotFoundError:  # versions before the first release have it elsewhere
+        accuracy = importlib.import_module("boulder_sweep.accuracy")
     known = {
         file.stem: bk.DesignTable(*(np.ascontiguousarray(column) for column in np.load(file)))
         for file in designs.glob("*.npy")
     }
     for line in sys.stdin:
-        name, step, estimate, locate, printed = line.split()
-        control = bk.Control(float(step), 1.0, np.radians(20.0), 0, estimate == "1", True, locate == "1")
+        name, asked, printed = line.split()
+        steps = (accuracy.STEPS_PRINTED if printed == "1" else accuracy.STEPS)[asked]
+        control = bk.Control(steps.step_s, 1.0, np.radians(20.0), 0, asked != "fast", True, steps.locate_yield)
         readings = bk.as_printed() if printed == "1" else bk.corrected()
         begun = time.process_time()
         bk.simulate_table(known[name], readings, control)
@@ -115,8 +115,10 @@ def whole_run(checkout: Path, cache: Path, accuracy: str, folder: Path) -> tuple
 
 
 def _environment(checkout: Path, cache: Path) -> dict[str, str]:
+    """Return variables under which Python finds a checkout, compiled to bytecode as an installed package is."""
     path = os.pathsep.join((str(checkout), str(checkout / "kernels")))
-    return os.environ | {"PYTHONPATH": path, "BOULDER_SWEEP_CACHE_DIR": str(cache)}
+    own = {"PYTHONPATH": path, "BOULDER_SWEEP_CACHE_DIR": str(cache), "PYTHONPYCACHEPREFIX": f"{cache}-bytecode"}
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | own
 
 
 def compare_kernels(checkouts: tuple[Path, Path], caches: tuple[Path, Path], folder: Path, rounds: int) -> None:
@@ -126,7 +128,7 @@ def compare_kernels(checkouts: tuple[Path, Path], caches: tuple[Path, Path], fol
         np.save(folder / f"{name}.npy", np.stack(list(table.values())))
     both = [Kernels(checkout, cache, folder) for checkout, cache in zip(checkouts, caches, strict=True)]
     print("kernels      designs     now [us]  other [us]  ratio of least, median of ratios")
-    for setting_name, setting in settings().items():
+    for setting_name, setting in SETTINGS.items():
         for name, table in known.items():
             count = len(table["L"])
             for kernels in both:

@@ -39,8 +39,8 @@ ORDER = (
     *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "tableau"),
     *("soil_records", "layered", "memory", "layered_soil", "remembering_soil", "soil"),
     *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
-    *("energy", "settling", "after_step", "second_spring", "unloading", "workspace", "impact"),
-    *("lane_events", "lane_steps", "lanes"),
+    *("energy", "settling", "after_step", "second_spring", "unloading", "onset", "workspace", "impact"),
+    *("lane_events", "lane_steps", "lane_starts", "lanes"),
 )
 CHANGES = {
     "soil_records": (("TINY = 1e-30", "TINY = 1e-15"),),  # its square must not be zero

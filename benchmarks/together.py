@@ -1,38 +1,82 @@
 """Two threads against one, and the time in which a whole run does nothing: what CPU time does not show.
 
-Neither depends on what else the machine does: waiting for a processor is taken out.
+Both are found by looking at what the threads do, not from wall time: what other programs take of the processors, or
+other machines of those of a virtual one, lengthens only that.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Collection
 from statistics import median
+from types import TracebackType
+from typing import NamedTuple, Self
 
 THREADS = 2
 ROUNDS = 9
 _LOOKING = """
-import os, select, sys
-folder, idle, looks = f"/proc/{sys.argv[1]}/task", 0, 0
+import json, os, select, sys
+folder, seen = f"/proc/{sys.argv[1]}/task", {}
 print("begun", flush=True)
 while not select.select([sys.stdin], [], [], 0.002)[0]:
-    states = set()
+    awake, asleep = [], []
     for thread in os.listdir(folder) if os.path.isdir(folder) else ():
         try:
             with open(f"{folder}/{thread}/stat") as stat:
-                states.add(stat.read().rpartition(")")[2].split()[0])
+                sleeps = stat.read().rpartition(")")[2].split()[0] not in ("R", "D")
         except OSError:
-            pass  # the thread has ended meanwhile
-    looks += bool(states)
-    idle += bool(states) and not states & {"R", "D"}
-print(idle, looks)
+            continue  # the thread has ended meanwhile
+        (asleep if sleeps else awake).append(int(thread))
+    look = json.dumps([sorted(awake), sorted(asleep)])
+    seen[look] = seen.get(look, 0) + 1
+print(json.dumps([[*json.loads(look), count] for look, count in seen.items()]))
 """
-"""Program that counts the looks at which no thread of a process runs, is ready to (R), or waits for the disk (D)."""
+"""Program that counts looks by which threads of a process they find awake, and which asleep: those that neither run,
+nor are ready to run (R), nor wait for the disk (D)."""
+
+
+class Looking:
+    """Another process that looks every two milliseconds at which threads of this one sleep, within a context.
+
+    A thread that waits for its turn on a processor does not sleep. Read the shares after the context.
+    """
+
+    def __enter__(self) -> Self:
+        """Return once the other process looks."""
+        command = [sys.executable, "-S", "-c", _LOOKING, str(os.getpid())]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None, "the pipe was asked for"
+        self._process.stdout.readline()  # it has begun
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the other process and take its counts."""
+        found = json.loads(self._process.communicate()[0])
+        self._looks = [(set(awake), set(asleep), count) for awake, asleep, count in found if awake or asleep]
+
+    @property
+    def idle(self) -> float:
+        """Share of the looks at which every thread slept; NaN where the system does not show the states of threads."""
+        idle = sum(count for awake, _, count in self._looks if not awake)
+        return idle / whole if (whole := sum(count for *_, count in self._looks)) else float("nan")
+
+    def asleep(self, thread: int) -> float:
+        """Share of the looks at which the thread of that native identifier slept; 0 where no look met it."""
+        looks = [(thread in asleep, count) for awake, asleep, count in self._looks if thread in awake | asleep]
+        return sum(slept * count for slept, count in looks) / max(sum(count for _, count in looks), 1)
+
+    def one_asleep(self, threads: Collection[int]) -> float:
+        """Share of the looks that met all of these threads at which not all were awake; 0 where none met all."""
+        looks = [(asleep, count) for awake, asleep, count in self._looks if awake | asleep >= set(threads)]
+        slept = sum(count for asleep, count in looks if not asleep.isdisjoint(threads))
+        return slept / max(sum(count for _, count in looks), 1)
 
 
 def in_threads(work: Callable[[], object], count: int = THREADS) -> None:
@@ -47,6 +91,9 @@ def in_threads(work: Callable[[], object], count: int = THREADS) -> None:
 def gain_over(work: Callable[[], object], reference: Callable[[], object], rounds: int = ROUNDS) -> float:
     """How much faster two threads are than one, over the same of a reference that shares nothing.
 
+    Where the host gives two processors the time of one, two threads of the reference gain nothing, either. So the
+    result is also at most the share of the two threads that is awake until the first one ends.
+
     Returns
     -------
     float
@@ -55,43 +102,43 @@ def gain_over(work: Callable[[], object], reference: Callable[[], object], round
     """
     in_threads(work)
     in_threads(reference)
-    return median(_gain(work) / _gain(reference) for _ in range(rounds))
+    return median(_gain_over(work, reference) for _ in range(rounds))
 
 
-def _gain(work: Callable[[], object]) -> float:
-    """How much faster two threads are than one."""
-    return THREADS * _time_in_threads(work, 1) / _time_in_threads(work, THREADS)
+def _gain_over(work: Callable[[], object], reference: Callable[[], object]) -> float:
+    """`gain_over` of one round."""
+    alone, together, reference_together = (timed(work, 1), timed(work, THREADS), timed(reference, THREADS))
+    gain = alone.seconds / together.seconds
+    reference_gain = timed(reference, 1).seconds / reference_together.seconds
+    return min(gain / reference_gain, 1.0 - together.one_asleep / THREADS)
 
 
-def _time_in_threads(work: Callable[[], object], count: int) -> float:
-    """Wall time of the slowest of some threads, without what it waited for a processor [s].
+class Timed(NamedTuple):
+    """What some threads took that did the same work at once."""
 
-    Other programs would decide a plain wall time. What remains is work and waiting for the other thread.
-    """
-    times = []
+    seconds: float
+    """Time the slowest computes, and sleeps because it waits for another [s]."""
+    one_asleep: float
+    """Share of the time in which one sleeps while none has ended."""
 
-    def timed() -> None:
+
+def timed(work: Callable[[], object], count: int) -> Timed:
+    """Do the same work in several threads at once, and say what they took."""
+    times: dict[int, float] = {}
+
+    def one() -> None:
+        begun = time.thread_time()
         work()
-        times.append(time.monotonic() - begun - _waited_for_processor())
+        times[threading.get_native_id()] = time.thread_time() - begun
 
-    begun = time.monotonic()
-    in_threads(timed, count)
-    return max(times)
-
-
-def _waited_for_processor() -> float:
-    """How long this thread was ready since its start and did not run [s]; 0 where the system does not tell."""
-    try:
-        return 1e-9 * int(Path("/proc/thread-self/schedstat").read_text().split()[1])
-    except OSError:
-        return 0.0
+    with Looking() as looking:
+        in_threads(one, count)
+    slowest = max(spent / max(1.0 - looking.asleep(thread), 0.01) for thread, spent in times.items())
+    return Timed(slowest, looking.one_asleep(times))
 
 
 def idle_share(work: Callable[[], object], rounds: int = ROUNDS) -> float:
     """How much of the wall time of some work none of its threads computes, wants to, or waits for the disk.
-
-    Another process looks at the states of the threads every two milliseconds. A thread that waits for its turn on a
-    processor counts as one that computes, so other programs change nothing.
 
     Parameters
     ----------
@@ -106,11 +153,7 @@ def idle_share(work: Callable[[], object], rounds: int = ROUNDS) -> float:
         Between 0 and 1; NaN where the system does not show the states of threads.
     """
     work()
-    command = [sys.executable, "-c", _LOOKING, str(os.getpid())]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as looking:
-        assert looking.stdout is not None, "the pipe was asked for"
-        looking.stdout.readline()  # it has begun
+    with Looking() as looking:
         for _ in range(rounds):
             work()
-        idle, looks = looking.communicate()[0].split()
-    return int(idle) / int(looks) if int(looks) else float("nan")
+    return looking.idle

@@ -21,6 +21,7 @@ from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings
+from boulder_sweep.settings.shown_units import shown_values
 from boulder_sweep.store.errors import OtherVersionError
 from boulder_sweep.store.manifest import load as load_manifest
 from boulder_sweep.store.provenance import differences, identity
@@ -67,15 +68,19 @@ class Explanation:
         """Outcomes that are not the same to the last bit."""
         return tuple(name for name, value in self.stored.items() if not _same(value, self.recomputed[name]))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return everything but the trajectory as plain data."""
+    def as_dict(self, units: str = "si") -> dict[str, Any]:
+        """Return everything but the trajectory as plain data, in ``si`` or ``us`` units."""
+        were, are = (
+            shown_values({name: outcomes[name] for name in self.unequal}, units)
+            for outcomes in (self.stored, self.recomputed)
+        )
         return {
             "name": self.name,
             "design_id": self.design_id,
-            "inputs": self.inputs,
-            "outcomes": self.stored,
+            "inputs": shown_values(self.inputs, units),
+            "outcomes": shown_values(self.stored, units),
             "same_bits": not self.unequal,
-            "unequal": {name: [self.stored[name], self.recomputed[name]] for name in self.unequal},
+            "unequal": {name: [were[name], are[name]] for name in were},
             "changed_since": list(self.changed),
         }
 

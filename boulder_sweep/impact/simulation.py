@@ -126,7 +126,7 @@ def simulate(
     outcome, c = _simulated(designs.table, how, control, record, second)
     row = _outcome_row(outcome)
     if control.error_estimate:
-        coarser, _ = _simulated(designs.table, how, control._replace(halved=False), no_record(), second)
+        coarser, _ = _simulated(designs.table, how, control._replace(refined=False), no_record(), second)
         _estimate(row, _outcome_row(coarser), plain(designs.table), how)
     judged = judge(row, designs, evaluation.limits, reported_step_s(control))
     if judged.verdict[0] != ERROR:
@@ -200,12 +200,12 @@ def _changed(
 def _control(control: Control, decided: Judged) -> Control:
     """How the time history is integrated: by the steps that decided the row, and beyond the limit.
 
-    Where a coarser solution estimates its error, by half of the step.
+    Where a coarser solution estimates its error, by a third of the step.
     """
     for finer in finer_controls(control):
         if reported_step_s(finer) == decided["step_s"][0]:
             control = finer
-    return control._replace(stop_at_limit=False, halved=control.error_estimate)
+    return control._replace(stop_at_limit=False, refined=control.error_estimate)
 
 
 def _as_decided(judged: Judged, decided: Judged) -> Judged:

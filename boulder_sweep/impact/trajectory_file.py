@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from boulder_sweep.errors import HistoryFileError
 from boulder_sweep.impact.trajectory_columns import BY_NAME
+from boulder_sweep.store.targets import check_target
 
 _TYPES = {"float64": pa.float64(), "dictionary": pa.dictionary(pa.int32(), pa.string())}
 
@@ -46,15 +47,26 @@ def write(table: pa.Table, path: str | Path) -> None:
     Raises
     ------
     HistoryFileError
-        The name has another ending, its folder does not exist, or it cannot be written.
+        The name has another ending, its folder does not exist or holds the result of a run, or it cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() != ".parquet":
-        raise HistoryFileError(f"{path}: a time history is a Parquet file; its name must end in .parquet")
-    if not target.absolute().parent.is_dir():
-        raise HistoryFileError(f"{path}: the folder {target.absolute().parent} does not exist")
+    target = checked_history(path)
     try:
         pq.write_table(table, target, compression="zstd", write_page_checksum=True)
     except OSError as problem:
         why = os.strerror(problem.errno) if problem.errno else str(problem)
         raise HistoryFileError(f"{path} cannot be written: {why}") from problem
+
+
+def checked_history(path: str | Path) -> Path:
+    """Return the path of a time history if it can be written there.
+
+    Raises
+    ------
+    HistoryFileError
+        The name has another ending, or its folder does not exist or holds the result of a run.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ".parquet":
+        raise HistoryFileError(f"{path}: a time history is a Parquet file; its name must end in .parquet")
+    check_target(target, HistoryFileError)
+    return target

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import ERROR, Judged, joined, not_computed, with_rows
+from boulder_sweep.judge.judged import ERROR, PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
@@ -69,6 +69,8 @@ class Evaluation:
         Whether the vehicles have a second spring, for which other kernels are compiled.
     ground
         Layers, water, cohesion and slope of the soil.
+    least_margin
+        Margin that a question asks for, from 0 to less than 1; see `judged`.
     """
 
     readings: Readings
@@ -79,6 +81,7 @@ class Evaluation:
     resistance: str = RESISTANCES[0]
     second_spring: bool = False
     ground: Ground = field(default_factory=Ground)
+    least_margin: float = 0.0
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -122,6 +125,12 @@ class Evaluation:
         -------
         Judged
             n rows, in the same order.
+
+        Notes
+        -----
+        A simulation may end with a proof of its verdict while the rotation can still grow, so its margin is one up to
+        then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
+        reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         """
         found = self._once(designs, self.control)
         for control in finer_controls(self.control):
@@ -131,7 +140,25 @@ class Evaluation:
             finer = self._once(designs.rows(again), control)
             computed = finer.verdict != ERROR
             found = with_rows(found, again[computed], finer.rows(computed))
-        return joined([found])
+        found = joined([found])
+        return self._margins_proved(found, designs) if self.least_margin > 0.0 else found
+
+    def _margins_proved(self, found: Judged, designs: Designs) -> Judged:
+        """Put margins that are not proved to last just below the one asked for; see `judged`."""
+        there = np.flatnonzero((found.verdict == PASS) & (found["margin"] >= self.least_margin))
+        if not len(there):
+            return found
+        left = 1.0 - self.least_margin
+        reduced = replace(
+            self,
+            control=self.control._replace(theta_limit=left * self.control.theta_limit),
+            limits=self.limits._replace(rotation=left * self.limits.rotation),
+            only=("verdict", "reason"),
+            least_margin=0.0,
+        )
+        margin = found["margin"].copy()
+        margin[there[reduced.judged(designs.rows(there)).verdict != PASS]] = np.nextafter(self.least_margin, 0.0)
+        return replace(found, columns=found.columns | {"margin": margin})
 
     def _once(self, designs: Designs, control: Control) -> Judged:
         """Simulate and judge designs once."""

@@ -108,7 +108,7 @@ def _sampled(sweep: Sweep, count: int) -> tuple[DesignBlock, np.ndarray]:
 
 
 def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
-    """Simulate designs in pieces, so that an interruption need not wait long."""
+    """Simulate designs in pieces, so that an interruption takes effect soon."""
     one_by_one = control.elements or designs.laws or isinstance(designs.table, LayeredTable)
     size = AT_ONCE if one_by_one else AT_ONCE_CLOSED
     rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]

@@ -11,7 +11,7 @@ import numpy as np
 
 from boulder_kernels import Control
 from boulder_sweep.columns import REASONS
-from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, finer_step_s
 from boulder_sweep.judge.judged import NUMERICAL_ERROR, Judged
 from boulder_sweep.judge.verdict import STEP_REASONS
 
@@ -48,7 +48,7 @@ def finer_controls(control: Control) -> Iterator[Control]:
 
 def reported_step_s(control: Control) -> float:
     """Return the step of the solution that is reported [s]."""
-    return 0.5 * control.h if control.error_estimate else control.h
+    return finer_step_s(control.h) if control.error_estimate else control.h
 
 
 def is_open(judged: Judged, control: Control) -> np.ndarray:

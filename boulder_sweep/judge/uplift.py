@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from boulder_kernels import DesignTable
@@ -21,8 +23,8 @@ def side_friction(table: DesignTable) -> np.ndarray:
     table
         n designs, SI.
     """
-    at_rest = 1.0 - np.sin(table.phi)
-    return at_rest * np.tan(WALL_FRICTION * table.phi) * table.rho_s * G * table.d**2 * table.L
+    coefficient = run_by_run(lambda phi: (1.0 - np.sin(phi)) * np.tan(WALL_FRICTION * phi), table.phi)
+    return coefficient * table.rho_s * G * table.d**2 * table.L
 
 
 def blow_lift(F_v: np.ndarray, table: DesignTable) -> np.ndarray:
@@ -43,3 +45,20 @@ def blow_lift(F_v: np.ndarray, table: DesignTable) -> np.ndarray:
     weight = table.rho_b * table.L * table.W * table.H * G
     turned = F_v * (table.e + table.d) * 1.5 * table.L / (table.L**2 + table.H**2)
     return turned / (weight + side_friction(table))
+
+
+def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray) -> np.ndarray:
+    """Return a function of n values, computed once for neighbours that are equal.
+
+    Parameters
+    ----------
+    function
+        Takes values and returns numbers for each, along the last axis.
+    column
+        Values of shape (n,), such as those of a soil: from one design of a grid to the next they seldom change.
+    """
+    starts = np.flatnonzero(column[1:] != column[:-1]) + 1
+    if 4 * len(starts) >= len(column):
+        return function(column)
+    starts = np.concatenate([[0], starts])
+    return np.repeat(function(column[starts]), np.diff(starts, append=len(column)), axis=-1)

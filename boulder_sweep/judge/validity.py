@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Status
-from boulder_sweep.judge.uplift import blow_lift
+from boulder_sweep.judge.uplift import blow_lift, run_by_run
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.notes import FAMILY_FACTOR, off_families
+from boulder_sweep.settings.notes import FAMILY_FACTOR, family_bounds
 
 TESTED_WIDTH_OVER_DEPTH = 0.85
 """Width over embedment depth of the boulders tested: 0.847 and 0.828."""
@@ -67,7 +67,7 @@ def usual_range(name: str) -> tuple[float, float]:
     return usual.low * (1.0 - 1e-9), usual.high * (1.0 + 1e-9)
 
 
-def _outside(values: np.ndarray, low: float, high: float) -> np.ndarray:
+def _outside(values: np.ndarray, low: float | np.ndarray, high: float | np.ndarray) -> np.ndarray:
     return (values < low) | (values > high)
 
 
@@ -132,7 +132,9 @@ FLAGS = (
         f"angle divided by {FAMILY_FACTOR:g}",
         "Friction angle and subgrade reaction of one soil rise together. The paper's own pair lies on the API curve. "
         "The factor is a judgement.",
-        lambda facts: off_families(np.degrees(facts.designs.table.phi), facts.designs.table.beta),
+        lambda facts: _outside(
+            facts.designs.table.beta, *run_by_run(lambda phi: family_bounds(np.degrees(phi)), facts.designs.table.phi)
+        ),
     ),
     Flag(
         "overlap",
@@ -164,16 +166,16 @@ BY_FLAG = {flag.name: flag for flag in FLAGS}
 
 def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return the column ``validity`` of n rows: codes, and the words they stand for."""
-    bits = np.zeros(len(facts.verdict), dtype=np.intp)
+    bits = np.zeros(len(facts.verdict), dtype=np.uint16)
     for place, flag in enumerate(FLAGS):
-        bits |= flag.raised(facts).astype(np.intp) << place
+        bits |= flag.raised(facts).astype(np.uint16) << place
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))
     codes = np.zeros(1 << len(FLAGS), dtype=np.int32)
     for mask, word in words.items():
         codes[mask] = named.index(word)
-    return codes[bits], named
+    return codes.take(bits), named
 
 
 def meanings(word: str) -> list[str]:

@@ -34,6 +34,7 @@ from boulder_sweep.judge.judged import (
     FAIL,
     HORIZON,
     NO_CONTACT,
+    NO_REASON,
     NUMERICAL_ERROR,
     OVERRIDE,
     OVERTURNS,
@@ -164,7 +165,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
     """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
     no_contact = status == Status.NO_CONTACT
-    simulated = np.isin(status, SIMULATED)
+    simulated = _is_one_of(status, SIMULATED)
     finite = np.ones(status.shape, dtype=bool)
     for maximum in (
         outcomes.theta_max,
@@ -182,7 +183,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
     penetration = outcomes.x_v_max - designs.bed_offset - designs.table.L
     too_deep = standing & (penetration > limits.penetration)
     without_proof = (Status.HORIZON, Status.OUTWARD, *((Status.UNPROVABLE,) if limits.proved else ()))
-    unproved = standing & np.isin(status, without_proof)
+    unproved = standing & _is_one_of(status, without_proof)
     crushed = standing & (outcomes.crush_max > designs.bed_offset)
     overlap = designs.table.H - designs.table.d - designs.table.e_bumper
     slight = standing & (overlap < limits.min_overlap)
@@ -190,10 +191,8 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
         np.minimum(limits.penetration - penetration, designs.bed_offset - outcomes.crush_max) < outcomes.x_error
     )
 
-    reason, reasons = _error_reasons(status, simulated & ~finite)
-    verdict = np.where(reason >= len(REASONS), ERROR, PASS).astype(np.int32)
     # Mildest rule first, so that the worst one stays.
-    for rows, kind, why in (
+    rules = (
         (standing & unsure, UNDECIDED, NUMERICAL_ERROR),
         (unproved, UNDECIDED, HORIZON),
         (slight, UNDECIDED, OVERRIDE),
@@ -201,9 +200,17 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
         (too_deep, FAIL, PENETRATION),
         (overturned, FAIL, OVERTURNS),
         (no_contact, FAIL, NO_CONTACT),
-    ):
-        verdict[rows] = kind
-        reason[rows] = why
+    )
+    rule = np.zeros(status.shape, dtype=np.uint8)
+    for number, (rows, _, _) in enumerate(rules, start=1):
+        np.maximum(rule, rows * np.uint8(number), out=rule)
+    verdict = np.array([PASS, *(kind for _, kind, _ in rules)], dtype=np.int32).take(rule)
+    reason = np.array([NO_REASON, *(why for _, _, why in rules)], dtype=np.int32).take(rule)
+    failed = ~(computed | no_contact)
+    reasons: tuple[str, ...] = REASONS
+    if failed.any():
+        verdict[failed] = ERROR
+        reason[failed], reasons = _error_reasons(status[failed], (simulated & ~finite)[failed])
     rated = standing & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
     return Facts(
         outcomes=outcomes,
@@ -246,21 +253,26 @@ def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
     )
 
 
+def _is_one_of(status: np.ndarray, kinds: tuple[Status, ...]) -> np.ndarray:
+    """Which rows ended in one of some ways, bool; many times as fast as `numpy.isin` for so few."""
+    return np.logical_or.reduce([status == kind for kind in kinds])
+
+
 def _ratings(penetration: np.ndarray) -> np.ndarray:
-    """Code of the best rating that each penetration [m] achieves; -1 beyond the last."""
-    bounds = np.array([PENETRATION_LIMITS_M[rating] for rating in RATINGS])
-    codes = np.searchsorted(bounds, penetration, side="left")
-    return np.where(codes < len(RATINGS), codes, -1).astype(np.int32)
+    """Code of the best rating that each penetration [m] achieves; -1 beyond the last and for NaN."""
+    codes = np.zeros(penetration.shape, dtype=np.int32)
+    for rating in RATINGS:
+        codes += ~(penetration <= PENETRATION_LIMITS_M[rating])
+    codes[codes == len(RATINGS)] = -1
+    return codes
 
 
 def _error_reasons(status: np.ndarray, not_finite: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Reason codes with the rows that could not be computed filled in, and the reasons they index."""
+    """Reason codes of rows that could not be computed, and the reasons they index."""
     texts = {int(kind): text for kind, text in STATUS_REASONS.items()}
-    computed = {int(kind) for kind in Status} - set(texts)
     rows = {
         texts.get(int(kind), f"the kernels ended with the unknown status {kind}"): status == kind
-        for kind in np.unique(status)
-        if int(kind) not in computed
+        for kind in np.unique(status[~not_finite])
     }
     if not_finite.any():
         rows[NOT_FINITE] = not_finite

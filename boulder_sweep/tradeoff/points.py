@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_kernels import OutcomeTable, Status
+from boulder_kernels.impact import STEP_RATIO
 from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ class Method(NamedTuple):
     locate_yield: bool
     """Whether steps end where the soil yields."""
     error_estimate: bool
-    """Whether a second solution by half the step is reported, and its difference from the first as the error."""
+    """Whether a second solution by a third of the step is reported, and its difference from the first as the error."""
 
     @property
     def is_plain(self) -> bool:
@@ -46,8 +47,13 @@ class Method(NamedTuple):
     @property
     def steps(self) -> str:
         """Steps in words."""
-        steps = f"{self.step_ms:g} + {0.5 * self.step_ms:g} ms" if self.error_estimate else f"{self.step_ms:g} ms"
+        steps = f"{self.step_ms:g} + {self.finer_step_ms:g} ms" if self.error_estimate else f"{self.step_ms:g} ms"
         return f"{steps}, yield located" if self.locate_yield else steps
+
+    @property
+    def finer_step_ms(self) -> float:
+        """Step of the second solution, where there is one [ms]."""
+        return self.step_ms / STEP_RATIO
 
 
 @dataclass

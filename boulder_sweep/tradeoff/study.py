@@ -37,7 +37,9 @@ DESIGNS = 4096
 """Designs of the sample."""
 STEPS_MS = (16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
 STEPS_LOCATED_MS = (8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
-STEPS_WITH_ERROR_MS = (12.0, 8.0, 6.0, 4.0, 2.0)
+STEPS_WITH_ERROR_MS = (18.0, 12.0, 9.0, 6.0, 3.0)
+STEPS_LOCATED_WITH_ERROR_MS = (12.0, 9.0, 6.0, 4.5, 3.0, 1.5, 0.75)
+"""With an error estimate the longer steps of the two solutions [ms]."""
 STEPS_OF_SUMS_MS = (12.0, 4.0, 2.0)
 ELEMENTS = (50, 200, 1000, 5000)
 REFERENCE_STEP_S = 5e-5
@@ -126,16 +128,25 @@ class Tradeoff:
     def _advice(self, wanted_deg: float) -> str:
         """Say what to use for an accuracy [deg]."""
         guarded, plain = (self.best(wanted_deg, error_estimate=estimate) for estimate in (True, False))
+        more = ""
+        if plain is not None:
+            more = f"; without one, solver: {{step: {plain.method.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
         if guarded is None:
-            return "no measured step is short enough"
+            return f"{self._none_guarded(plain)}{more}"
         ask = guarded.accuracy or f"{_rounded_up(guarded.estimated_p99_9_deg):g} deg"
-        text = (
+        return (
             f"use solver: {{accuracy: {ask}}} (steps of {guarded.method.steps}): {guarded.cpu_us:.3g} us a design, "
             f"{_duration(guarded, self.sweep.n_designs)} for this grid on one core, with an error for every design"
+            f"{more}"
         )
-        if plain is not None:
-            text += f"; without one, solver: {{step: {plain.method.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
-        return text
+
+    def _none_guarded(self, plain: Point | None) -> str:
+        """Say why no method with an error estimate can be named, where `plain` steps suffice or none (None)."""
+        if any(method.error_estimate and method.readings == self.own_readings for method in self.left_out):
+            measured = any(point.method.error_estimate for point in self._own())
+            which = "accurate enough " if measured else ""
+            return f"no method with an error estimate {which}was measured in the time; allow more --seconds"
+        return "no measured step is short enough" if plain is None else "no step with an error estimate is short enough"
 
     def table(self) -> pa.Table:
         """Return one row for every method."""
@@ -255,7 +266,7 @@ def _methods(readings: str) -> Iterator[Method]:
     yield from (Method(readings, 0, step, False, False) for step in STEPS_MS)
     yield from (Method(readings, 0, step, True, False) for step in STEPS_LOCATED_MS)
     yield from (Method(readings, 0, step, False, True) for step in STEPS_WITH_ERROR_MS)
-    yield from (Method(readings, 0, step, True, True) for step in STEPS_LOCATED_MS)
+    yield from (Method(readings, 0, step, True, True) for step in STEPS_LOCATED_WITH_ERROR_MS)
     yield from (Method(readings, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
 
 

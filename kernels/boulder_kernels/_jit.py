@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import functools
 import hashlib
 import os
@@ -30,12 +31,16 @@ import stat
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding
 import numba
+from numba.core.caching import FunctionCache
+from numba.core.runtime._nrt_python import c_helpers
+
+from ._compiler import InsideCompiler, KernelCompiler
 
 SETTINGS: Any = numba.config
 """Numba's settings, which it fills in at run time."""
@@ -124,7 +129,7 @@ def _own_folder(folder: Path) -> Path:
 CACHE_FOLDER = _cache_folder()
 INSIDE = "inside"
 """Folder within it for kernels as other kernels call them, without what a call from Python needs."""
-_DECORATING = threading.Lock()
+_LOOKING = threading.Lock()
 
 
 def _ask_for_wide_vectors() -> None:
@@ -148,22 +153,73 @@ def _compiled(
 ) -> Callable[..., Any]:
     """Decorate one function, its cache in this package's folder."""
     options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
-    options |= {"cache": CACHE_FOLDER is not None, "fastmath": fastmath, "forceinline": inline}
+    options |= {"fastmath": fastmath, "forceinline": inline}
     options |= {} if arrays else {"_nrt": False}
     if SETTINGS.DISABLE_JIT:
         return function
     return _compiled_in_two_ways(function, options)
 
 
-def _decorated(function: Callable[..., Any], options: dict[str, Any], folder: str) -> Any:
+class _Files:
+    """The compiled code of one function on disk, in place of Numba's cache, of which it makes one when it is asked.
+
+    Numba looks for the folder of every function that is decorated, and makes its compiler ready before it loads
+    anything. Of a start that compiles nothing that is a third.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: str):
+        self._function, self._folder = function, folder
+
+    @functools.cached_property
+    def _cache(self) -> Any:
+        with _LOOKING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
+            before = SETTINGS.CACHE_DIR
+            SETTINGS.CACHE_DIR = self._folder
+            try:
+                return FunctionCache(self._function)
+            finally:
+                SETTINGS.CACHE_DIR = before
+
+    @property
+    def cache_path(self) -> str:
+        """Folder of the files, for Numba's statistics."""
+        return self._cache.cache_path
+
+    def load_overload(self, types: Any, context: Any) -> Any:
+        """Return the code for arguments of some types; None where there is none: the compiler makes itself ready."""
+        for name, address in c_helpers.items():  # what makes arrays
+            llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+        return self._cache._load_overload(types, context)
+
+    def save_overload(self, types: Any, compiled: Any) -> None:
+        """Keep the code for arguments of some types.
+
+        One process at a time: Numba looks for a free number, and of two that do so at once, each for other types, both
+        would take the same. One of the two would then find the other's code under its own types at every later start.
+        """
+        with _alone(Path(CACHE_FOLDER or "") / "lock"):
+            self._cache.save_overload(types, compiled)
+
+
+@contextlib.contextmanager
+def _alone(file: Path) -> Iterator[None]:
+    """Keep other processes waiting that ask for the same file, where the file system has locks."""
+    with contextlib.ExitStack() as kept:
+        with contextlib.suppress(OSError):
+            lock = kept.enter_context(file.open("a"))
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            # A process forked meanwhile has the file open, too, and would keep the lock beyond its closing here.
+            kept.callback(fcntl.flock, lock, fcntl.LOCK_UN)
+        yield
+
+
+def _decorated(function: Callable[..., Any], options: dict[str, Any], folder: str, compiler: type[Any]) -> Any:
     """Decorate a function, its compiled code in a folder."""
-    with _DECORATING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
-        before = SETTINGS.CACHE_DIR
-        SETTINGS.CACHE_DIR = folder
-        try:
-            return numba.njit(**options)(function)
-        finally:
-            SETTINGS.CACHE_DIR = before
+    decorated = numba.njit(pipeline_class=compiler, **options)(function)
+    if CACHE_FOLDER is not None:
+        decorated._cache = _Files(function, folder)
+        decorated._compilation_chain_init_hook = lambda: None  # looks for extensions, as the compiler does itself
+    return decorated
 
 
 def _compiled_in_two_ways(function: Callable[..., Any], options: dict[str, Any]) -> Any:
@@ -173,9 +229,9 @@ def _compiled_in_two_ways(function: Callable[..., Any], options: dict[str, Any])
     their wrappers would be a third of the work. What Python calls is left to a second dispatcher of the same function.
     """
     folder = Path(CACHE_FOLDER or "")
-    inside = _decorated(function, options | {"no_cpython_wrapper": True}, str(folder / INSIDE))
+    inside = _decorated(function, options | {"no_cpython_wrapper": True}, str(folder / INSIDE), InsideCompiler)
     inside.targetoptions = options
-    called = functools.cache(lambda: _decorated(function, options, str(folder)))
+    called = functools.cache(lambda: _decorated(function, options, str(folder), KernelCompiler))
     take_over = inside.add_overload
 
     def keep(compiled: Any) -> None:

@@ -107,7 +107,13 @@ def turned_back(y: State, y_end: State) -> bool:
 
 @inlined
 def passes(
-    y: State, y_end: State, k_end: Acceleration, g: GapFactors, switches: Switches, c: Constants
+    y: State,
+    y_end: State,
+    k_end: Acceleration,
+    g: GapFactors,
+    switches: Switches,
+    c: Constants,
+    beyond: float,
 ) -> tuple[bool, Compression]:
     """Whether a step meets no event and turns nowhere, so that it may be kept as it is; and the compression at its end.
 
@@ -118,6 +124,8 @@ def passes(
         is not a number does not pass.
     g, switches, c
         The step.
+    beyond
+        By how much the net moment may exceed the couple of the weight of a boulder that is seated [N m]; else 0.
     """
     sin, versin = sine_versine(y_end.theta_b)
     end = compression_of(y_end, sin, versin, switches, c)
@@ -126,7 +134,7 @@ def passes(
     gaps = gaps_of(k.A, k.slope_x, y_end.theta_b, y_end.omega_b, end.u, k_end.M, arm, g, c)
     plain = (
         (gaps.contact >= 0.0)
-        & (gaps.rotation >= 0.0)
+        & (gaps.rotation >= -beyond)
         & (gaps.couple >= 0.0)
         & (gaps.corner >= 0.0)
         & (gaps.arm >= 0.0)
@@ -283,9 +291,11 @@ def decide(
     if kept.event == LIMIT:
         status = Status.LIMIT.value
     elif ending.stopping and ending.provable and y.v_v <= 0.0:
-        if turned_back(y_start, y):
+        # At one of its maxima a motion has yet to turn back, and the barrier will be another then.
+        inside = inside_maxima(y, m)
+        if inside and turned_back(y_start, y):
             barrier = barrier_energy(m, c)
-        if inside_maxima(y, m) and boulder_energy(y, c) < barrier:
+        if inside and boulder_energy(y, c) < barrier:
             status = Status.SETTLED.value
     if status == RUNNING and t >= horizon:
         status = horizon_status(y, m, ending, c)

@@ -6,15 +6,16 @@ away from the truck; alpha is the depth below the soil line, 0 ... d.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
+from numba import types
+from numba.extending import lower_builtin, type_callable
 
-from ._jit import exact_inlined, exact_kernel, function_of
+from ._jit import exact_inlined
 from .readings import Readings
+from .trigonometry import direction, half_tangent
 
 G = 9.80665
 """Standard gravity [m/s^2]."""
@@ -85,11 +86,27 @@ def design_in(designs: np.ndarray, row: int) -> Design:
     return Design(*designs[:, row])
 
 
-@overload(design_in, inline="always", strict=False)
-def _design_in(designs: Any, row: Any) -> Callable[..., Any]:
-    """Write out every field: one array is counted once where a tuple of them is counted at every call."""
-    values = ", ".join(f"designs[{i}, row]" for i in range(len(Design._fields)))
-    return function_of(f"def design_in(designs, row):\n return Design({values})", Design=Design)
+# Inside kernels it is one load for every field: an index that need not be checked lets a loop over rows be vectorised.
+
+
+@type_callable(design_in)
+def _type_design_in(context: Any) -> Callable[..., Any]:
+    def result(designs: Any, row: Any) -> Any:
+        """Return the type of the result, or None where a column is not one piece of memory."""
+        return types.NamedUniTuple(designs.dtype, len(Design._fields), Design) if designs.layout == "C" else None
+
+    return result
+
+
+@lower_builtin(design_in, types.Array, types.Any)
+def _lower_design_in(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    designs = context.make_array(sig.args[0])(context, builder, args[0])
+    columns = builder.extract_value(designs.shape, 1)
+    place, numbers = context.cast(builder, args[1], sig.args[1], types.intp), []
+    for _ in Design._fields:
+        numbers.append(builder.load(builder.gep(designs.data, [place], inbounds=True)))
+        place = builder.add(place, columns)
+    return context.make_tuple(builder, sig.return_type, numbers)
 
 
 class Constants(NamedTuple):
@@ -145,38 +162,33 @@ class Constants(NamedTuple):
     """Compression at which the vehicle's spring exerts no force [m]: 0, but for a vehicle on its second spring."""
 
 
-@exact_kernel
-def shear_wedge_angle(phi: float) -> float:
-    """Angle theta_w of the wedge of soil that moves with the boulder [rad] (Eq 1)."""
-    return 0.25 * math.pi + 0.5 * phi
+@exact_inlined
+def wedge_slope(phi: float) -> float:
+    """Tangent of the angle theta_w = pi/4 + phi/2 of the wedge of soil that moves with the boulder [-] (Eq 1)."""
+    half = half_tangent(phi)
+    return (1.0 + half) / (1.0 - half)
 
 
-@exact_kernel
+@exact_inlined
 def element_depth(n: int, d: float, elements: int) -> float:
     """Depth alpha_n of the middle of element n = 1 ... N below the soil line [m] (Eq 24)."""
     return (n - 0.5) * d / elements
 
 
-@exact_kernel
+@exact_inlined
 def element_mass(n: int, design: Design, elements: int) -> float:
     """Mass m_n of soil element n = 1 ... N [kg] (Eq 2)."""
     h_e = design.d / elements
-    return (
-        design.rho_s
-        * design.W
-        * h_e
-        * math.tan(shear_wedge_angle(design.phi))
-        * (design.d - element_depth(n, design.d, elements))
-    )
+    return design.rho_s * design.W * h_e * wedge_slope(design.phi) * (design.d - element_depth(n, design.d, elements))
 
 
-@exact_kernel
+@exact_inlined
 def boulder_mass(design: Design) -> float:
     """Mass m_b of the boulder [kg] (Eq 15)."""
     return design.rho_b * design.L * design.W * design.H
 
 
-@exact_kernel
+@exact_inlined
 def boulder_inertia(design: Design, m_b: float, c_x: float, c_y: float, box: bool) -> float:
     """Moment of inertia J_b of the boulder about the common centre of mass [kg m^2] (Eq 16).
 
@@ -201,7 +213,7 @@ class SoilMass(NamedTuple):
     """Sum of m_n times height over the base, squared [kg m^2] (for Eq 13)."""
 
 
-@exact_kernel
+@exact_inlined
 def soil_mass(design: Design, elements: int) -> SoilMass:
     """Sums of Eqs 3, 4 and 13 over the soil elements, or their limits for N -> infinity.
 
@@ -214,7 +226,7 @@ def soil_mass(design: Design, elements: int) -> SoilMass:
     """
     if elements == 0:
         d = design.d
-        mass = design.rho_s * design.W * math.tan(shear_wedge_angle(design.phi)) * 0.5 * d * d
+        mass = design.rho_s * design.W * wedge_slope(design.phi) * 0.5 * d * d
         return SoilMass(mass, mass * (2.0 / 3.0) * d, mass * 0.5 * d * d)
     mass = first = second = 0.0
     for n in range(1, elements + 1):
@@ -226,25 +238,26 @@ def soil_mass(design: Design, elements: int) -> SoilMass:
     return SoilMass(mass, first, second)
 
 
-@exact_kernel
+@exact_inlined
 def passive_pressure_coefficient(phi: float) -> float:
-    """Rankine coefficient of passive earth pressure K_p [-] (with Eq 27)."""
-    return math.tan(0.25 * math.pi + 0.5 * phi) ** 2
+    """Rankine coefficient of passive earth pressure K_p, the square of tan(pi/4 + phi/2) [-] (with Eq 27)."""
+    return wedge_slope(phi) ** 2
 
 
-@exact_kernel
+@exact_inlined
 def ultimate_pressure(alpha: float, phi: float, rho_s: float, K_epsilon: float) -> float:
     """Ultimate lateral pressure sigma of the soil at depth alpha [Pa] (Eq 27)."""
     return passive_pressure_coefficient(phi) ** 2 * rho_s * G * alpha * K_epsilon
 
 
-@exact_kernel
+@exact_inlined
 def compression_wedge_length(d: float, phi: float) -> float:
     """Length L_soil,c of the wedge of soil that is compressed [m] (Eq 25)."""
-    return d / math.tan(phi)
+    half = half_tangent(phi)
+    return d * (1.0 - half * half) / (2.0 * half)
 
 
-@exact_kernel
+@exact_inlined
 def spring_per_depth(design: Design) -> float:
     """Spring of a soil element of unit height per metre of its depth [N/m^3] (Eqs 24, 25).
 
@@ -253,13 +266,13 @@ def spring_per_depth(design: Design) -> float:
     return 1e6 * design.beta * design.W / compression_wedge_length(design.d, design.phi)
 
 
-@exact_kernel
+@exact_inlined
 def ultimate_per_depth(design: Design) -> float:
     """Ultimate resistance of a soil element of unit height per metre of its depth [N/m^2] (Eqs 26, 27)."""
     return ultimate_pressure(1.0, design.phi, design.rho_s, design.K_epsilon) * design.W
 
 
-@exact_kernel
+@exact_inlined
 def yield_displacement(design: Design) -> float:
     """Displacement at which a soil element reaches its ultimate resistance [m] (Eqs 26-28).
 
@@ -301,7 +314,7 @@ def constants_with(
         theta_corner = np.inf
     else:
         C_cos, C_sin = m_b * G * d_N, m_b * G * l_n
-        theta_corner = math.atan2(l_n, d_N)
+        theta_corner = direction(d_N, l_n)
     return Constants(
         m_eff,
         J_eff,
@@ -330,7 +343,7 @@ def constants_with(
     )
 
 
-@exact_kernel
+@exact_inlined
 def constants_of(design: Design, readings: Readings, elements: int) -> Constants:
     """Constants of the motion of one design (Eqs 1-16, 24-28).
 

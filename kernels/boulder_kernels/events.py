@@ -40,6 +40,8 @@ TOLERANCE = 1e-3
 square; where they jump, Newton's method follows."""
 EDGE_TOLERANCE = 1e-5
 """The same as printed, where several events lie close together and a motion may graze one of them."""
+AT_END = 0.3
+"""An event that lies before the end of the step by less than this share of the precision is taken to be at the end."""
 NEWTON_TOLERANCE = 1e-6
 """Last correction of a root by Newton's method, as a fraction of the step: its square is what is left."""
 JUST_AFTER = 1e-3
@@ -149,6 +151,7 @@ def begin_search(start: Gaps, weights: Gaps, tolerance: float) -> tuple[Bracket,
     f_low, _ = least_gap(start, weights)
     b = Bracket(0.0, f_low, 1.0, -1.0, 0.0)
     tau = next_guess(b) if f_low > 0.0 else JUST_AFTER
+    tau = 1.0 if tau > 1.0 - AT_END * tolerance else tau
     return b, tau, (f_low < NEVER) & (1.0 - tau > tolerance)
 
 

@@ -32,6 +32,7 @@ from .events import NONE, SHORTEN, locate_limit
 from .layered import constants_in
 from .memory import ELASTIC
 from .modes import Modes, Switches
+from .onset import first_length
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
 from .readings import Readings
 from .second_spring import (
@@ -57,6 +58,10 @@ ATTEMPTS_SPARE = 10_000
 """A simulation gives up after ATTEMPTS_PER_STEP attempts per nominal step, plus this many for events."""
 
 
+STEP_RATIO = 3.0
+"""Step of the coarser of the two solutions that an error is estimated from, over that of the finer."""
+
+
 class Control(NamedTuple):
     """How a simulation is run."""
 
@@ -75,9 +80,9 @@ class Control(NamedTuple):
     locate_yield: bool = False
     """Whether steps also end where the soil reaches its ultimate resistance. The force has a kink there: a step that
     runs across it is of third order only. Locating it restores the fifth, and pays for errors below about 1e-4 deg."""
-    halved: bool = False
-    """Whether the step of every design is halved, after any shortening: the finer of the two solutions that the error
-    is estimated from."""
+    refined: bool = False
+    """Whether the step of every design is divided by `STEP_RATIO`, after any shortening: the finer of the two
+    solutions that the error is estimated from."""
     longest_horizon: float = 0.0
     """Simulated time [s] up to which a design goes on that reaches the horizon without proof that it stays below its
     limits; not beyond the horizon where it is shorter, or where nothing stops at the limit."""
@@ -175,13 +180,13 @@ def first_step(control: Control, theta_stop: float, c: Constants) -> tuple[float
     rates = rates_of(theta_stop, c)
     h = min(control.h, stable_step(rates))
     status = refusal(h, control.h, control.horizon, rates)
-    return 0.5 * h if control.halved else h, status
+    return h / STEP_RATIO if control.refined else h, status
 
 
 @kernel
 def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
     """What ends the simulation of a design by steps of a given length [s]; no design takes more than MOST_STEPS."""
-    most = (2 if control.halved else 1) * MOST_STEPS * h_full
+    most = (STEP_RATIO if control.refined else 1.0) * MOST_STEPS * h_full
     longest = control.horizon
     if control.stop_at_limit:
         longest = max(longest, min(control.longest_horizon, most))
@@ -297,14 +302,14 @@ def simulate_by_steps(
     written = 0
     t, t_limit = 0.0, np.nan
     attempts = 0
-    h_next = h_full
+    h_next = first_length(h_full, factors, c)
     barrier, horizon = NO_PROOF, control.horizon
     latest, stiffening = 1.0, True
     while attempts < budget:
         attempts += 1
         h = min(h_next, horizon - t)
         y_end, k_end = step(y, k1, h, switches, c)
-        passing, end = passes(y, y_end, k_end, factors, switches, c)
+        passing, end = passes(y, y_end, k_end, factors, switches, c, 0.0)
         if second is not None and stiffening:
             crush, latest = largest_crush(start, end, h)
             passing = passing and crush < second.s_2

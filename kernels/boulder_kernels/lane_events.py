@@ -56,6 +56,7 @@ from .workspace import (
     TIME,
     TRUCK,
     WEIGHTS,
+    align_stack,
     field,
     load,
     put,
@@ -72,6 +73,7 @@ def motion_within(ws: np.ndarray, lane: int) -> DenseOutput:
 @kernel
 def begin_searches(ws: np.ndarray, locate_yield: bool) -> None:
     """Work out the motion within every step, and begin the search for its first event."""
+    align_stack()
     for lane in range(LANES):
         c, g = load(ws, CONSTANTS, lane), load(ws, FACTORS, lane)
         y, k = load(ws, STATE, lane), load(ws, START, lane)
@@ -93,6 +95,7 @@ def begin_searches(ws: np.ndarray, locate_yield: bool) -> None:
 @kernel
 def search_on(ws: np.ndarray) -> None:
     """Narrow the bracket of every search that is open."""
+    align_stack()
     for lane in range(LANES):
         c, s, g = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane), load(ws, FACTORS, lane)
         tau = field(ws, TAU, lane)
@@ -117,6 +120,7 @@ def is_open(ws: np.ndarray, count: int) -> bool:
 @kernel
 def keep_steps(ws: np.ndarray) -> None:
     """Keep every step up to its first event; the state kept takes the place of that at the end of the step."""
+    align_stack()
     for lane in range(LANES):
         c, s = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane)
         dense, start = motion_within(ws, lane), load(ws, COMPRESSION, lane)
@@ -191,6 +195,7 @@ def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, loca
 @kernel
 def start_steps(ws: np.ndarray) -> None:
     """Work out what every next step starts with: its acceleration, anew after an event, and its compression."""
+    align_stack()
     for lane in range(LANES):
         c, s = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane)
         y, k_end = load(ws, STATE, lane), load(ws, END, lane)

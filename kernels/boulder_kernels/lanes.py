@@ -3,8 +3,9 @@
 All groups of lanes are stepped in turn (`boulder_kernels.lane_steps`). A lane whose step needs more than to be accepted
 hands its design over to a group of events and goes on with another at once: one that returns from there, else the next
 of the table, so that no lane waits. A group of events is worked out when it is full (`boulder_kernels.lane_events`);
-there are two, because designs return from one while the other is being filled. What a lane computes does not depend on
-the others, only when and where it does so.
+there are two, because designs return from one while the other is being filled. The next of the table are started side
+by side, too (`boulder_kernels.lane_starts`). What a lane computes does not depend on the others, only when and where it
+does so.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from ._jit import array_kernel, inlined, kernel
 from .after_step import RUNNING
 from .impact import Control, ending_of
 from .lane_events import conclude, start_steps, work_out
-from .lane_steps import attempt_steps, start_lane, take_over_steps, write_lane
+from .lane_starts import start_designs
+from .lane_steps import attempt_steps, take_over_steps, write_lane
 from .outcomes import STATUS, Status, empty_outcomes
 from .readings import Readings
 from .stability import MOST_STEPS, RETRY
@@ -28,6 +30,7 @@ from .workspace import (
     GROUPS,
     LANES,
     SIZE,
+    STARTS,
     STATUS_OF_LANE,
     STEP,
     STEP_FULL,
@@ -40,11 +43,13 @@ from .workspace import (
 EMPTY = -1
 """Row of a lane that holds no design."""
 STEPPED = GROUPS * LANES
-"""Places that are stepped: lanes 0 ... STEPPED - 1. Behind them are those of the two groups of events."""
-BUSY, PENDING, READY, IDLE, SIDE, HANDLED = range(6)
+"""Places that are stepped: lanes 0 ... STEPPED - 1. Behind them are those of the two groups of events, and behind
+those the ones where designs are started."""
+PLACES = STEPPED + 3 * LANES
+BUSY, PENDING, READY, IDLE, SIDE, HANDLED, STARTED = range(7)
 """Among the counts of a `Queue`: lanes with a design; designs in the group of events that is being filled, designs in
-the other one that may return, lanes without a design, which of the groups is being filled, 0 or 1, and how many steps
-have been worked out there in all."""
+the other one that may return, lanes without a design, which of the groups is being filled, 0 or 1, how many steps have
+been worked out there in all, and designs that have been started and wait for a lane."""
 
 
 class Queue(NamedTuple):
@@ -54,6 +59,8 @@ class Queue(NamedTuple):
     """Row of the design at each place or EMPTY, and in the last place the first row not yet started."""
     ready: np.ndarray
     """Places of designs that may return into a lane."""
+    started: np.ndarray
+    """Places of designs that may enter a lane."""
     idle: np.ndarray
     """Lanes without a design."""
     waiting: np.ndarray
@@ -67,10 +74,47 @@ def lane_of(place: int) -> int:
     """Lane of the workspace at a place."""
     if place < STEPPED:
         return (place // LANES) * SIZE + place % LANES
-    return EVENTS + ((place - STEPPED) // LANES) * EVENT_SIZE + place % LANES
+    if place < PLACES - LANES:
+        return EVENTS + ((place - STEPPED) // LANES) * EVENT_SIZE + place % LANES
+    return STARTS + place % LANES
 
 
 @kernel
+def start_more(
+    ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
+) -> None:
+    """Start the next designs of the table, until there are some that need integration; write those that need none.
+
+    Parameters
+    ----------
+    ws, q
+        The workspace and the queue.
+    designs, readings, control, out
+        As of `simulate_lanes`, and its result; of the designs, at least as many as lanes.
+    """
+    while q.counts[STARTED] == 0 and q.rows[-1] < out.shape[1]:
+        first = min(q.rows[-1], designs.shape[1] - LANES)
+        start_designs(ws[STARTS:], designs, first, readings, control, control.h)
+        for row in range(q.rows[-1], min(first + LANES, out.shape[1])):
+            place = PLACES - LANES + row - first
+            status = int(field(ws[STARTS:], STATUS_OF_LANE, row - first))
+            if status == RUNNING:
+                q.rows[place] = row
+                q.started[q.counts[STARTED]] = place
+                q.counts[STARTED] += 1
+            else:
+                out[STATUS, row] = status
+        q.rows[-1] = first + LANES
+
+
+@inlined
+def let_return(ws: np.ndarray, q: Queue, other: int, place: int) -> None:
+    """Move a design from its place in another group into a lane."""
+    copy_lane(ws, lane_of(other), lane_of(place), ATTENTION)
+    q.rows[place] = q.rows[other]
+
+
+@inlined
 def next_design(
     ws: np.ndarray,
     q: Queue,
@@ -80,35 +124,30 @@ def next_design(
     control: Control,
     out: np.ndarray,
 ) -> None:
-    """Put the next design that needs integration into a lane, writing those that need none on the way.
-
-    Parameters
-    ----------
-    ws, q, place
-        The workspace, the queue, and the place of the lane.
-    designs, readings, control, out
-        As of `simulate_lanes`, and its result.
-    """
+    """Put the next design that needs integration into the lane at a place; other arguments as of `start_more`."""
+    if q.counts[STARTED] == 0:
+        start_more(ws, q, designs, readings, control, out)
+    if q.counts[STARTED] > 0:
+        q.counts[STARTED] -= 1
+        let_return(ws, q, q.started[q.counts[STARTED]], place)
+        return
+    # An empty lane stands still: its steps have no length, and their results are ignored.
     lane = lane_of(place)
     q.rows[place] = EMPTY
-    # An empty lane stands still: its steps have no length, and their results are ignored.
     put(ws, STEP, lane, 0.0)
     put(ws, STEP_FULL, lane, 0.0)
-    while q.rows[place] == EMPTY and q.rows[-1] < designs.shape[1]:
-        row = q.rows[-1]
-        q.rows[-1] += 1
-        status = start_lane(ws, lane, designs, row, readings, control, control.h)
-        if status == RUNNING:
-            q.rows[place] = row
-        else:
-            out[STATUS, row] = status
 
 
 @inlined
-def let_return(ws: np.ndarray, q: Queue, other: int, place: int) -> None:
-    """Move a design from its place in a group of events into a lane."""
-    copy_lane(ws, lane_of(other), lane_of(place), ATTENTION)
-    q.rows[place] = q.rows[other]
+def start_again(
+    ws: np.ndarray, lane: int, designs: np.ndarray, row: int, readings: Readings, control: Control, longest: float
+) -> int:
+    """Start a design in a lane of the workspace by steps no longer than given [s]; return its status."""
+    first = min(row, designs.shape[1] - LANES)
+    again = STARTS + EVENT_SIZE
+    start_designs(ws[again:], designs, first, readings, control, longest)
+    copy_lane(ws, again + row - first, lane, ATTENTION)
+    return int(field(ws[again:], STATUS_OF_LANE, row - first))
 
 
 @inlined
@@ -121,7 +160,7 @@ def hand_over(
     control: Control,
     out: np.ndarray,
 ) -> None:
-    """Move a design into the group of events, and let another into its lane; arguments as of `next_design`."""
+    """Move a design into the group of events, and let another into its lane; arguments as of `start_more`."""
     counts = q.counts
     other = STEPPED + counts[SIDE] * LANES + counts[PENDING]
     copy_lane(ws, lane_of(place), lane_of(other), SIZE)
@@ -147,7 +186,7 @@ def handle(
     control: Control,
     out: np.ndarray,
 ) -> None:
-    """Work out what follows from the steps in the group of events; arguments as of `next_design`.
+    """Work out what follows from the steps in the group of events; arguments as of `start_more`.
 
     As many designs as lanes have left since this was last done, so all that were ready then have returned.
     """
@@ -164,7 +203,8 @@ def handle(
         row, h = q.rows[other], field(events, STEP_FULL, k)
         status = int(field(events, STATUS_OF_LANE, k))
         if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
-            status = start_lane(events, k, designs, row, readings, control, RETRY * h)
+            lane = EVENTS + side * EVENT_SIZE + k
+            status = start_again(ws, lane, designs, row, readings, control, RETRY * h)
         if status != RUNNING:
             write_lane(events, k, status, out, row)
         elif counts[IDLE] > 0:
@@ -179,28 +219,24 @@ def handle(
     counts[SIDE] = 1 - side
 
 
-@inlined
-def find_waiting(ws: np.ndarray, q: Queue) -> int:
-    """List the lanes whose step needs more, without a branch, and return how many there are."""
+@kernel
+def step_groups(ws: np.ndarray, q: Queue) -> int:
+    """Attempt a step in all lanes of all groups, accept those that need no more, and list and count the others."""
     count = 0
-    for place in range(STEPPED):
-        q.waiting[count] = place
-        count += int((ws[(place // LANES) * SIZE + place % LANES + ATTENTION] != 0.0) & (q.rows[place] != EMPTY))
+    for group in range(GROUPS):
+        lanes = ws[group * SIZE :]
+        attempt_steps(lanes)
+        if take_over_steps(lanes) > 0:
+            for lane in range(LANES):
+                place = group * LANES + lane
+                q.waiting[count] = place
+                count += int((field(lanes, ATTENTION, lane) != 0.0) & (q.rows[place] != EMPTY))
     return count
 
 
 @kernel
-def step_groups(ws: np.ndarray) -> None:
-    """Attempt a step in all lanes of all groups, and accept those that need no more."""
-    for group in range(GROUPS):
-        lanes = ws[group * SIZE :]
-        attempt_steps(lanes)
-        take_over_steps(lanes)
-
-
-@kernel
 def begin(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
-    """Put the first designs into the lanes of an empty workspace; arguments as of `next_design`."""
+    """Put the first designs into the lanes of an empty workspace; arguments as of `start_more`."""
     for place in range(STEPPED):
         next_design(ws, q, place, designs, readings, control, out)
         if q.rows[place] == EMPTY:
@@ -212,9 +248,8 @@ def begin(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, con
 
 @kernel
 def sweep(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> bool:
-    """Step all lanes once; return whether any design is left. Arguments as of `next_design`."""
-    step_groups(ws)
-    for k in range(find_waiting(ws, q)):
+    """Step all lanes once; return whether any design is left. Arguments as of `start_more`."""
+    for k in range(step_groups(ws, q)):
         hand_over(ws, q, q.waiting[k], designs, readings, control, out)
         if q.counts[PENDING] == LANES:
             handle(ws, q, designs, readings, control, out)
@@ -236,12 +271,26 @@ def empty_workspace() -> np.ndarray:
 def empty_queue() -> Queue:
     """Return the queue before the first design has been started."""
     return Queue(
-        np.zeros(STEPPED + 2 * LANES + 1, np.int64),
+        np.zeros(PLACES + 1, np.int64),
+        np.zeros(LANES, np.int64),
         np.zeros(LANES, np.int64),
         np.zeros(STEPPED, np.int64),
         np.zeros(STEPPED, np.int64),
-        np.zeros(6, np.int64),
+        np.zeros(STARTED + 1, np.int64),
     )
+
+
+@array_kernel
+def filled_up(designs: np.ndarray) -> np.ndarray:
+    """Return designs that are at least as many as lanes, the last one repeated where they are fewer."""
+    count, last = designs.shape
+    if last >= LANES:
+        return designs
+    more = np.empty((count, LANES))
+    for i in range(count):
+        for lane in range(LANES):
+            more[i, lane] = designs[i, min(lane, last - 1)]
+    return more
 
 
 @array_kernel
@@ -263,6 +312,9 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
         Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
     """
     out = empty_outcomes(designs.shape[1])
+    if designs.shape[1] == 0:
+        return out
+    designs = filled_up(designs)
     ws, q = empty_workspace(), empty_queue()
     begin(ws, q, designs, readings, control, out)
     while sweep(ws, q, designs, readings, control, out):

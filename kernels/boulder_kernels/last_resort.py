@@ -7,14 +7,24 @@ Three things make such designs affordable.
 3. A spring that relaxes against its damper faster than the steps can follow passes on the force of the damper, however
    stiff it is: F = c_v times the speed of crush, with an error of the order of the relaxation time c_v/k_v over that of
    the impact. So a softer spring stands for it, which relaxes within a step, and at least `DAMPED` times as fast as the
-   damper slows the masses. Half the step comes with a spring twice as stiff, so the estimated error covers the spring.
+   damper slows the masses. A third of the step comes with a spring three times as stiff, so the estimated error covers
+   the spring.
 """
 
 from __future__ import annotations
 
 from ._jit import kernel
 from .design import Constants, Design, constants_of, is_computable
-from .impact import Control, Outcome, Record, failed, first_step, simulate_by_steps, simulate_on_springs
+from .impact import (
+    STEP_RATIO,
+    Control,
+    Outcome,
+    Record,
+    failed,
+    first_step,
+    simulate_by_steps,
+    simulate_on_springs,
+)
 from .outcomes import Status
 from .readings import Readings
 from .second_spring import SecondSpring, is_second_spring, stiffest, times, with_spring
@@ -33,7 +43,7 @@ NO_SPRING = 1e-12
 def spring_to_follow(r: Rates, control: Control) -> float:
     """Factor on a spring that leaves it no faster than the steps can follow."""
     slowing = r.truck / r.relaxation  # c_v over the masses
-    fastest = (2.0 if control.halved else 1.0) * max(1.0 / control.h, DAMPED * slowing)
+    fastest = (STEP_RATIO if control.refined else 1.0) * max(1.0 / control.h, DAMPED * slowing)
     return min(1.0, fastest / r.relaxation)
 
 
@@ -80,8 +90,8 @@ def last_resort_on_springs(
     softer = times(second, factor)
     c = constants_of(with_spring(design, min(1.0, factor * (c.k_v / design.k_v))), readings, control.elements)
     apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)
-    part = 0.5 if control.halved else 1.0
-    h = part * min(control.h, RESOLVED * longest_step(control.theta_limit, stiffest(c, softer)))
-    h_apart = part * min(control.h, longest_step(control.theta_limit, apart)) if readings.separation_released else h
+    ratio = STEP_RATIO if control.refined else 1.0
+    h = min(control.h, RESOLVED * longest_step(control.theta_limit, stiffest(c, softer))) / ratio
+    h_apart = min(control.h, longest_step(control.theta_limit, apart)) / ratio if readings.separation_released else h
     found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record, softer)
     return failed(status) if found.status == Status.STEP_BUDGET.value else found

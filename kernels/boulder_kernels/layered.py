@@ -12,7 +12,6 @@ design, and `boulder_kernels.soil` chooses by their type.
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -31,9 +30,9 @@ from .design import (
     design_at,
     element_depth,
     element_mass,
-    shear_wedge_angle,
     spring_per_depth,
     ultimate_pressure,
+    wedge_slope,
 )
 from .readings import Readings
 
@@ -180,7 +179,7 @@ def fill_layers(design: Design, layers: np.ndarray, soil: SoilLayers) -> SoilMas
         soil.R[m] = local.rho_s * design.W * d
         # The wedge at a height over the base is that height times tan(theta_w) long.
         lower = d * (1.0 - soil.to[m])
-        wedge = local.rho_s * design.W * math.tan(shear_wedge_angle(local.phi))
+        wedge = local.rho_s * design.W * wedge_slope(local.phi)
         mass += wedge * (upper**2 - lower**2) / 2.0
         first += wedge * (upper**3 - lower**3) / 3.0
         second += wedge * (upper**4 - lower**4) / 4.0

@@ -101,7 +101,7 @@ def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
     Parameters
     ----------
     coarse, fine
-        `OutcomesAtRest` by a step and by half of it; the error goes into the finer.
+        `OutcomesAtRest` by a step and by a third of it; the error goes into the finer.
     safety
         Factor from the difference of the two to the error.
     """

@@ -45,7 +45,14 @@ from .vehicle import contact_displacement, spring_compression
 NO_PROOF = -1e300
 """Barrier of a motion that nothing has been proved of: no energy is below it."""
 PLACING_STEPS = 6
-"""Steps of the root finder that places a tangent."""
+"""Most steps of the root finder that places a tangent."""
+PLACED = 1e-6
+"""Precision with which a tangent is placed, as a fraction of the energy, or of the lift of the weight."""
+BALANCED_FROM, BALANCED_TO = 0.66, 0.71
+"""Where a uniform soil turned about a point pushes no way, as a ratio of the depth: at 2/3 while it is elastic, at
+1/sqrt(2) where all of it yields."""
+MOVED_FROM = 0.75
+"""Fraction of the largest rotation from which on a boulder mostly is where moving takes the least energy."""
 RESTING_PRECISION = 1e-13
 """Precision of the least energy where a place of rest is looked for, as a fraction of it."""
 CAUTION = 1.0 - 1e-6
@@ -79,13 +86,22 @@ def least_elastic_energy(slope_x: float, c: Constants) -> float:
     """
     if slope_x == 0.0:
         return 0.0
-    bracket = Bracket(0.0, soil_potential(0.0, slope_x, c).V_A, slope_x, soil_potential(slope_x, slope_x, c).V_A, 0.0)
-    A = 0.0
+    low, high = BALANCED_FROM * slope_x, BALANCED_TO * slope_x
+    f_low, f_high = soil_potential(low, slope_x, c).V_A, soil_potential(high, slope_x, c).V_A
+    if not f_low < 0.0 < f_high:
+        low, high = 0.0, slope_x
+        f_low, f_high = soil_potential(low, slope_x, c).V_A, soil_potential(high, slope_x, c).V_A
+    bracket = Bracket(low, f_low, high, f_high, 0.0)
+    least = 0.0
     for _ in range(PLACING_STEPS):
         A = next_guess(bracket)
-        bracket = narrowed(bracket, A, soil_potential(A, slope_x, c).V_A)
-    p = soil_potential(A, slope_x, c)
-    return p.V - abs(p.V_A) * slope_x
+        p = soil_potential(A, slope_x, c)
+        below = abs(p.V_A) * slope_x
+        least = max(least, p.V - below)
+        if below <= PLACED * p.V:
+            break
+        bracket = narrowed(bracket, A, p.V_A)
+    return least
 
 
 @kernel
@@ -172,6 +188,13 @@ def bound_at(
 
 
 @inlined
+def slope_along(x_max: float, s: float, along: float, c: Constants) -> float:
+    """Derivative of the elastic energy by the sine s on x_b = x_max, where the displacement grows by along times it."""
+    p = soil_potential(x_max + along * s, c.d * s, c)
+    return p.V_A * along + p.V_X * c.d
+
+
+@inlined
 def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     """Lower bound of the potential energy on x_b = x_max for |theta| <= theta_max [J].
 
@@ -185,18 +208,21 @@ def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     t = versin_max / sin_max if sin_max > 0.0 else 0.0
     lift = c.C_cos + c.C_sin * t
     # Place the tangent where, along the line of the largest versine, the energy is least.
-    direction_A, direction_X = c.z_0 - c.l_n * t, c.d
-    start, end = soil_potential(x_max, 0.0, c), soil_potential(x_max + direction_A * sin_max, direction_X * sin_max, c)
-    slope = start.V_A * direction_A + start.V_X * direction_X + lift
-    slope_end = end.V_A * direction_A + end.V_X * direction_X + lift
-    s = 0.0 if slope >= 0.0 else sin_max
-    if slope < 0.0 < slope_end:
-        bracket = Bracket(0.0, slope, sin_max, slope_end, 0.0)
+    along = c.z_0 - c.l_n * t
+    low, high = MOVED_FROM * sin_max, sin_max
+    f_low, f_high = lift + slope_along(x_max, low, along, c), lift + slope_along(x_max, high, along, c)
+    if f_low >= 0.0:
+        low, f_low = 0.0, lift + slope_along(x_max, 0.0, along, c)
+    s = low if f_low >= 0.0 else high
+    if f_low < 0.0 < f_high:
+        bracket = Bracket(low, f_low, high, f_high, 0.0)
         for _ in range(PLACING_STEPS):
             s = next_guess(bracket)
-            p = soil_potential(x_max + direction_A * s, direction_X * s, c)
-            bracket = narrowed(bracket, s, p.V_A * direction_A + p.V_X * direction_X + lift)
-    A, X = x_max + direction_A * s, direction_X * s
+            slope = lift + slope_along(x_max, s, along, c)
+            if abs(slope) <= PLACED * lift:
+                break
+            bracket = narrowed(bracket, s, slope)
+    A, X = x_max + along * s, c.d * s
     p = soil_potential(A, X, c)
     least = bound_at(p, A, X, 0.0, 0.0, x_max, lift, c)
     for side in (-1.0, 1.0):

@@ -4,12 +4,15 @@ Within a step the motion is smooth, and an explicit method is stable where its s
 linearised motion lies in the stability region of the method. The rates are bounded from above, once per design, for
 the states that the motion can reach: by the energy of the truck, and up to the rotation at which the simulation ends.
 A design that would need too many steps is refused before it starts, and the status names the rate that asks for them.
+Rates of an impossible design are not numbers, which `np.sqrt` also gives without the compiler.
 """
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
+
+import numpy as np
 
 from ._jit import exact_inlined
 from .design import Constants
@@ -52,7 +55,7 @@ class Rates(NamedTuple):
 @exact_inlined
 def largest_force(c: Constants) -> float:
     """Upper bound of the contact force [N]: the damper passes on no more, nor does the spring stop it by more."""
-    stored = c.v_0 * c.k_v / math.sqrt(c.k_m)
+    stored = c.v_0 * c.k_v / np.sqrt(c.k_m)
     return min(stored, c.v_0 * c.k_v / (c.k_m * c.tau_v)) if c.tau_v > 0.0 else stored
 
 
@@ -76,8 +79,8 @@ def largest_speed(reach: float, inverse_J: float, c: Constants) -> float:
     times as fast as the truck, whatever the lever of the blow.
     """
     mobility = c.inverse_m_eff + reach * reach * inverse_J
-    by_energy = math.sqrt(c.k_v / c.k_m * mobility)
-    by_blow = 1.0 + math.sqrt(mobility / c.inverse_m_eff)
+    by_energy = np.sqrt(c.k_v / c.k_m * mobility)
+    by_blow = 1.0 + np.sqrt(mobility / c.inverse_m_eff)
     return c.v_0 * min(by_energy, by_blow)
 
 
@@ -108,13 +111,13 @@ def rates_of(theta_stop: float, c: Constants) -> Rates:
     first += 0.5 * l_n * sin
     across, around = 0.5 * c.inverse_m_eff, second * inverse_J
     coupled = first * first * c.inverse_m_eff * inverse_J
-    soil = c.K_soil * (0.5 * (across + around) + math.sqrt(0.25 * (across - around) ** 2 + coupled))
+    soil = c.K_soil * (0.5 * (across + around) + np.sqrt(0.25 * (across - around) ** 2 + coupled))
 
-    lever = min(abs(c.h) + abs(c.g_x) * sin, math.hypot(c.h, c.g_x))
+    lever = min(abs(c.h) + abs(c.g_x) * sin, np.sqrt(c.h * c.h + c.g_x * c.g_x))
     truck = c.k_v * (c.inverse_m_eff + lever * lever * inverse_J) + c.k_m
 
     # The energy of the truck presses the soil no further than it takes to store it.
-    pressed = 0.5 * c.K_soil * min(c.x_yield, 2.0 * c.v_0 * math.sqrt(c.k_v / (c.k_m * c.K_soil)))
+    pressed = 0.5 * c.K_soil * min(c.x_yield, 2.0 * c.v_0 * np.sqrt(c.k_v / (c.k_m * c.K_soil)))
     upright = max(abs(z_0), abs(d - z_0))
     turning = abs(c.C_cos) * sin + abs(c.C_sin)
     turning += largest_force(c) * (abs(c.g_x) + abs(c.h) * sin) + pressed * (l_n + upright * sin)
@@ -128,7 +131,7 @@ def rates_of(theta_stop: float, c: Constants) -> Rates:
 @exact_inlined
 def stable_step(r: Rates) -> float:
     """Longest step that is stable for a design [s]."""
-    oscillation = math.sqrt(r.soil + r.truck + r.turning)
+    oscillation = np.sqrt(r.soil + r.truck + r.turning)
     return min(STABLE_OSCILLATION / oscillation, STABLE_DECAY / (r.relaxation + r.drag))
 
 
@@ -151,7 +154,7 @@ def refusal(h: float, h_asked: float, horizon: float, r: Rates) -> int:
         return ACCEPTED
     if h >= h_asked:
         return Status.STEP_BUDGET.value
-    oscillation = math.sqrt(r.soil + r.truck + r.turning)
+    oscillation = np.sqrt(r.soil + r.truck + r.turning)
     if STABLE_DECAY * oscillation < STABLE_OSCILLATION * (r.relaxation + r.drag):
         return Status.WEAK_DAMPER.value if r.relaxation >= r.drag else Status.THICK_SOIL.value
     if r.soil >= max(r.truck, r.turning):

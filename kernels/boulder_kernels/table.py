@@ -18,10 +18,10 @@ from .plastic import add_rest_error, simulate_plastic_rows
 from .readings import Readings
 from .second_spring import SecondSpring, SecondSprings
 
-SAFETY = 3.0
+SAFETY = 1.5
 """Factor from the difference of two solutions to the error that is reported: it makes the estimate hold for 99 % and
 more of all designs, and for those that are not stopped at the limit of rotation alone."""
-SAFETY_PRINTED = 10.0
+SAFETY_PRINTED = 5.0
 """The same where the restoring moment is read as printed: two of its jumps can come and go within a step of either
 solution, and both then miss them alike."""
 LEAST_ROTATION = 1e-4
@@ -145,7 +145,7 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
     Parameters
     ----------
     coarse, fine
-        Solutions with a step and with half of it; the estimates go into the finer.
+        Solutions with a step and with a third of it; the estimates go into the finer.
     table
         The designs.
     safety
@@ -195,7 +195,7 @@ def simulate_table(
         Which formulas are read as printed.
     control
         Step, horizon, limit, soil. With ``error_estimate`` every design is simulated with the step and
-        with half of it, and the finer result is reported.
+        with a third of it, and the finer result is reported.
     springs
         Second springs of the vehicles, where they have any; such designs are simulated one by one.
 
@@ -207,7 +207,7 @@ def simulate_table(
     out = simulate_once(table, readings, control, springs)
     if not control.error_estimate:
         return out
-    fine = simulate_once(table, readings, control._replace(halved=True), springs)
+    fine = simulate_once(table, readings, control._replace(refined=True), springs)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     estimate_errors(out, fine, DesignTable(*table[: len(DesignTable._fields)]), safety)
     if control.unloading != ELASTIC:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-from ._jit import inlined
+from ._jit import exact_inlined, inlined
 
 
 class SineVersine(NamedTuple):
@@ -58,3 +59,34 @@ def sine_versine(theta: float) -> SineVersine:
     cos_half = 1.0 + z * c
     twice = 2.0 * sin_half
     return SineVersine(twice * cos_half, twice * sin_half)
+
+
+@exact_inlined
+def half_tangent(angle: float) -> float:
+    """Tangent of half an angle of at most a right one, |angle| <= pi/2 [rad].
+
+    Lambert's continued fraction x/(1 - x^2/(3 - x^2/(5 - ... x^2/17))) as a ratio of polynomials: to 5e-16 of itself.
+    """
+    x = 0.5 * angle
+    z = x * x
+    above = (((z - 990.0) * z + 135135.0) * z - 4729725.0) * z + 34459425.0
+    below = (((45.0 * z - 13860.0) * z + 945945.0) * z - 16216200.0) * z + 34459425.0
+    return x * above / below
+
+
+@exact_inlined
+def nearer(angle: float, x: float, y: float) -> float:
+    """Angle [rad] nearer to the direction of (x, y), by the tangent of what is left."""
+    s = sine_versine(angle)
+    cos = 1.0 - s.versin
+    return angle + (y * cos - x * s.sin) / (x * cos + y * s.sin)
+
+
+@exact_inlined
+def direction(x: float, y: float) -> float:
+    """Angle of the point (x, y) in the first quadrant, atan(y/x) [rad], to rounding.
+
+    The first guess is off by 0.072 rad at most, and each step leaves a third of the cube of that.
+    """
+    angle = 0.5 * math.pi * y / (x + y)
+    return nearer(nearer(nearer(angle, x, y), x, y), x, y)

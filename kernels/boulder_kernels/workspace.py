@@ -19,7 +19,7 @@ from numba import types
 from numba.extending import lower_builtin, type_callable
 
 from .dense_output import Track
-from .design import Constants
+from .design import Constants, Design
 from .dynamics import Acceleration, State
 from .gaps import GapFactors, Gaps
 from .modes import Modes, Switches
@@ -66,6 +66,7 @@ _LAYOUT: dict[str, Any] = {
     "attention": Number,
     "end_state": State,
     "end": Acceleration,
+    "status": Number,
 }
 _EVENT_LAYOUT: dict[str, Any] = {
     "boulder": Track,
@@ -78,7 +79,8 @@ _EVENT_LAYOUT: dict[str, Any] = {
     "open": Number,
     "event": Number,
     "moment": Number,
-    "status": Number,
+    # Of designs that are being started.
+    "design": Design,
 }
 """What is known of a step in the group of those that need more: in a second part of the same array."""
 
@@ -101,7 +103,9 @@ EVENTS = GROUPS * SIZE
 """Where the first of the two groups of those that need more begins: its lanes are EVENTS ... EVENTS + LANES - 1."""
 EVENT_SIZE = sum(_size(record) for record in _ALL.values())
 """Numbers of one of them."""
-WHOLE = EVENTS + 2 * EVENT_SIZE
+STARTS = EVENTS + 2 * EVENT_SIZE
+"""Where the group of designs that are being started begins, and behind it that of those that are started again."""
+WHOLE = STARTS + 2 * EVENT_SIZE
 """Numbers of all groups."""
 CONSTANTS = _place("constants")
 SWITCHES = _place("switches")
@@ -145,6 +149,7 @@ EVENT = _place("event")
 MOMENT = _place("moment")
 """Net moment where the step is cut [N m]."""
 STATUS_OF_LANE = _place("status")
+DESIGN = _place("design")
 _RECORDS = {_place(name): record for name, record in _ALL.items()}
 
 
@@ -181,6 +186,14 @@ def store(ws: np.ndarray, place: int, lane: int, record: Any) -> None:
         ws[place + offset + lane] = getattr(record, name)
 
 
+def align_stack() -> None:
+    """Let the function that calls this keep its stack on whole lines of the fast memory, as the workspace is.
+
+    What finds no room in the registers goes to the stack, a vector as long as a line: nearly four hundred times in a
+    step. By default a vector may lie across two lines there, which takes twice as long.
+    """
+
+
 def copy_lane(ws: np.ndarray, lane: int, other: int, end: int) -> None:
     """Copy the numbers of one lane to another, up to before a place."""
     ws[other : other + end : LANES] = ws[lane : lane + end : LANES]
@@ -197,6 +210,22 @@ def _pointer(context: Any, builder: Any, kinds: Any, values: Any, offset: int = 
     for kind, value in zip(kinds[1:], values[1:], strict=True):
         first = builder.add(first, context.cast(builder, value, kind, types.intp))
     return builder.gep(context.make_array(kinds[0])(context, builder, values[0]).data, [first], inbounds=True)
+
+
+LINE = 64
+"""Bytes of a line of the fast memory."""
+
+
+@type_callable(align_stack)
+def _type_align_stack(context: Any) -> Callable[..., Any]:
+    return lambda: types.void
+
+
+@lower_builtin(align_stack)
+def _lower_align_stack(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.function.attributes.add("nounwind")  # as it is anyway: llvmlite writes no alignment of the stack alone
+    builder.function.attributes.alignstack = LINE
+    return context.get_dummy_value()
 
 
 _NOT_REAL = {int: types.int64, bool: types.boolean}

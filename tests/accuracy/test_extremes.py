@@ -7,7 +7,6 @@ import pytest
 
 from boulder_kernels import SIMULATED, Control, Design, DesignTable, OutcomeTable, Readings, Status, simulate_table
 from boulder_sweep.judge.verdict import STATUS_REASONS, Limits, judge
-from docs.studies.extremes import box_shares_table, is_left_open
 from tests.accuracy.box import LIMIT, PRESETS, how
 from tests.judge.plain import plain_designs
 
@@ -151,15 +150,3 @@ def test_a_limit_just_below_the_peak(below: float, preset: str) -> None:
         assert out.t_limit[0] == out.t_end[0] < plain.t_end[0]
         to_the_end = run(Control(step_s, 1.0, limit, 0, False, False), preset)
         assert np.isfinite(to_the_end.t_limit[0]) == (to_the_end.theta_max[0] >= limit)
-
-
-@pytest.mark.slow
-@pytest.mark.compiled
-@pytest.mark.parametrize("seed", [1, 2])
-def test_few_designs_of_the_box_stay_open(seed: int) -> None:
-    """Of 4000 designs of the whole box 2 % at most end undecided or refused, each for a reason in words."""
-    shares = box_shares_table(4000, seed)
-    *endings, together = shares.rows
-    assert int(together[2]) <= 80
-    assert sum(int(row[2]) for row in endings if is_left_open(row[0])) == int(together[2])
-    assert all(", " in row[0] for row in endings if is_left_open(row[0]))

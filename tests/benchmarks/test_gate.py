@@ -1,5 +1,6 @@
 """The gate lets through what is fast enough and names what is not; with a clock of its own, so nothing is timed."""
 
+import hashlib
 import itertools
 import re
 import subprocess
@@ -54,6 +55,32 @@ def test_one_disturbed_round_does_not_decide(clock: Callable[..., None], monkeyp
     (finding,) = gate.judged({"path": nothing}, {"path": 5.0}, rounds=9)
     assert finding.ratio == 4.0
     assert finding.passes
+
+
+def found_in_turn(*ratios: dict[str, float], counted: bool = False) -> Callable[[], list[gate.Finding]]:
+    """A measurement that finds these ratios, of at most 1, one after the other; a further one is an error."""
+    each = iter(ratios)
+    return lambda: [gate.Finding(name, ratio, 1.0, counted=counted) for name, ratio in next(each).items()]
+
+
+def test_what_is_too_slow_only_once_or_twice_passes(capsys: pytest.CaptureFixture[str]) -> None:
+    first, second, third = {"a": 6.0, "b": 0.5}, {"a": 2.0, "b": 3.0}, {"a": 0.9, "b": 4.0}
+    assert [finding.ratio for finding in gate.confirmed(found_in_turn(first, second, third))] == [0.9, 0.5]
+    assert capsys.readouterr().out.splitlines() == [
+        "too slow, so measured again: a (6.000, at most 1.000)",
+        "too slow, so measured again: a (2.000, at most 1.000)",
+    ]
+    assert [finding.ratio for finding in gate.confirmed(found_in_turn(third, second, first))] == [0.9, 0.5]
+
+
+@pytest.mark.parametrize("slow", [1.1, float("nan")])
+def test_what_is_too_slow_each_time_fails(slow: float) -> None:
+    measure = found_in_turn({"a": 0.5, "b": slow}, {"a": 0.5, "b": slow}, {"a": 2.0, "b": slow})
+    assert [finding.passes for finding in gate.confirmed(measure)] == [True, False]
+
+
+def test_counts_are_taken_once() -> None:
+    assert "counts have changed: a" in gate.complaint(gate.confirmed(found_in_turn({"a": 1.1}, counted=True)))
 
 
 def test_a_ratio_that_is_no_number_fails() -> None:
@@ -181,21 +208,57 @@ class Timed(NamedTuple):
         """Do nothing."""
 
 
-def test_work_that_sleeps_is_told_from_work_that_computes() -> None:
-    def compute() -> None:
-        until = time.process_time() + 0.05
-        while time.process_time() < until:
-            pass
+def compute() -> None:
+    """Compute for a while, as the clock of the thread tells."""
+    until = time.thread_time() + 0.05
+    while time.thread_time() < until:
+        hashlib.sha256(b"0" * 1_000_000)  # without the lock of the interpreter
 
+
+def share_nothing() -> None:
+    """Work of a thread that needs nothing another one has."""
+
+
+def wait_for_each_other() -> None:
+    """Work that one thread at a time does."""
+
+
+def slowed_by_each_other() -> None:
+    """Work of which each thread takes longer while another does it."""
+
+
+@pytest.mark.parametrize(
+    ("work", "gain"), [(share_nothing, 1.0), (wait_for_each_other, 0.5), (slowed_by_each_other, 0.25)]
+)
+@pytest.mark.parametrize("host", [1.1, 2.0])
+def test_the_gain_of_two_threads_is_that_over_work_that_shares_nothing(
+    monkeypatch: pytest.MonkeyPatch, work: Callable[[], None], gain: float, host: float
+) -> None:
+    """Also on a host that gives two processors the time of one."""
+    disturbed = itertools.cycle([40.0, *[1.0] * 11])  # of three rounds with four times each, one
+    together_s = {share_nothing: host, wait_for_each_other: 2.0, slowed_by_each_other: 4.0 * host}
+
+    def timed(work: Callable[[], None], count: int) -> together.Timed:
+        seconds = (1.0 if count == 1 else together_s[work]) * next(disturbed)
+        return together.Timed(seconds, float(count > 1 and work is wait_for_each_other))
+
+    monkeypatch.setattr(together, "timed", timed)
+    assert together.gain_over(work, share_nothing, rounds=9) == pytest.approx(gain)
+
+
+@pytest.mark.slow
+def test_work_that_sleeps_is_told_from_work_that_computes() -> None:
     assert together.idle_share(lambda: time.sleep(0.05), rounds=3) > 0.8
     assert together.idle_share(compute, rounds=3) < 0.2
 
 
+@pytest.mark.slow
 def test_threads_that_wait_for_each_other_gain_nothing() -> None:
     lock = threading.Lock()
 
     def alone() -> None:
         with lock:
-            time.sleep(0.02)
+            compute()
 
-    assert together.gain_over(alone, lambda: time.sleep(0.02), rounds=3) < 0.7
+    assert together.gain_over(alone, compute) < 0.7
+    assert together.gain_over(compute, compute) > 0.7

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -73,3 +74,16 @@ def test_the_command(result: Path, capsys: pytest.CaptureFixture[str], tmp_path:
     assert json.loads(capsys.readouterr().out)["same_bits"] is True
     assert execute(["explain", str(result), "999"]) == 2
     assert execute(["explain", str(tmp_path), "0"]) == 2
+
+
+def test_plain_data_in_us_units_names_what_differs_in_them(result: Path) -> None:
+    table = boulder_sweep.read(result)
+    found = explain(result, int(table.design_id[table.verdict == "pass"].iloc[0]))
+    stored, length = found.stored["max_displacement_m"], found.inputs["boulder_length_m"]
+    assert length is not None
+    differs = dataclasses.replace(found, recomputed=found.recomputed | {"max_displacement_m": 2.0 * stored})
+    data = differs.as_dict("us")
+    assert data["unequal"] == {"max_displacement_ft": [stored / 0.3048, 2.0 * stored / 0.3048]}
+    assert data["inputs"]["boulder_length_ft"] == length / 0.3048
+    assert differs.as_dict()["unequal"] == {"max_displacement_m": [stored, 2.0 * stored]}
+    assert differs.as_dict()["inputs"] == found.inputs

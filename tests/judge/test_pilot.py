@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, finer_step_s
 from boulder_sweep.judge.evaluation import control_of
 from boulder_sweep.judge.pilot import accuracy_of, pilot, pilot_size
 from boulder_sweep.judge.sampling import sampled_rows
@@ -28,6 +28,13 @@ def test_names_stand_for_steps(name: str) -> None:
     text = GRID.format(**DEFAULTS).replace("step: 4 ms", f"accuracy: {name}").replace("corrected", "as_printed")
     assert accuracy_of(load_text(text, Path("grid.yaml"))).steps == STEPS_PRINTED[name]
     assert accuracy_of(asked(name)).error_estimate == (name != "fast")
+
+
+def test_reported_steps_are_round_numbers() -> None:
+    """In the table, too: a third of 18 ms in binary numbers is 5.999999999999999 ms."""
+    shown = [finer_step_s(steps.step_s) for steps in LADDER]
+    assert shown[:5] == [0.006, 0.004, 0.004, 0.003, 0.002]
+    assert all(len(repr(step)) <= len("0.0001875") for step in shown)
 
 
 def test_smaller_numbers_get_shorter_steps_that_meet_them() -> None:

@@ -16,7 +16,7 @@ from boulder_sweep.judge.refinement import LAST_RESORT_STEPS, MOST_STEPS, finer_
 from boulder_sweep.judge.verdict import Limits
 from tests.judge.plain import plain_designs
 
-CONTROL = Control(0.008, 1.0, math.radians(20.0), 0, True, longest_horizon=10.0)
+CONTROL = Control(0.012, 1.0, math.radians(20.0), 0, True, longest_horizon=10.0)
 LIMITS = Limits(CONTROL.theta_limit, "P1")
 
 
@@ -51,7 +51,7 @@ def test_a_row_says_by_which_step_it_was_decided() -> None:
     row = evaluation().judged(plain_designs()).row(0)
     assert row["step_s"] == reported_step_s(CONTROL) == 0.004
     unguarded = CONTROL._replace(error_estimate=False)
-    assert evaluation(unguarded).judged(plain_designs()).row(0)["step_s"] == 0.008
+    assert evaluation(unguarded).judged(plain_designs()).row(0)["step_s"] == 0.012
     assert evaluation().judged(plain_designs(H=1.5)).row(0)["step_s"] is None  # no contact: nothing was simulated
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from boulder_sweep.judge.uplift import blow_lift, side_friction
+from boulder_sweep.judge.uplift import blow_lift, run_by_run, side_friction
 from tests.judge.plain import plain_designs
 
 F = 8e5
@@ -45,3 +45,20 @@ def test_no_force_lifts_nothing_and_none_is_none() -> None:
     lifts = blow_lift(np.array([0.0, math.nan]), plain_designs(2).table)
     assert lifts[0] == 0.0
     assert math.isnan(lifts[1])
+
+
+@pytest.mark.parametrize(
+    "values", [[], [0.3], [0.3] * 9, [0.3] * 8 + [0.4] * 7, [0.1, 0.2, 0.3, 0.1], [0.3, np.nan] * 4]
+)
+def test_equal_neighbours_are_computed_once(values: list[float]) -> None:
+    """The same bits as row by row, for one function and for two; four equal neighbours are one call of it."""
+    column, seen = np.array(values), []
+
+    def both(x: np.ndarray) -> np.ndarray:
+        seen.append(len(x))
+        return np.stack([np.sin(x), np.exp(x)])
+
+    assert run_by_run(both, column).tobytes() == np.stack([np.sin(column), np.exp(column)]).tobytes()
+    assert run_by_run(np.tan, column).tobytes() == np.tan(column).tobytes()
+    runs = 1 + np.count_nonzero(column[1:] != column[:-1])
+    assert seen == [runs if 4 * (runs - 1) < len(column) else len(column)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import pickle
 import shutil
@@ -11,6 +12,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -147,3 +149,23 @@ def test_a_planted_file_does_not_run(place: Path) -> None:
         assert str(place) not in done.stdout
         assert "belongs to another user" in done.stderr
         assert not mark.exists()
+
+
+def test_a_process_forked_meanwhile_does_not_keep_others_waiting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has the file open as well; a second descriptor of the same opening stands for it."""
+    kept: list[int] = []
+    opened = Path.open
+
+    def forked(path: Path, mode: str) -> IO[str]:
+        file = opened(path, mode)
+        kept.append(os.dup(file.fileno()))
+        return file
+
+    monkeypatch.setattr(_jit.Path, "open", forked)
+    with _jit._alone(tmp_path / "lock"), opened(tmp_path / "lock") as other, pytest.raises(BlockingIOError):
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    with opened(tmp_path / "lock") as other:
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    os.close(kept[0])

@@ -16,10 +16,10 @@ from boulder_kernels.design import (
     element_mass,
     is_computable,
     passive_pressure_coefficient,
-    shear_wedge_angle,
     soil_mass,
     spring_per_depth,
     ultimate_pressure,
+    wedge_slope,
     yield_displacement,
 )
 from tests import oracle
@@ -123,7 +123,7 @@ def test_soil_parameters() -> None:
     alpha, height = np.array([0.7]), np.array([0.01])
     for design in DESIGNS:
         inputs = inputs_of(design)
-        assert shear_wedge_angle(design.phi) == pytest.approx(pi / 4 + design.phi / 2, rel=1e-15)
+        assert wedge_slope(design.phi) == pytest.approx(tan(pi / 4 + design.phi / 2), rel=1e-12)
         K_p = (1 + sin(design.phi)) / (1 - sin(design.phi))
         assert passive_pressure_coefficient(design.phi) == pytest.approx(K_p, rel=1e-12)
         assert atan(design.d / compression_wedge_length(design.d, design.phi)) == pytest.approx(design.phi)

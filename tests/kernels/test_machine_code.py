@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
+from boulder_kernels.design import design_in
 from boulder_kernels.lane_events import begin_searches, keep_steps, search_on, start_steps
+from boulder_kernels.lane_starts import compute_constants, stand_still, take_over_first_steps
 from boulder_kernels.lane_steps import attempt_steps, take_over_steps
 from boulder_kernels.lanes import simulate_lanes
-from boulder_kernels.workspace import SIZE, WHOLE
+from boulder_kernels.workspace import LANES, SIZE, WHOLE
 
 from .samples import control, random_designs, table_of
 
@@ -80,6 +82,13 @@ def test_steps_are_vectorised(step_code: str) -> None:
         assert found[f"div {register}"] >= 6
 
 
+def test_vectors_on_the_stack_lie_on_whole_lines(step_code: str) -> None:
+    """Where the stack does not begin on one, each of these vectors may take two lines of the fast memory."""
+    if widest():
+        assert re.search(r"%(zmm|ymm|xmm)\d+, -?\d*\(%rsp\)", step_code)
+        assert "andq\t$-64, %rsp" in step_code
+
+
 def test_no_scalar_arithmetic_in_the_steps(step_code: str) -> None:
     """No division, nor any other operation, that is done for one lane at a time."""
     assert [match.group(0).strip() for match in SCALAR.finditer(step_code)] == []
@@ -92,18 +101,22 @@ def test_taking_over_is_vectorised(take_over_code: str) -> None:
         assert found[f"fma {register}"] > 20
 
 
-SEARCHES = {
+HOW = control(8e-3, 1.0, 0.3, stop_at_limit=True)
+OTHERS = {
     begin_searches: (False,),
     search_on: (),
     keep_steps: (),
     start_steps: (),
+    compute_constants: (np.stack(table_of(random_designs(LANES, seed=142))), 0, bk.corrected(), HOW, 8e-3),
+    stand_still: (bk.corrected(), HOW),
+    take_over_first_steps: (bk.corrected(), HOW),
 }
 
 
-@pytest.mark.parametrize("kernel", SEARCHES, ids=lambda kernel: kernel.__name__)
-def test_events_are_vectorised(kernel) -> None:
-    """Searches for events, peaks and fresh accelerations: whole registers, next to nothing for one lane at a time."""
-    code = assembly(kernel, np.zeros(WHOLE), *SEARCHES[kernel])
+@pytest.mark.parametrize("kernel", OTHERS, ids=lambda kernel: kernel.__name__)
+def test_events_and_starts_are_vectorised(kernel) -> None:
+    """Searches for events, peaks, fresh accelerations, constants: whole registers, next to nothing a lane at a time."""
+    code = assembly(kernel, np.zeros(WHOLE), *OTHERS[kernel])
     assert not CALL.search(code)
     found, register = widths(code), widest()
     if register and register != "xmm":
@@ -125,3 +138,12 @@ def test_kernels_leave_the_interpreter_lock_free() -> None:
     assert len(simulate_lanes.nopython_signatures) == len(simulate_lanes.signatures) > 0
     for kernel in (simulate_lanes, bk.simulate_design, attempt_steps, take_over_steps):
         assert kernel.targetoptions["nogil"]
+
+
+def test_a_column_that_is_not_one_piece_of_memory_is_refused() -> None:
+    """Designs are read by their places in memory, so another order of the same array would give other designs."""
+    table = np.stack(table_of(random_designs(3, seed=160)))
+    first = numba.njit(lambda designs: design_in(designs, 0))
+    assert first(table) == design_in(table, 0)
+    with pytest.raises(numba.TypingError):
+        first(np.asfortranarray(table))

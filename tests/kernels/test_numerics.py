@@ -1,6 +1,6 @@
 """Small numerical tools: sine and versine, roots, the longest stable step."""
 
-from math import cos, pi, sin
+from math import atan2, cos, pi, sin, tan
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from boulder_kernels.dynamics import State, acceleration
 from boulder_kernels.modes import FREE, SEATED, Modes, Switches, switches_of
 from boulder_kernels.roots import ITERATIONS, Bracket, narrowed, next_guess
 from boulder_kernels.stability import rates_of, stable_step
-from boulder_kernels.trigonometry import sine_versine
+from boulder_kernels.trigonometry import direction, half_tangent, sine_versine
 from tests import oracle
 
 from .samples import design_of, random_designs
@@ -38,6 +38,16 @@ def test_sine_and_versine(angles: np.ndarray) -> None:
     relative = np.abs(found - known)[near] / np.maximum(np.abs(known[near]), 1e-320)
     small = known[near] > 1e-290  # the square of a tiny angle leaves the range of numbers
     assert np.max(relative[small], initial=0.0) <= 1e-15
+
+
+def test_half_tangent_and_direction() -> None:
+    """Against the library's functions, from tiny to a right angle."""
+    for angle in [*np.linspace(-0.5 * pi, 0.5 * pi, 2001), *np.geomspace(1e-300, 1e-2, 100)]:
+        assert half_tangent(angle) == pytest.approx(tan(0.5 * angle), rel=1e-15, abs=1e-320)
+    for angle in [*np.linspace(0.0, 0.5 * pi, 2001), 1e-12, 0.5 * pi - 1e-12]:
+        for size in (1e-3, 1.0, 1e9):
+            x, y = size * abs(cos(angle)), size * sin(angle)
+            assert direction(x, y) == pytest.approx(atan2(y, x), rel=4e-15)
 
 
 def test_sine_and_versine_exactly() -> None:

@@ -85,10 +85,11 @@ def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.compiled
 def test_a_warm_cache_is_used() -> None:
-    """The same of the cache that these tests run with, which they have warmed."""
+    """The same of the cache that these tests run with, which they have warmed; the compiler is not made ready."""
     run(RUN, {})
-    _, hits, misses = run(RUN, {}).split()
-    assert (int(hits), int(misses)) == (1, 0)
+    prepared = "; import sys; print('numba.np.npyimpl' in sys.modules)"
+    _, hits, misses, is_prepared = run(RUN.rstrip() + prepared, {}).split()
+    assert (int(hits), int(misses), is_prepared) == (1, 0, "False")
 
 
 def test_the_hash_tells_sources_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -151,9 +152,9 @@ def test_without_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_other_users_of_numba_keep_their_cache() -> None:
-    """The folder is set while a kernel is decorated and at no other time."""
+    """The folder is set while that of a kernel is looked for and at no other time."""
     before = numba.config.CACHE_DIR
-    _jit.kernel(lambda x: x)
+    assert Path(_jit.kernel(lambda x: x).stats.cache_path).is_relative_to(str(_jit.CACHE_FOLDER))
     assert before == numba.config.CACHE_DIR
 
 
@@ -190,6 +191,32 @@ print(quarter(1.0), half(1.0), half(3), quarter(1.0), len(half.overloads))
 """
 
 
+MORE = """
+import numpy as np
+from called import _jit, half
+
+@_jit.array_kernel
+def halves(x):
+    y = np.empty_like(x)
+    for i in range(x.size):
+        y[i] = half(x[i])
+    return y
+
+print(half(1.0), *halves(np.arange(3.0)))
+"""
+
+
+@pytest.mark.compiled
+def test_compiling_after_loading(tmp_path: Path) -> None:
+    """A process that has loaded kernels can still compile others, which call them."""
+    for name, source in (("called.py", CALLED), ("more.py", MORE)):
+        (tmp_path / name).write_text(source)
+    environment = {_jit.CACHE_VARIABLE: str(tmp_path / "cache")}
+    run(f"import sys; sys.path.append({str(tmp_path)!r}); import called", environment)
+    printed = run(f"import sys; sys.path.append({str(tmp_path)!r}); import more", environment)
+    assert printed.split() == ["0.25", "0.5", "1.5", "0.25", "2", "0.5", "0.0", "0.5", "1.0"]
+
+
 @pytest.mark.compiled
 def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
     """Compiled for kernels first it has no wrapper, and calls from Python must not run into that."""
@@ -201,3 +228,100 @@ def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
     (folder,) = (tmp_path / "cache").glob("kernels-*")
     inside = [path for path in folder.rglob("*.nbc") if _jit.INSIDE in path.relative_to(folder).parts]
     assert [path.name.split("-")[0].rpartition(".")[2] for path in inside] == ["half"]
+
+
+SAVED = """
+import sys, time
+from pathlib import Path
+from numba.core.caching import IndexDataCacheFile
+from boulder_kernels import _jit
+
+def at_once(save):
+    def announced(*arguments):
+        Path(sys.argv[1]).touch()
+        while sys.argv[2:] and not Path(sys.argv[2]).exists():
+            time.sleep(0.01)
+        return save(*arguments)
+    return announced
+
+def late(save):
+    def kept_waiting(*arguments):
+        time.sleep(0.5)
+        return save(*arguments)
+    return kept_waiting
+
+@_jit.kernel
+def twice(x):
+    return x + x
+
+if sys.argv[2:]:
+    _jit._Files.save_overload = at_once(_jit._Files.save_overload)
+    IndexDataCacheFile._save_index = late(IndexDataCacheFile._save_index)
+    print(twice(1 if sys.argv[1] < sys.argv[2] else 0.5))
+else:
+    print(twice(1), twice(0.5), *(sum(count.values()) for count in (twice.stats.cache_hits, twice.stats.cache_misses)))
+"""
+
+
+@pytest.mark.compiled
+def test_two_processes_keep_compiled_code_at_once(tmp_path: Path) -> None:
+    """Code for different types of one function: each is found again under its own."""
+    script, path = (
+        tmp_path / "saved.py",
+        os.pathsep.join([str(SOURCES[0].parents[1]), os.environ.get("PYTHONPATH", "")]),
+    )
+    script.write_text(SAVED)
+    environment = {**os.environ, "PYTHONPATH": path, _jit.CACHE_VARIABLE: str(tmp_path / "cache")}
+    one, other = str(tmp_path / "one"), str(tmp_path / "other")
+    both = [
+        subprocess.Popen([sys.executable, str(script), *names], env=environment, stdout=subprocess.PIPE, text=True)
+        for names in ((one, other), (other, one))
+    ]
+    assert {process.communicate(timeout=120)[0].strip() for process in both} == {"2", "1.0"}
+    later = subprocess.run([sys.executable, str(script), one], env=environment, capture_output=True, text=True)
+    assert later.stdout.split() == ["2", "1.0", "2", "0"], later.stderr
+
+
+TAKEN = """
+import sys
+from boulder_kernels import _jit
+
+@_jit.kernel
+def third(x):
+    return x / 3.0
+
+@_jit.kernel
+def ninth(x):
+    return third(third(x))
+
+@_jit.kernel
+def root(x):
+    return third(x) ** 0.5
+
+print(*(globals()[name](27.0) for name in sys.argv[1:]), sum(third.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.compiled
+def test_kernels_for_kernels_are_taken_from_the_disk(tmp_path: Path) -> None:
+    """They are compiled into what calls them, now and in a later process."""
+    file = tmp_path / "taken.py"
+    file.write_text(TAKEN)
+    for called, printed in (("ninth", "3.0 0"), ("root", "3.0 1"), ("root third ninth", "3.0 9.0 3.0 0")):
+        script = f"import runpy, sys; sys.argv[1:] = {called.split()}; runpy.run_path({str(file)!r})"
+        assert run(script, {_jit.CACHE_VARIABLE: str(tmp_path / "cache")}).split() == printed.split()
+
+
+@pytest.mark.compiled
+def test_only_what_python_calls_is_made_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
+    third = _jit.kernel(lambda x: x / 3.0)
+    ninth = _jit.kernel(lambda x: third(third(x)))
+    assert ninth(27.0) == 3.0
+    places = [
+        compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+        for kernel in (third, ninth)
+        for compiled in kernel.overloads.values()
+    ]
+    assert [place != 0 for place in places] == [False, True]
+    assert third(27.0) == 9.0

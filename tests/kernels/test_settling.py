@@ -4,6 +4,7 @@ from math import exp, log, radians
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import boulder_kernels as bk
 from boulder_kernels import Design, Status
@@ -18,6 +19,8 @@ from boulder_kernels.settling import (
     energy_to_turn,
     proof_is_possible,
 )
+from boulder_kernels.soil import soil_potential
+from boulder_kernels.trigonometry import sine_versine
 from tests import oracle
 from tests.oracle.restoring import gravity_energy
 from tests.oracle.soil import Motion
@@ -110,6 +113,25 @@ def test_the_bounds_are_not_idle() -> None:
     assert energy_to_turn(0.2, c) > 0.9 * turned
     moved = min(potential(design, problem, 0.2, a) for a in np.linspace(-0.2, 0.2, 501))
     assert energy_to_move(0.2, 0.2, c) > 0.8 * moved
+
+
+def test_the_bound_on_turning_is_tight() -> None:
+    """Elastic or yielding, as a whole or by one element: the least energy to six digits."""
+    for design in [design_of(oracle.RWG), *random_designs(4, seed=117)]:
+        for elements in (0, 1, 50):
+            c = constants_of(design, CORRECTED, elements)
+            for theta in (1e-4, 0.02, 0.3):
+                sin, versin = sine_versine(theta)
+                slope = c.d * sin
+                found = minimize_scalar(
+                    lambda A, slope=slope, c=c: soil_potential(A, slope, c).V,
+                    bounds=(0.0, slope),
+                    method="bounded",
+                    options={"xatol": 1e-10 * slope},
+                )
+                known = c.C_cos * sin + c.C_sin * versin + found.fun
+                assert energy_to_turn(theta, c) == pytest.approx(known, rel=2e-6)
+                assert energy_to_turn(theta, c) <= known * (1.0 + 1e-12)
 
 
 def test_no_proof_without_a_barrier() -> None:
