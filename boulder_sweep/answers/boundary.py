@@ -3,8 +3,9 @@
 The longest axis of the grid is cut into lines. Along a line, designs begin to pass at some place. That place is located
 on a few lines spread over the grid and interpolated for all others. Every design closer to the interpolated place than
 the interpolation error is simulated; where a result contradicts the interpolation, its neighbours are simulated too,
-until none does. All other verdicts follow. A patch of different verdicts far from any change, or a second change along
-a line, is missed.
+until none does. Then the last design of every line that fails and the first that passes are simulated where that was
+not done, until every change lies between two simulated designs. All other verdicts follow. A patch of different
+verdicts beside which nothing was simulated, or such a second change along a line, is missed.
 """
 
 from __future__ import annotations
@@ -302,8 +303,11 @@ class _Lines:
 
     def holds(self, lines: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Return whether simulated designs pass, or lie beyond the passing stretch."""
-        verdict, reason = self.verdict[lines, places], self.reason[lines, places]
-        return (verdict == PASS) | (self.over_is_beyond & (reason == NO_CONTACT))
+        return self.holding()[lines, places]
+
+    def holding(self) -> np.ndarray:
+        """Return whether known designs pass, or lie beyond the passing stretch; false for others."""
+        return (self.verdict == PASS) | (self.over_is_beyond & (self.reason == NO_CONTACT))
 
     def fill(self) -> None:
         """Simulate every design whose verdict cannot be inferred from its neighbours."""
@@ -315,17 +319,19 @@ class _Lines:
         at = self.located(lines).reshape([len(own) for own in chosen] or [1])
         begins, doubt = self._interpolated(chosen, at)
         place = np.arange(self.length)
-        near = np.abs(place - begins[:, None]) < doubt[:, None]
-        told = place >= begins[:, None]
-        while near.any():
+        unknown = self.verdict == UNKNOWN
+        told = np.where(unknown, place >= begins[:, None], self.holding())
+        near = (np.abs(place - begins[:, None]) < doubt[:, None]) & unknown
+        # Where nothing else is left, the pair beside every change of verdict must have been simulated, not inferred.
+        while near.any() or (near := _changing(told) & unknown).any():
             self.simulate(*np.nonzero(near))
-            known = self.verdict != UNKNOWN
-            holds = (self.verdict == PASS) | (self.over_is_beyond & (self.reason == NO_CONTACT))
+            unknown = self.verdict == UNKNOWN
+            holds = self.holding()
             # Where a simulated design contradicts its inferred verdict, its neighbours on this line and the next are
             # simulated.
             surprise = self.simulated & (holds != told)
-            told = np.where(known, holds, told)
-            near = _beside(surprise.reshape(*self.others, self.length)).reshape(surprise.shape) & ~known
+            told = np.where(unknown, told, holds)
+            near = _beside(surprise.reshape(*self.others, self.length)).reshape(surprise.shape) & unknown
         self.told = told
 
     def _interpolated(self, chosen: list[np.ndarray], at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -374,6 +380,17 @@ def _along(values: np.ndarray, axis: int, known: np.ndarray, wanted: np.ndarray,
     if smooth and len(known) > 2:
         return PchipInterpolator(known, values, axis=axis)(wanted)
     return interp1d(known, values, axis=axis)(wanted)
+
+
+def _changing(told: np.ndarray) -> np.ndarray:
+    """Return the designs on both sides of every change of verdict along lines, shape (lines, length).
+
+    Before its first design a line counts as failing, after its last as passing, so that a line on which no verdict
+    changes has one such design.
+    """
+    padded = np.pad(told, ((0, 0), (1, 1)), constant_values=((False, False), (False, True)))
+    change = padded[:, 1:] != padded[:, :-1]
+    return change[:, 1:] | change[:, :-1]
 
 
 def _beside(cells: np.ndarray) -> np.ndarray:

@@ -1,8 +1,13 @@
 """The probability of an event from scrambled Sobol points, sampled until its confidence interval is narrow enough.
 
-Several independent scramblings of the sequence give one estimate each; their spread gives the interval (Student's t).
-Where hardly any point lies on one side, their spread is not reliable and the exact binomial interval of Clopper and
-Pearson is used.
+Several independent scramblings of the sequence give one estimate each; their spread gives the interval (Student's t),
+and a share of one point is added. Where hardly any point lies on one side, their spread is not reliable and the exact
+binomial interval of Clopper and Pearson is used.
+
+The share: if one input decides, every scrambling of N points counts N p points of the event, rounded down or up, and
+rounded up with a chance equal to the fraction f of N p. All S scramblings may then agree, and have no spread, however
+far N p is from a whole number. They agree on the lower one with the chance (1 - f)^S, which is less than 1 - confidence
+if f is more than 1 - (1 - confidence)^(1/S).
 """
 
 from __future__ import annotations
@@ -148,11 +153,17 @@ def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -
     -------
     low, high : ndarray, shape (n,)
         Its ends.
+
+    Notes
+    -----
+    Student's t, Clopper and Pearson, and the share of a point as the module explains; with 16 scramblings and a
+    confidence of 95 % it is 0.17.
     """
     count = np.broadcast_to(np.asarray(count), happened.shape[:1])
     shares = happened / count[:, None]
     mean = shares.mean(axis=1)
     half = stdtrit(SCRAMBLINGS - 1, 0.5 + 0.5 * confidence) * shares.std(axis=1, ddof=1) / np.sqrt(SCRAMBLINGS)
+    half += (1.0 - (1.0 - confidence) ** (1.0 / SCRAMBLINGS)) / count
     yes, all_ = happened.sum(axis=1), SCRAMBLINGS * count
     few = np.minimum(yes, all_ - yes) < FEWEST
     tail = 0.5 * (1.0 - confidence)

@@ -11,11 +11,12 @@ from scipy.special import ndtr
 
 from boulder_sweep.answers.trials import Judges, Rows
 from boulder_sweep.designs import block_of
-from boulder_sweep.judge.judged import UNDECIDED
+from boulder_sweep.judge.judged import ERROR, NO_CONTACT, UNDECIDED
 from boulder_sweep.runner.pool import Pool
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.spread import Spread
+    from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
 
 AT_ONCE = 16_384
@@ -25,6 +26,9 @@ NEAR = 0.01
 sweep. The error of the quick solution is far smaller."""
 WORST = -10.0
 """Distance assigned to designs that the truck goes over, or that cannot be computed."""
+_SIZES = ("boulder_height_m", "embedment_depth_m", "bumper_height_m", "bed_offset_m")
+OVERLAP_M = 0.25
+"""Overlap beyond the required one that counts as a reserve of 1."""
 FAST_OVERTURN_S = 0.05
 """Time scale of the distance of designs that overturn: -1 if they reach the limit at this time, closer to 0 later."""
 
@@ -75,12 +79,30 @@ class Draws:
         For a design that stands, the distance is its margin beyond the requested one; for one that overturns, the
         earlier, the more negative.
         """
+        return self._measured(index, z, inputs)
+
+    def reserve(self, index: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the reserve of designs, positive where they pass, shape (m,); arguments as of `distance`.
+
+        Notes
+        -----
+        Unlike the distance it shrinks towards whatever ends passing, also towards too little overlap with the bumper
+        and towards too much crush, so that rare cases of these are found step by step. For a design that passes it is
+        the product of three reserves, which does not change its order where one of them is the same for all; for
+        others, minus the sum of all that is wrong.
+        """
+        return self._measured(index, z, {}, reserve=True)
+
+    def _measured(
+        self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray], *, reserve: bool = False
+    ) -> np.ndarray:
         ends = range(0, len(index), AT_ONCE)
         pieces = self.parallel(
             joblib.delayed(self._piece)(
                 index[at : at + AT_ONCE],
                 z[at : at + AT_ONCE],
                 {name: values[at : at + AT_ONCE] for name, values in inputs.items()},
+                reserve,
             )
             for at in ends
         )
@@ -94,35 +116,60 @@ class Draws:
         """Return the inputs of sampled designs."""
         return self.spread.filled({name: values[index] for name, values in self.rows.items()} | inputs, z)
 
-    def _piece(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> np.ndarray:
+    def _piece(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray], reserve: bool) -> np.ndarray:
         given = self.given(index, z, inputs)
         if not self.variants:
-            return self._distances(given, self.judges)
+            return self._each(given, self.judges, reserve)
         count = len(self.variants)
         chosen = np.minimum((ndtr(z[:, -1]) * count).astype(np.int64), count - 1)
         found = np.empty(len(index))
         for place, judges in enumerate(self.variants):
             own = np.flatnonzero(chosen == place)
             if len(own):
-                found[own] = self._distances({name: values[own] for name, values in given.items()}, judges)
+                found[own] = self._each({name: values[own] for name, values in given.items()}, judges, reserve)
         return found
 
-    def _distances(self, given: Rows, judges: Judges) -> np.ndarray:
-        judged = judges.quick(block_of(given))
-        found = _distance_of(judged, judges)
+    def _each(self, given: Rows, judges: Judges, reserve: bool) -> np.ndarray:
+        block = block_of(given)
+        judged = judges.quick(block)
+        found = _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)
         if judges.quick is not judges.own:
             near = np.flatnonzero(np.abs(judged["margin"] - judges.least_margin) < NEAR)
             if len(near):
-                again = judges.own(block_of({name: values[near] for name, values in given.items()}))
-                found[near] = _distance_of(again, judges)
+                closer = block_of({name: values[near] for name, values in given.items()})
+                again = judges.own(closer)
+                found[near] = _reserve_of(again, judges, closer) if reserve else _distance_of(again, judges)
         return found
 
 
 def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:
+    """Return the distance of designs from failing; see `Draws.distance`."""
     margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
     found = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
     # On a limit or undecided: neither counts as passing. An undecided row may have no margin.
     found = np.where(np.isnan(margin) & (judged.verdict == UNDECIDED), 0.0, found)
+    return _signed(found, judged, judges)
+
+
+def _reserve_of(judged: Judged, judges: Judges, block: DesignBlock) -> np.ndarray:
+    """Return the reserve of designs; see `Draws.reserve`."""
+    height, depth, bumper, bed = (block.columns[name].to_numpy() for name in _SIZES)
+    margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
+    parts = (
+        np.where(np.isnan(margin), -FAST_OVERTURN_S / time, margin),
+        (height - depth - bumper - judges.own.limits.min_overlap) / OVERLAP_M,
+        1.0 - judged["vehicle_crush_m"] / np.maximum(bed, np.finfo(float).tiny),
+    )
+    # What is not known of a design neither helps nor harms it.
+    inside = np.prod([np.nan_to_num(np.maximum(part, 0.0), nan=1.0) for part in parts], axis=0)
+    beyond = np.sum([np.nan_to_num(np.minimum(part, 0.0), nan=0.0) for part in parts], axis=0)
+    # A design that the truck goes over is worse than any that overturns, and one that cannot be computed the worst.
+    beyond += np.where(judged.verdict == ERROR, WORST, np.where(judged.reason == NO_CONTACT, -1.0, 0.0))
+    return _signed(np.where(judges.holds(judged), inside, beyond), judged, judges)
+
+
+def _signed(found: np.ndarray, judged: Judged, judges: Judges) -> np.ndarray:
+    """Return a measure that is positive where designs pass, and negative where they do not."""
     smallest = np.finfo(float).tiny
     return np.where(judges.holds(judged), np.maximum(found, smallest), np.minimum(found, -smallest))
 

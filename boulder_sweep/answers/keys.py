@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boulder_sweep.answers.moving import narrowed
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.leaf import LeafError, outside, read_single
@@ -15,7 +16,7 @@ from boulder_sweep.settings.problems import Place, did_you_mean
 from boulder_sweep.settings.tree import Scalar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from boulder_sweep.settings import Sweep
 
@@ -38,6 +39,8 @@ TOLERANCES = {
 LEAST_RATIO = 0.35
 """Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
 may slide a metre instead of turning, and pass; buried deeper, it is held at its foot and overturns."""
+MOST_PLACES = 2**53
+"""Multiples of the tolerance up to which every one is a number of its own."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,11 @@ class Key:
         return self.field.name
 
     @property
+    def is_coarse(self) -> bool:
+        """Whether the tolerance is larger than the usual one."""
+        return self.tolerance > TOLERANCES[self.field.unit]
+
+    @property
     def answer(self) -> str:
         """Column of the answer: ``least_embedment_depth_m``."""
         return f"{'most' if self.most else 'least'}_{self.name}"
@@ -76,10 +84,14 @@ class Key:
         return places * self.tolerance
 
     def ends(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the outermost lattice places within a range."""
-        first = np.ceil(low / self.tolerance - 1e-6).astype(np.int64)
-        last = np.floor(high / self.tolerance + 1e-6).astype(np.int64)
+        """Return the outermost lattice places within a range; the next one above its start where none is within."""
+        first, last = self.within(low, high)
         return first, np.maximum(first, last)
+
+    def within(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the outermost lattice places within a range, the first behind the last where there is none."""
+        first = np.ceil(low / self.tolerance - 1e-6).astype(np.int64)
+        return first, np.floor(high / self.tolerance + 1e-6).astype(np.int64)
 
 
 def key_of(word: str, *, most: bool = False, tolerance: str | float | None = None) -> Key:
@@ -152,6 +164,20 @@ def share(text: str | float, option: str) -> float:
     return quantity(text, "1", option)
 
 
+def margin_asked(text: str | float) -> float:
+    """Return the least margin to the limits as a fraction, 0.25 for ``25 %``.
+
+    Raises
+    ------
+    QuestionError
+        It is not a number, negative, or 100 % or more, which no design has.
+    """
+    margin = share(text, "--margin")
+    if not 0.0 <= margin < 1.0:
+        raise QuestionError(f"--margin {text}: must be 0 or more and less than 100 %")
+    return margin
+
+
 def bound(text: str | float, field: fields.Field) -> float:
     """Return one end of the search range, which must be an admitted value.
 
@@ -197,11 +223,23 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
     low, high : ndarray, shape (n,)
         Ends in the unit of the table.
 
+    Notes
+    -----
+    If the input has a distribution, its mean is searched, where the distribution is within the admitted range.
+
     Raises
     ------
     QuestionError
-        The range is empty.
+        The range is empty, or the distribution of the input cannot take the means of the range.
     """
+    low, high = _whole_range(sweep, key, given, between)
+    return narrowed(sweep, key.name, low, high, least=key.tolerance, given=between is not None)
+
+
+def _whole_range(
+    sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the search range, whatever the distribution of the input; arguments as of `range_of`."""
     one = np.ones(len(next(iter(given.values()))))
     if between is not None:
         low, high = (bound(end, key.field) for end in between)
@@ -226,4 +264,74 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
         return 0.0 * one, given["hood_height_m"]
     usual = key.field.usual or key.field.admitted
     assert usual is not None
-    return usual.low * one, usual.high * one
+    lowest, highest = usual.low * one, usual.high * one
+    second = "vehicle_second_spring_N_m"
+    if key.name == second:
+        lowest = np.maximum(lowest, given["vehicle_spring_N_m"])  # a softer one is refused
+    elif key.name == "vehicle_spring_N_m" and second in given:
+        highest = np.minimum(highest, given[second])
+    elif key.name == "vehicle_second_spring_from_m":
+        highest = np.minimum(highest, given["bed_offset_m"])  # no more than what is in front of the cargo bed
+    return lowest, highest
+
+
+def refuse_coarse(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarray]], between: Ends) -> None:
+    """Refuse a tolerance that leaves nothing to search in the ranges of `range_of`, or too many values to count.
+
+    A range may be as narrow as it likes where it ends because the truck goes over the boulder beyond. Otherwise a
+    multiple of the tolerance must lie within it. Where the user chose the range or a larger tolerance than the usual
+    one, at least one range must hold two, a value that passes and the next.
+
+    Parameters
+    ----------
+    sweep, key, between
+        As of `range_of`.
+    pieces
+        The other inputs of all rows, in pieces.
+
+    Raises
+    ------
+    QuestionError
+        The tolerance is too coarse or too fine for a range.
+    """
+    chosen = between is not None or key.is_coarse
+    most, widest = 0, (0.0, 0.0)
+    for given in pieces:
+        low, high = range_of(sweep, key, given, between)
+        far = np.flatnonzero(np.maximum(low, high) > MOST_PLACES * key.tolerance)
+        if len(far):
+            raise _unsearchable(key, low[far[0]], high[far[0]], "too many multiples", "give a larger --tolerance")
+        first, last = key.within(low, high)
+        reach = math.inf if between is not None else reach_of(key, given)
+        by_nature = (key.values(first) > reach) & (high - low < TOLERANCES[key.field.unit])
+        none = np.flatnonzero((first > last) & ~by_nature & ((low < high) | ((low == high) & chosen)))
+        if len(none):
+            raise _unsearchable(key, low[none[0]], high[none[0]], "no multiple")
+        held = np.where(low < high, last - first + 1, 0)
+        if held.max(initial=0) > most:
+            row = held.argmax()
+            most, widest = held[row], (low[row], high[row])
+    if chosen and most == 1:
+        raise _unsearchable(key, *widest, "only one multiple")
+
+
+def reach_of(key: Key, given: Mapping[str, np.ndarray]) -> np.ndarray | float:
+    """Return the value beyond which the truck goes over the boulder, row by row; infinity for other inputs."""
+    if key.name == "embedment_depth_m":
+        return given["boulder_height_m"] - given["bumper_height_m"]
+    return 1.0 - given["bumper_height_m"] / given["boulder_height_m"] if key.name == "embedment_ratio" else math.inf
+
+
+def _unsearchable(
+    key: Key,
+    low: float,
+    high: float,
+    held: str,
+    remedy: str = "give a smaller --tolerance or a wider range (--between)",
+) -> QuestionError:
+    """Return the error for a range that cannot be searched in steps of the tolerance."""
+    unit = "" if key.field.unit == "1" else f" {key.field.unit}"
+    return QuestionError(
+        f"the range to search, {low:.10g} to {high:.10g}{unit}, holds {held} of the tolerance, "
+        f"{key.tolerance:.10g}{unit}; {remedy}"
+    )

@@ -29,12 +29,12 @@ MILLIMETRES = 1000
 SCALES = (0.5, 2.0)
 """If the file gives a single boulder, it is scaled within these bounds at constant proportions."""
 DEPTHS = 7
-"""Number of depths tried for each boulder if the depth is free."""
+"""Number of depths tried for each boulder if the depth is free, up to the deepest that overlaps the truck enough."""
 DEPTHS_AT_LAST = 25
-"""Number of depths from which that of the answer is chosen; includes those of the search."""
+"""Number of depths at which the height of the answer is searched, and from which its depth is chosen."""
 COARSE, FINE = 9, 5
 """Number of values of each other side: on the first lattice, and on each finer one."""
-ROUNDS = 5
+ROUNDS = 8
 """Number of finer lattices, each half as wide as the one before."""
 CELLS = 8
 """Pieces that the range of the height is cut into by the scan."""
@@ -99,7 +99,7 @@ class LightestQuestion:
             each = max(count ** len(others), 1)
             index = np.repeat(np.arange(n), each)
             flat = {side: values.ravel() for side, values in tried.items()}
-            found = trial.least(index, flat, quick=True)
+            found = trial.least(index, flat, DEPTHS, quick=True)
             mass = np.where(found.has_holds, trial.mass(index, found.holds, flat), np.inf).reshape(n, each)
             place = mass.argmin(axis=1)
             better = mass[np.arange(n), place] < best
@@ -119,19 +119,20 @@ class _Boulders:
         low, high = asked.bounds[asked.free[-1]] if asked.free else SCALES
         self.first, self.last = round(low * MILLIMETRES), round(high * MILLIMETRES)
 
-    def least(self, index: np.ndarray, others: Sides, *, quick: bool) -> Search:
+    def least(self, index: np.ndarray, others: Sides, depths: int, *, quick: bool) -> Search:
         """Search for the least height (or the last free side, or the scale), given the other sides."""
 
         def predicate(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
-            return self.codes(index[rows], places, {side: values[rows] for side, values in others.items()}, quick=quick)
+            tried = {side: values[rows] for side, values in others.items()}
+            return self.codes(index[rows], places, tried, depths, quick=quick)
 
         first, last = (np.full(len(index), end, dtype=np.int64) for end in (self.first, self.last))
         return search(predicate, first, last, CELLS)
 
-    def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
+    def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, depths: int, *, quick: bool) -> np.ndarray:
         """Return the predicate of `search`: a boulder passes if it does so at any of the depths."""
-        block, judged, depths = self.judged(index, places, others, DEPTHS, quick=quick)
-        shape = (len(index), depths)
+        block, judged, count = self.judged(index, places, others, depths, quick=quick)
+        shape = (len(index), count)
         holds = self.judges.holds(judged).reshape(shape).any(axis=1)
         beyond = beyond_reach(block, judged).reshape(shape).all(axis=1)
         return np.where(beyond, BEYOND, np.where(holds, HOLDS, FAILS))
@@ -163,8 +164,16 @@ class _Boulders:
         low, high = np.broadcast_to(low, height.shape), np.broadcast_to(high, height.shape)
         if np.array_equal(low, high):
             return _millimetres(low)[:, None]
-        deepest = np.clip(height - self.rows["bumper_height_m"][index], low, high)
+        deepest = np.clip(self._deepest(height, self.rows["bumper_height_m"][index]), low, high)
         return _millimetres(low[:, None] + (deepest - low)[:, None] * np.linspace(0.0, 1.0, count))
+
+    def _deepest(self, height: np.ndarray, bumper: np.ndarray) -> np.ndarray:
+        """Return the greatest depth [m], in whole millimetres, at which the boulder's top overlaps the truck enough."""
+        overlap = self.asked.sweep.criterion.min_overlap_m
+        places = np.floor((height - bumper - overlap) * MILLIMETRES + 1e-6)
+        # By the very sums of the verdict, which may fall short by a bit where they are equal in decimals.
+        left = height - places / MILLIMETRES - bumper
+        return (places - ((left < overlap) | (left <= 0.0))) / MILLIMETRES
 
     def mass(self, index: np.ndarray, places: np.ndarray, others: Sides) -> np.ndarray:
         """Mass of boulders [kg]."""
@@ -175,13 +184,15 @@ class _Boulders:
         """Return the answers for the best sides of every row, judged with the accuracy of the sweep."""
         n = len(next(iter(self.rows.values())))
         index = np.arange(n)
-        found = self.least(index, others, quick=True)
+        found = self.least(index, others, DEPTHS_AT_LAST, quick=True)
         agrees = np.ones(n, dtype=bool)
         for has, places, holds in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
-            agrees &= ~has | ((self.codes(index, places, others, quick=False) == HOLDS) == holds)
+            agrees &= ~has | ((self.codes(index, places, others, DEPTHS_AT_LAST, quick=False) == HOLDS) == holds)
         if not agrees.all():
             wrong = np.flatnonzero(~agrees)
-            part = self.least(wrong, {side: values[wrong] for side, values in others.items()}, quick=False)
+            part = self.least(
+                wrong, {side: values[wrong] for side, values in others.items()}, DEPTHS_AT_LAST, quick=False
+            )
             found = replaced(found, wrong, part)
         block, judged, count = self.judged(index, found.shown, others, DEPTHS_AT_LAST, quick=False)
         rank = np.where(self.judges.holds(judged), judged["margin"], -1.0).reshape(n, count)

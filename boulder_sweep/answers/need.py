@@ -15,16 +15,18 @@ from typing import TYPE_CHECKING, Any
 import joblib
 
 from boulder_sweep.answers.doubts import every_reading
-from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, share
+from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
 from boulder_sweep.answers.lightest import SIDES, LightestQuestion
 from boulder_sweep.answers.questions import ProbabilityQuestion, Question
-from boulder_sweep.answers.search import WORDS
-from boulder_sweep.answers.trials import Judges, judges_of, ranges
+from boulder_sweep.answers.search import BLOCKED, WORDS
+from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
+from boulder_sweep.columns import OPTIONAL_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.places import Place
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import pool
+from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.settings.model import ReadingChoice
 
 if TYPE_CHECKING:
@@ -53,6 +55,8 @@ class Need:
         Inputs, answer, bracket, outcome at the answer; units in the field metadata.
     simulated : int
         Designs simulated during the search.
+    probability : float or None
+        Probability of passing asked for; None where no input is uncertain.
     """
 
     sweep: Sweep
@@ -60,6 +64,7 @@ class Need:
     least_margin: float
     arrow: pa.Table
     simulated: int
+    probability: float | None = None
 
     def __len__(self) -> int:
         return len(self.arrow)
@@ -82,13 +87,22 @@ class Need:
         """Input columns that follow from others or from the answer."""
         given = self.sweep.plan.given
         derived = tuple(name for name in ("embedment_depth_m", "impact_height_m") if name not in given)
-        return (*derived, *SIDES, "embedment_depth_m") if self.key.name == BOULDER_MASS.name else derived
+        if self.key.name == BOULDER_MASS.name:
+            return (*derived, *SIDES, *EMBEDMENT)
+        return (*derived, *EMBEDMENT) if self.key.name in EMBEDMENT else derived
 
     def counts(self) -> dict[str, int]:
         """Return the number of rows of each kind of answer."""
         found = self.arrow["found"].combine_chunks().value_counts().to_pylist()
         counted = {entry["values"]: entry["counts"] for entry in found}
         return {word: counted[word] for word in WORDS if word in counted}
+
+    @property
+    def errors(self) -> int:
+        """Number of rows that cannot be computed, other than where the boulder has no face left for the truck."""
+        rows = zip(*(self.arrow[name].to_pylist() for name in ("verdict", "reason", "found")), strict=True)
+        blocked = WORDS[BLOCKED]
+        return sum(v == "error" and not (found == blocked and why in NO_FACE) for v, why, found in rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -185,20 +199,31 @@ def need(
         The question is contradictory or out of range.
     SettingsError
         An input has a distribution.
+    TypeError, ValueError
+        The number of jobs is not a whole number, or out of range.
     """
     if probability is None:
         sweep.require_values()
     if least and most:
         raise QuestionError("use either --least or --most, not both")
-    key = key_of(most or least or "embedment_depth", most=bool(most), tolerance=tolerance)
+    word = most or least or "embedment_depth"
+    if (between is not None or tolerance is not None) and key_of(word).name == BOULDER_MASS.name:
+        raise QuestionError(
+            "--least mass takes neither --between nor --tolerance; the sides and the embedment in the file are its "
+            "bounds, in whole millimetres"
+        )
+    key = key_of(word, most=bool(most), tolerance=tolerance)
     if key.name == "friction_angle_deg" and sweep.partial_factor != 1.0:
         raise QuestionError(
             "the friction angle is asked for, and partial_factor would not be applied to the answer; remove it from "
             "the file, then multiply the tangent of the answer by it"
         )
-    least_margin = share(margin, "--margin")
-    if not 0.0 <= least_margin < 1.0:
-        raise QuestionError(f"--margin {margin}: must be 0 or more and less than 100 %")
+    if key.name in OPTIONAL_COLUMNS and key.name not in sweep.plan.given:
+        raise QuestionError(
+            f"the vehicle of {sweep.name} has no second spring; give it both vehicle.second_spring and "
+            f"vehicle.second_spring_from, of which {key.field.path} is then searched"
+        )
+    least_margin = margin_asked(margin)
     if open_readings and probability is None:
         raise QuestionError("--open-readings needs --probability")
     variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep)) if open_readings else ()
@@ -219,7 +244,8 @@ def need(
     from boulder_sweep.answers.tables import joined_tables
 
     table = joined_tables(tables, _metadata(asked[0], least_margin))
-    return Need(sweep, key, least_margin, table, simulated)
+    chance = None if probability is None else share(probability, "--probability")
+    return Need(sweep, key, least_margin, table, simulated, chance)
 
 
 frontier = need

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.answers.keys import BOULDER_MASS
+from boulder_sweep.answers.keys import BOULDER_MASS, key_of
 from boulder_sweep.answers.lightest import SIDES
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.settings.fields import BY_NAME
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.doubts import Doubt
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
-    from boulder_sweep.answers.reserves import Reserves
+    from boulder_sweep.answers.reserves import Reserve, Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
     from boulder_sweep.settings import Sweep
 
@@ -42,6 +42,8 @@ HEADS = {
     "impact_speed_m_s": ("speed", "m/s"),
     "vehicle_spring_N_m": ("spring", "N/m"),
     "vehicle_damper_N_s_m": ("damper", "N s/m"),
+    "vehicle_second_spring_N_m": ("spring 2", "N/m"),
+    "vehicle_second_spring_from_m": ("beyond", "m"),
     "bumper_height_m": ("bumper", "m"),
     "hood_height_m": ("hood", "m"),
     "bed_offset_m": ("bed", "m"),
@@ -52,6 +54,10 @@ NOTES = {
     "never": "never: passes nowhere in the searched range",
     "not_monotone": "*: fails again further on; column passes_within (-o) lists all passing ranges",
     "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
+}
+NOT_FAILING = {
+    "no_progress": "no_progress: small steps lead no nearer to the rare designs; see P(pass)",
+    "contradicts": "contradicts: P(fail) would contradict P(pass), which is counted; see P(pass)",
 }
 SHORT = {"as_printed": "printed", "corrected": "corrected"}
 
@@ -104,19 +110,21 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
     ]
     if "p_fail" in found.arrow.column_names:
-        columns.insert(
-            -2,
-            (
-                ("P(fail)", "subset simulation"),
-                lambda row: f"{row['p_fail']:.2g} ({row['p_fail_low']:.2g} to {row['p_fail_high']:.2g})",
-            ),
-        )
+        columns.insert(-2, (("P(fail)", ""), _failing))
     lines = table_lines(columns, rows, width)
     if count > most:
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
+    occurring = {row.get("p_fail_by") for row in rows}
+    lines += [note for word, note in NOT_FAILING.items() if word in occurring]
     if count == 1:
         lines += ["", *_index_lines(found, width)]
     return lines
+
+
+def _failing(row: Row) -> str:
+    if row["p_fail"] is None:
+        return str(row["p_fail_by"])
+    return f"{row['p_fail']:.2g} ({row['p_fail_low']:.2g} to {row['p_fail_high']:.2g})"
 
 
 def doubt_lines(found: Sequence[Doubt], width: int = WIDTH) -> list[str]:
@@ -138,30 +146,39 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, u
 
     Parameters are those of `need_lines`.
     """
+    from boulder_sweep.answers.reserves import RESERVES
+
     count = len(found)
     rows = _shown_rows(found.arrow, most, units)
     columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
     columns.append((("verdict", ""), lambda row: str(row["verdict"])))
-    for head, column, own, decimals in (
-        (_head("impact_speed_m_s", units), "withstands_speed_m_s", "impact_speed_m_s", 2),
-        (_head("vehicle_mass_kg", units), "withstands_mass_kg", "vehicle_mass_kg", 0),
-        (_head("friction_angle_deg", units), "withstands_friction_angle_deg", "friction_angle_deg", 2),
-    ):
-        columns.append((head, _withstood(column, own, decimals)))
+    for reserve, decimals in zip(RESERVES, (2, 0, 2), strict=True):
+        field = key_of(reserve.input).field
+        size = 1.0 if units == "si" else shown_unit(field.unit, units).size
+        columns.append((_head(field.name, units), _withstood(reserve, field.name, decimals, size)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
     lines = table_lines(columns, rows, width)
     if count > most:
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
+    if any(sign in line for line in lines for sign in "≥≤"):
+        lines.append("≥, ≤: passes at the worst value tried")
     return lines
 
 
-def _withstood(column: str, own: str, decimals: int) -> Cell:
-    """Return a formatter for a value that is withstood and its distance from that of the design."""
+def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:
+    """Return a formatter for a value that is withstood and its distance from that of the design.
+
+    A design that passes at the worst value tried may withstand more.
+    """
+    sense, sign = (1.0, "≥") if reserve.worst > reserve.best else (-1.0, "≤")
+    end = (sense - 1e-9) * reserve.worst / size
 
     def cell(row: Row) -> str:
-        if row[column] is None:
+        value = row[reserve.column]
+        if value is None:
             return "-"
-        return f"{row[column]:.{decimals}f} ({row[column] / row[own] - 1.0:+.0%})"
+        before = sign if row["verdict"] == "pass" and sense * value >= end else ""
+        return f"{before}{value:.{decimals}f} ({value / row[own] - 1.0:+.0%})"
 
     return cell
 
@@ -246,19 +263,24 @@ def _leading(sweep: Sweep, table: pa.Table, names: Sequence[str], units: str) ->
     labels: list[Column] = [((name, ""), _word(name)) for name in sweep.plan.labels if name in table.column_names]
     if sweep.table is not None:
         return [*labels, (("design", ""), lambda row: str(row["design_id"]))]
-    return labels + [(_head(name, units), _number(name)) for name in names if _varies(table, name)]
+    return labels + [(_head(name, units), _number(name)) for name in names if _varies(sweep, table, name)]
 
 
 def _word(name: str) -> Cell:
     return lambda row: str(row[name])
 
 
-def _varies(table: pa.Table, name: str) -> bool:
-    """Whether an input differs between rows."""
+def _varies(sweep: Sweep, table: pa.Table, name: str) -> bool:
+    """Whether an input differs between rows; a table holds depths, also where the file gives ratios."""
+    if name == "embedment_ratio":
+        given = sweep.plan.given.get(name)
+        return given is not None and bool(given.values.min() < given.values.max())
     return name in table.column_names and len(table[name].unique()) > 1
 
 
 def _number(name: str) -> Cell:
+    if name == "embedment_ratio":
+        return lambda row: f"{row['embedment_depth_m'] / row['boulder_height_m']:.5g}"
     return lambda row: f"{row[name]:.5g}"
 
 

@@ -9,12 +9,14 @@ import numpy as np
 
 from boulder_sweep.answers.chance import SCRAMBLINGS, Chance, Points, chance
 from boulder_sweep.answers.draws import Draws, threads
-from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.search import BEYOND, CELLS, FAILS, FAR, HOLDS, NOT_MONOTONE, Search, search
+from boulder_sweep.answers.keys import Ends, Key, range_of, reach_of, refuse_coarse
+from boulder_sweep.answers.search import BEYOND, BLOCKED, CELLS, FAILS, FAR, HOLDS, NEVER, NOT_MONOTONE, Search, search
 from boulder_sweep.answers.spread import Spread, uncertain_rows
-from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
+from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, ranges, taken
 from boulder_sweep.judge.judged import with_rows
 
+CHECKED_AT_ONCE = 65_536
+"""Rows whose ranges are checked together, before any row is searched."""
 DRAWN = 4096
 """Samples at each value if a probability is asked for."""
 HALF_WIDTH = 0.005
@@ -78,7 +80,7 @@ class Question:
     Raises
     ------
     QuestionError
-        The search range is empty or not admitted.
+        The search range is empty or not admitted, or the tolerance does not suit it.
     """
 
     rows_at_once = 2048
@@ -89,7 +91,8 @@ class Question:
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges) -> None:
         self.sweep, self.key, self.between, self.judges = sweep, key, between, judges
         self.open = Open(sweep, (key.name,))
-        range_of(sweep, key, self.open.rows(0, 0), between)  # refuses a wrong range before anything is computed
+        pieces = (self.open.rows(start, stop) for start, stop in ranges(self.count, CHECKED_AT_ONCE))
+        refuse_coarse(sweep, key, pieces, between)  # also refuses a wrong range, before anything is computed
 
     @property
     def count(self) -> int:
@@ -114,7 +117,7 @@ class Question:
         return Answers(
             replace(block, labels=self.open.labels(start, stop)),
             judged,
-            found.kind,
+            self.kinds(rows, found, trial),
             np.where(found.has_fails, self.key.values(found.fails), np.nan),
             np.where(found.has_holds, self.key.values(found.holds), np.nan),
             [_stretches(self.key, found.changes.get(row), first[row], last[row]) for row in range(stop - start)],
@@ -131,6 +134,22 @@ class Question:
     def trial(self, rows: Rows) -> Trial:
         """Return the object that tries values in some rows."""
         return Trial(self.key, self.judges, rows)
+
+    def kinds(self, rows: Rows, found: Search, trial: Trial) -> np.ndarray:
+        """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
+
+        Where nothing passes, the end of the range tells whether the truck goes over the boulder there, and not the last
+        place of the lattice, which may lie before it.
+        """
+        kind = found.kind.copy()
+        never = np.flatnonzero(kind == NEVER)
+        if len(never):
+            end = range_of(self.sweep, self.key, rows, self.between)[0 if self.key.most else 1]
+            beyond = end >= reach_of(self.key, rows) * (1.0 - 1e-12)
+            untried = never[~beyond[never] & (self.key.values(found.shown[never]) != end[never])]
+            beyond[untried] = trial.beyond(untried, end[untried])
+            kind[never[beyond[never]]] = BLOCKED
+        return kind
 
 
 class ProbabilityQuestion(Question):
@@ -150,7 +169,7 @@ class ProbabilityQuestion(Question):
     Raises
     ------
     QuestionError
-        The search range is empty or not admitted, or no input has a distribution.
+        As of `Question`, no input has a distribution, or that of the input asked for cannot move with its mean.
     """
 
     rows_at_once = 4
@@ -167,7 +186,7 @@ class ProbabilityQuestion(Question):
         variants: tuple[Judges, ...] = (),
     ) -> None:
         super().__init__(sweep, key, between, judges)
-        self.spread, self.probability, self.seed = Spread(sweep), probability, seed
+        self.spread, self.probability, self.seed = Spread(sweep, key.name), probability, seed
         self.variants = variants
         points = Points(len(self.spread.names) + bool(variants), seed).upto(DRAWN // SCRAMBLINGS)
         self.points = points.reshape(DRAWN, -1)
@@ -201,6 +220,12 @@ class Trial:
     def block(self, index: np.ndarray, places: np.ndarray) -> DesignBlock:
         """Return the designs with these values."""
         return taken(self.rows, index, **{self.key.name: self.key.values(places)})
+
+    def beyond(self, index: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return whether there is nothing to try at these values, which need not be on the lattice, shape (m,)."""
+        block = taken(self.rows, index, **{self.key.name: values})
+        self.simulated += len(index)
+        return beyond_reach(block, self.judges.quick(block))
 
     def contradicted(self, found: Search, block: DesignBlock, judged: Judged) -> np.ndarray:
         """Return the rows that the accuracy of the sweep does not confirm, shape (m,).

@@ -39,7 +39,7 @@ CLASS_TOLERANCE = 0.02
 """A class applies to a truck of one mass; none is named if the mass differs by more than this share."""
 
 Told = Callable[[int, int], None]
-"""Told how many rows of how many are done."""
+"""Called with the number of rows done and the total."""
 
 
 class Reserve(NamedTuple):
@@ -52,7 +52,7 @@ class Reserve(NamedTuple):
     best: float
     """Best value tried."""
     worst: float
-    """Worst value tried."""
+    """Worst value tried, unless the design itself has a worse one."""
     meaning: str
 
 
@@ -121,12 +121,14 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None)
     -------
     Reserves
         One row a design. If a design fails at every value tried, the column is null; if it never fails, the column
-        holds the last value tried.
+        holds the last value tried, or the design's own value if that is worse still.
 
     Raises
     ------
     SettingsError
         An input has a distribution.
+    TypeError, ValueError
+        The number of jobs is not a whole number, or out of range.
     """
     from boulder_sweep.answers.tables import joined_tables
     from boulder_sweep.store.provenance import file_metadata, identity
@@ -162,7 +164,8 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
     passes
         Whether they pass as they are.
     best, worst
-        Range over which the input is changed.
+        Range over which the input is changed. It begins at the design's own value: a design that passes beyond `worst`
+        withstands its own value, and nothing is tried for one that fails beyond `best`.
     """
     trial = Trial(key, judges, rows)
     own = rows[key.name] / key.tolerance
@@ -170,6 +173,10 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
     first = (np.floor(own + 1e-9) if worst > best else np.ceil(own - 1e-9)).astype(np.int64)
     ends = (round(end / key.tolerance) for end in (worst, best))
     last = np.where(passes, *ends)
+    # A range never runs backwards: towards the better side for a design that passes, or the worse for one that fails.
+    upwards = passes == (worst > best)
+    backwards = np.where(upwards, last < first, last > first)
+    last = np.where(backwards, first, last)
 
     def predicate(codes: Callable[[np.ndarray, np.ndarray], np.ndarray], index: np.ndarray) -> Any:
         """Search for the change of verdict; for a design that passes, for the first value at which it does not."""
@@ -189,7 +196,8 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
     # `fails` is the last place before the change; for a design that passes, that is the withstood value.
     at = np.where(passes, np.where(found.has_holds, found.fails, last), found.holds)
     at = np.where(passes & found.has_holds & ~found.has_fails, first, at)
-    return np.where(passes | found.has_holds, key.values(at), np.nan)
+    values = np.where(passes | found.has_holds, key.values(at), np.nan)
+    return np.where(backwards, np.where(passes, rows[key.name], np.nan), values)
 
 
 def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:

@@ -3,6 +3,9 @@
 The rare event is reached in levels, each a tenth as probable as the one before. Within a level the points move by x' =
 a x + sqrt(1 - a^2) w, which preserves the standard normal distribution; a move that would leave the level is rejected.
 Several populations give the interval.
+
+This works if the distance says how far a point is from the event. Where it is the same for most points of a level, the
+next level is no nearer to the event, and there is no result.
 """
 
 from __future__ import annotations
@@ -36,12 +39,35 @@ class Rare:
     Attributes
     ----------
     estimate, low, high : ndarray, shape (n,)
-        The probability and its interval, symmetric on a logarithmic scale.
+        The probability and its interval, symmetric on a logarithmic scale; NaN where a level came no nearer to the
+        event than the one before.
     """
 
     estimate: np.ndarray
     low: np.ndarray
     high: np.ndarray
+
+
+FAILING = ("drawn", "subset", "no_progress", "contradicts")
+"""How a probability of failing was found, or, the last two, why there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Failing:
+    """Probabilities of failing of n rows.
+
+    Attributes
+    ----------
+    estimate, low, high : ndarray, shape (n,)
+        The probability and its confidence interval; NaN where there is none.
+    by : ndarray of int32, shape (n,)
+        Place in `FAILING`.
+    """
+
+    estimate: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    by: np.ndarray
 
 
 def subset_simulation(
@@ -73,13 +99,16 @@ def subset_simulation(
     Returns
     -------
     Rare
-        Zero, with an upper end of 1e-12, where the event was never reached.
+        Zero, with an upper end of 1e-12, where the event was not reached although every level came nearer to it.
     """
+    if rows == 0:
+        return Rare(*(np.empty(0) for _ in range(3)))
     rng = np.random.default_rng(seed)
     x = rng.standard_normal((rows, POPULATIONS, points, dimensions))
     g = _distances(distance, np.arange(rows), x)
     probability = np.ones((rows, POPULATIONS))
     open_ = np.arange(rows)
+    last = g.reshape(rows, -1).max(axis=1)
     for level in range(MOST_LEVELS):
         # One threshold for all populations of a row: it hardly depends on any single one, so the estimates of the
         # populations are free of the bias that thresholds of their own would cause.
@@ -87,7 +116,10 @@ def subset_simulation(
         edge = np.where(edge <= 0.0, 0.0, edge)
         inside = g[open_] <= edge[:, None, None]
         probability[open_] *= inside.mean(axis=2)
-        going = edge > 0.0
+        stuck = (edge > 0.0) & (edge >= last[open_])
+        probability[open_[stuck]] = np.nan
+        going = (edge > 0.0) & ~stuck
+        last[open_] = edge
         if level == MOST_LEVELS - 1:
             probability[open_[going]] = 0.0
         open_, edge, inside = open_[going], edge[going], inside[going]
@@ -139,4 +171,4 @@ def _combined(probability: np.ndarray, confidence: float) -> Rare:
     ratio = np.divide(error, mean, out=np.zeros_like(mean), where=mean > 0.0)
     factor = np.exp(stdtrit(POPULATIONS - 1, 0.5 + 0.5 * confidence) * ratio)
     least = SHARE**MOST_LEVELS
-    return Rare(mean, mean / factor, np.where(mean > 0.0, np.minimum(mean * factor, 1.0), least))
+    return Rare(mean, mean / factor, np.where(mean == 0.0, least, np.minimum(mean * factor, 1.0)))

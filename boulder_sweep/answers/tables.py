@@ -15,10 +15,12 @@ import pyarrow.parquet as pq
 
 from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.sensitivity import Indices
+from boulder_sweep.answers.subset import FAILING
 from boulder_sweep.columns import DESIGN_ID, INPUTS
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.places import Place, RemotePath, place_of
 from boulder_sweep.store.schema import part_table
+from boulder_sweep.store.targets import check_target
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.chance import Chance
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.questions import Answers
+    from boulder_sweep.answers.subset import Failing
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
 
@@ -106,7 +109,7 @@ def chance_table(
     found: Chance,
     driver: np.ndarray,
     words: Sequence[str],
-    failing: Chance | None,
+    failing: Failing | None,
 ) -> pa.Table:
     """Return probabilities as a table: inputs, outcome at the means, probability of passing, most influential input.
 
@@ -123,7 +126,7 @@ def chance_table(
     words
         The uncertain inputs.
     failing
-        Probabilities of failing by subset simulation.
+        Probabilities of failing, small ones by subset simulation.
     """
     table = part_table(replace(block, start=start, stop=start + len(block)), judged, {})
     places = pa.array(driver.astype(np.int32), mask=driver < 0)
@@ -141,9 +144,22 @@ def chance_table(
     ]
     if failing is not None:
         columns += [
-            ("p_fail", "1", "chance that the design does not pass, by subset simulation", pa.array(failing.estimate)),
-            ("p_fail_low", "1", "lower end of the interval of p_fail", pa.array(failing.low)),
-            ("p_fail_high", "1", "upper end of the interval of p_fail", pa.array(failing.high)),
+            (
+                "p_fail",
+                "1",
+                "chance that the design does not pass; null where p_fail_by says why",
+                _numbers(failing.estimate),
+            ),
+            ("p_fail_low", "1", "lower end of the interval of p_fail", _numbers(failing.low)),
+            ("p_fail_high", "1", "upper end of the interval of p_fail", _numbers(failing.high)),
+            (
+                "p_fail_by",
+                "",
+                "subset: by subset simulation; drawn: by the designs drawn for p_pass; no_progress: no step of the "
+                "simulation came nearer to the rare designs; contradicts: its interval and that of p_pass "
+                "exclude each other",
+                pa.DictionaryArray.from_arrays(pa.array(failing.by), pa.array(FAILING)),
+            ),
         ]
     for name, unit, meaning, array in columns:
         table = table.append_column(pa.field(name, array.type, metadata={"unit": unit, "meaning": meaning}), array)
@@ -235,7 +251,7 @@ def write_parquet(table: pa.Table, path: str | Place) -> Place:
     Raises
     ------
     QuestionError
-        The name has another ending, its folder does not exist, or it cannot be written.
+        The name has another ending, its folder does not exist or holds the result of a run, or it cannot be written.
     """
     target = checked_parquet(path)
     split = [field.name for field in table.schema if field.name != DESIGN_ID.name and pa.types.is_floating(field.type)]
@@ -264,13 +280,12 @@ def checked_parquet(path: str | Place) -> Place:
     Raises
     ------
     QuestionError
-        The name has another ending, or its folder does not exist.
+        The name has another ending, or its folder does not exist or holds the result of a run.
     """
     target = place_of(path)
     if target.suffix.lower() != ".parquet":
         raise QuestionError(f"{path}: answers are a Parquet file; its name must end in .parquet")
-    if isinstance(target, Path) and not target.absolute().parent.is_dir():
-        raise QuestionError(f"{path}: the folder {target.absolute().parent} does not exist")
+    check_target(target, QuestionError)
     return target
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.designs import DesignBlock, Label, block_of
+from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of
 from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged
@@ -22,8 +22,11 @@ if TYPE_CHECKING:
 
 OUT_OF_REACH = ("no_contact", "override")
 """Reasons for which there is nothing to search at a value: the truck goes over the boulder."""
+NO_FACE = (REASONS[1], REASONS[3])
+"""Reasons of designs that cannot be computed for which there is nothing to search either: the boulder is buried, or
+ends below the impact height of the file."""
 PLACEHOLDER = 0.5
-SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s")
+SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "vehicle_crush_m")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
 
 Rows = dict[str, np.ndarray]
@@ -84,7 +87,7 @@ class Judges:
     accuracy
         The sweep's own accuracy.
     least_margin
-        Margin that a design must have to count as passing.
+        Margin that a design must have to count as passing. Both evaluations prove that it lasts.
     """
 
     quick: Evaluation
@@ -105,9 +108,9 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
     horizon.
     """
     accuracy = accuracy_of(sweep)
-    own = evaluation_of(sweep, accuracy, proved=False)
+    own = dataclasses.replace(evaluation_of(sweep, accuracy, proved=False), least_margin=least_margin)
     quick = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False), proved=False)
-    quick = dataclasses.replace(quick, only=SEARCHED)
+    quick = dataclasses.replace(quick, only=SEARCHED, least_margin=least_margin)
     if not accuracy.error_estimate and accuracy.steps.step_s >= quick.control.h:
         quick = own
     return Judges(quick, own, accuracy, least_margin)

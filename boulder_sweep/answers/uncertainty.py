@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chance, Points, chance
+from boulder_sweep.answers.chance import FEWEST, FIRST, SCRAMBLINGS, Chance, Points, chance
 from boulder_sweep.answers.draws import Draws
-from boulder_sweep.answers.keys import share
+from boulder_sweep.answers.keys import margin_asked, share
 from boulder_sweep.answers.sensitivity import drivers, indices
 from boulder_sweep.answers.spread import Spread, uncertain_rows
-from boulder_sweep.answers.subset import subset_simulation
+from boulder_sweep.answers.subset import FAILING, Failing, subset_simulation
 from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
@@ -142,10 +142,10 @@ def uncertainty(
     seed
         Seed of all random numbers; the same seed gives the same result, whatever the number of threads.
     most
-        Most samples of a row.
+        Most samples of a row; fewer than 512 are not drawn.
     rare
         Whether to compute the smaller of the probabilities of failing and passing by subset simulation as well, which
-        reaches 1e-6 and below.
+        reaches 1e-6 and below. Null, with the reason in ``p_fail_by``, where that does not work.
     jobs
         Threads; all cores by default.
     backend, scheduler
@@ -157,16 +157,17 @@ def uncertainty(
     ------
     QuestionError
         No input has a distribution, or an argument is out of range.
+    TypeError, ValueError
+        The number of jobs is not a whole number, or out of range.
     """
-    width, sure, least_margin = (
-        share(half_width, "--half-width"),
-        share(confidence, "--confidence"),
-        share(margin, "--margin"),
-    )
+    width, sure = share(half_width, "--half-width"), share(confidence, "--confidence")
+    least_margin = margin_asked(margin)
     if not 1e-6 <= width <= 0.5:
         raise QuestionError(f"--half-width {half_width}: must be between 0.000001 and 0.5")
     if not 0.5 <= sure < 1.0:
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
+    if seed < 0:
+        raise QuestionError(f"--seed {seed}: must not be negative")
     if rare and sweep.n_designs > MOST_INDEXED:
         raise QuestionError(f"--rare takes up to {MOST_INDEXED} designs; this file has {sweep.n_designs:,}")
     asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most, rare)
@@ -252,22 +253,29 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     return chance_table(start, block, asked.judges.own(block), found, driver, asked.spread.words, failing)
 
 
-def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Chance:
-    """Return the probabilities of failing, from subset simulation of the rarer of failing and passing."""
-    n = len(found.estimate)
-    sign = np.where(found.estimate >= 0.5, 1.0, -1.0)
+def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Failing:
+    """Return the probabilities of failing: `found` if enough designs fall on each side, else from subset simulation."""
+    passing = found.estimate * found.points
+    few = np.flatnonzero(np.minimum(passing, found.points - passing) < FEWEST)
+    sign = np.where(found.estimate[few] >= 0.5, 1.0, -1.0)
 
     def distance(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return sign[index] * draws.distance(index, z)
+        return sign[index] * draws.reserve(few[index], z)
 
-    small = subset_simulation(distance, n, len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
+    small = subset_simulation(distance, len(few), draws.dimensions, seed=asked.seed, confidence=asked.confidence)
     fails = sign > 0.0
-    return Chance(
-        np.where(fails, small.estimate, 1.0 - small.estimate),
-        np.where(fails, small.low, 1.0 - small.high),
-        np.where(fails, small.high, 1.0 - small.low),
-        found.points,
-    )
+    estimate, low, high = 1.0 - found.estimate, 1.0 - found.high, 1.0 - found.low
+    estimate[few] = np.where(fails, small.estimate, 1.0 - small.estimate)
+    apart = np.zeros(len(estimate), dtype=bool)
+    from_, to = np.where(fails, small.low, 1.0 - small.high), np.where(fails, small.high, 1.0 - small.low)
+    apart[few] = (from_ > high[few]) | (to < low[few])
+    low[few], high[few] = from_, to
+    by = np.full(len(estimate), FAILING.index("drawn"), dtype=np.int32)
+    by[few] = np.where(np.isnan(small.estimate), FAILING.index("no_progress"), FAILING.index("subset"))
+    by[apart] = FAILING.index("contradicts")
+    known = by < FAILING.index("no_progress")
+    estimate, low, high = (np.where(known, own, np.nan) for own in (estimate, low, high))
+    return Failing(estimate, low, high, by)
 
 
 def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tuple[Any, Any]:

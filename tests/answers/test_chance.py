@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pystra
 import pytest
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 from scipy.stats import sobol_indices, uniform
 
-from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance, interval
 from boulder_sweep.answers.sensitivity import drivers, estimators, indices
 from boulder_sweep.answers.subset import subset_simulation
 
@@ -54,6 +54,27 @@ def test_stated_intervals_hold_at_their_rate(edge: float) -> None:
         found = chance(lambda _, z: linear(z) <= edge, 1, Points(3, seed), half_width=0.01)
         held += int(found.low[0] <= ndtr(edge) <= found.high[0])
     assert held >= 182, "95 % of 200 are 190, less three standard deviations"
+
+
+@pytest.mark.parametrize("weights", [(1.0,), (0.95, 0.3122), (1.0, 1.0, 1.0)])
+def test_stated_intervals_hold_for_whatever_number_of_inputs_decides(weights: tuple[float, ...]) -> None:
+    """If one input decides, all scramblings often count the same; their spread alone held 85 % of the time."""
+    direction = np.array(weights) / np.linalg.norm(weights)
+    exact = np.random.default_rng(0).uniform(0.02, 0.98, 200)
+    edges, held, widths = ndtri(exact), [], []
+    for seed in range(10):
+        points = Points(len(weights), seed)
+        found = chance(lambda row, z: z @ direction <= edges[row], len(exact), points, half_width=0.01)
+        held.append((found.low <= exact) & (exact <= found.high))
+        widths.append(found.high - found.low)
+    assert np.mean(held) >= 0.95
+    assert np.min(widths) > 0.0
+    assert np.max(widths) <= 0.02 + 1e-12
+
+
+def test_scramblings_that_agree_are_not_certain() -> None:
+    low, high = interval(np.full((1, SCRAMBLINGS), 16.0), 32, 0.95)
+    assert (high - low)[0] == pytest.approx(2.0 * (1.0 - 0.05 ** (1 / 16)) / 32)
 
 
 def ishigami(u: np.ndarray) -> np.ndarray:
@@ -131,9 +152,18 @@ def test_small_probability_of_a_curved_limit_state_is_that_of_pystra(curvature: 
 
 
 def test_what_cannot_happen_has_an_upper_end_only() -> None:
-    found = subset_simulation(lambda row, z: np.ones(len(z)), 1, 2, seed=0, points=100)
+    found = subset_simulation(lambda row, z: 1.0 + ndtr(linear(z)), 1, 2, seed=0, points=100)
     assert (found.estimate[0], found.low[0]) == (0.0, 0.0)
     assert 0.0 < found.high[0] <= 1e-11
+
+
+@pytest.mark.parametrize("height", [1.0, np.finfo(float).tiny])
+def test_where_no_level_comes_nearer_there_is_no_probability(height: float) -> None:
+    """All other points are equally far from the event, which a seventh or a hundredth of them meet, or none."""
+    events = np.array([-1.1, -2.33, -99.0])
+    found = subset_simulation(lambda row, z: np.where(linear(z) <= events[row], -1.0, height), 3, 2, seed=0, points=100)
+    assert found.estimate[0] == pytest.approx(ndtr(-1.1), abs=0.03)
+    assert np.isnan([found.estimate[1:], found.low[1:], found.high[1:]]).all()
 
 
 def test_what_always_happens_is_certain() -> None:

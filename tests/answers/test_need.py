@@ -14,14 +14,17 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.answers.keys import key_of
+from boulder_sweep.answers.lightest import LightestQuestion, _Boulders
 from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.printing import need_lines
+from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.designs import block_of
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.settings import SettingsError, Sweep
+from boulder_sweep.settings import SettingsError, Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import random_designs, site
 
@@ -54,7 +57,8 @@ def test_brackets_of_random_designs_are_certified() -> None:
     assert certify(found) >= 500
     counts = found.counts()
     assert sum(counts.values()) == len(found) == 2000
-    assert set(counts) >= {"found", "always", "never"}
+    assert set(counts) >= {"found", "always", "blocked_by_overlap"}
+    assert "never" not in counts, "every range ends where the truck would go over the boulder"
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "fine"])
@@ -104,6 +108,31 @@ def test_margin_needs_more_depth() -> None:
     more = need(site(), margin="25 %", both_readings=False)
     assert (more.frame.least_embedment_depth_m > plain.least_embedment_depth_m)[more.frame.passes_at.notna()].all()
     assert more.frame.margin[more.frame.passes_at.notna()].between(0.25, 0.27).all()
+
+
+RINGS_ON = """
+boulder: {length: 1.648 m, width: 1.327 m, height: 3.31 m, density: 2671 kg/m^3}
+site: {embedment_depth: 1.266 m}
+soil: {density: 1711 kg/m^3, friction_angle: 29.56 deg, subgrade_reaction: 9.91 MN/m^3, strain_rate_factor: 1.197}
+vehicle: {mass: 2933 kg, speed: 8.887 m/s, spring: 2339.9 kN/m, damper: 297.6 kN*s/m}
+"""
+
+
+def test_a_margin_is_proved_to_last() -> None:
+    """At the horizon of a second the verdict is proved, and the rotation still grows, by 0.7 degrees."""
+    brief = load_text(RINGS_ON, Path("brief.yaml"))
+    long = dataclasses.replace(brief, solver=dataclasses.replace(brief.solver, horizon_s=8.0))
+    for asked, holds in ((0.0, True), (0.33, True), (0.36, False)):
+        for sweep in (brief, long):
+            judges = judges_of(sweep, asked)
+            for evaluation in (judges.quick, judges.own):
+                rows = evaluation(sweep.block(0, 1))
+                assert rows.verdict[0] == PASS
+                assert judges.holds(rows)[0] == holds
+                assert rows["margin"][0] >= 0.375 or not holds or sweep is long
+    question = {"margin": "36 %", "between": ("1.2 m", "1.4 m"), "both_readings": False}
+    one, other = (need(sweep, "embedment_depth", **question).frame.iloc[0] for sweep in (brief, long))
+    assert (one.found, one.passes_within) == (other.found, other.passes_within) == ("not_monotone", "1.2 to 1.219")
 
 
 def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
@@ -185,6 +214,82 @@ def test_the_lightest_boulder_is_lighter_than_any_of_the_grid(tmp_path: Path) ->
     assert (frame[DEPTH] / frame.boulder_height_m).between(0.549, 0.751).all()
 
 
+@pytest.mark.parametrize(
+    ("changes", "lighter_kg"),
+    [
+        ({"width": "1.4 m", "friction": "40 deg", "subgrade": "63 MN/m^3"}, 17_598.0),
+        ({"width": "1.4 m", "friction": "42 deg", "subgrade": "63 MN/m^3"}, 16_937.0),
+        (
+            {"length": "0.6 m", "friction": "38 deg", "height": "[1.6, 4.0] m", "site": "embedment_ratio: [0.35, 0.8]"},
+            8387.0,
+        ),
+    ],
+)
+def test_the_lightest_boulder_may_reach_no_deeper_than_it_must_overlap(
+    changes: dict[str, str], lighter_kg: float
+) -> None:
+    """The deepest embedment of a range may leave too little overlap; the best one is just above that limit."""
+    usual = {"height": "[1.8, 3.6] m", "site": "embedment_ratio: [0.45, 0.75]"}
+    found = need(site(**(usual | changes)), "mass", both_readings=False)
+    frame = found.frame
+    assert frame.least_boulder_mass_kg[0] < lighter_kg
+    assert passes(found, frame, frame[DEPTH], DEPTH).all()
+    assert frame.margin[0] < 0.01, "a least mass just passes"
+
+
+@pytest.mark.parametrize("least", [0.0, 0.1, 0.25, 0.3])
+def test_the_deepest_embedment_tried_overlaps_enough_by_the_sums_of_the_verdict(least: float) -> None:
+    sweep = site(height="[1.6, 4.0] m", site="embedment_depth: [0.1, 4.0] m")
+    sweep = dataclasses.replace(sweep, criterion=dataclasses.replace(sweep.criterion, min_overlap_m=least))
+    asked = LightestQuestion(sweep, key_of("mass"), judges_of(sweep))
+    trial = _Boulders(asked, asked.open.rows(0, 1))
+    height = np.arange(1600, 4001) / 1000
+    depth = trial.depths(np.zeros(len(height), dtype=int), height, 25)[:, -1]
+    overlap = height - depth - 0.5
+    assert (overlap >= least).all()
+    assert (overlap > 0.0).all()
+    assert (overlap < least + 2.1e-3).all()
+
+
+def random_bounds(rng: np.random.Generator) -> tuple[dict[str, tuple[float, float]], dict[str, str]]:
+    """Return bounds of a boulder's sides [m], and a file with them."""
+    bounds = {
+        "length": (round(rng.uniform(0.6, 1.4), 2), round(rng.uniform(1.6, 2.2), 2)),
+        "width": (round(rng.uniform(0.8, 1.6), 2), round(rng.uniform(1.8, 2.6), 2)),
+        "height": (round(rng.uniform(1.4, 2.2), 2), round(rng.uniform(3.4, 4.2), 2)),
+    }
+    changes = {side: f"[{low}, {high}] m" for side, (low, high) in bounds.items()}
+    changes["site"] = f"embedment_ratio: [{rng.uniform(0.35, 0.5):.2f}, {rng.uniform(0.65, 0.85):.2f}]"
+    return bounds, changes | {"friction": f"{rng.uniform(34, 44):.1f} deg"}
+
+
+@pytest.mark.slow
+def test_no_boulder_among_many_is_lighter_than_the_lightest() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(8):
+        bounds, changes = random_bounds(rng)
+        sweep = site(**changes)
+        answer = need(sweep, "mass", both_readings=False).frame.iloc[0]
+        least = answer.least_boulder_mass_kg
+        best = np.array([answer[f"boulder_{side}_m"] for side in bounds], dtype=float)
+        ends = np.array(list(bounds.values()))
+        ratios = np.array(changes["site"].split(": ")[1].strip("[]").split(", "), dtype=float)
+        # Over the whole of the bounds, and near the answer.
+        sides = np.concatenate([rng.uniform(*ends.T, (400_000, 3)), best + rng.uniform(-0.2, 0.2, (200_000, 3))])
+        sides = np.rint(np.clip(sides, *ends.T) * 1000) / 1000
+        mass = sides.prod(axis=1) * 2600.0
+        sides = sides[(mass > 0.9 * least) & (mass < 0.998 * least)]
+        low, deepest = ratios[0] * sides[:, 2], np.minimum(ratios[1] * sides[:, 2], sides[:, 2] - 0.75)
+        share = 1.0 - rng.uniform(0.0, 1.0, len(sides)) ** 2
+        depth = np.floor((low + share * (deepest - low)) * 1000) / 1000
+        names = [f"boulder_{side}_m" for side in bounds]
+        inputs = dict(zip(names, sides.T, strict=True)) | {DEPTH: depth}
+        rows = {name: np.full(len(sides), values[0]) for name, values in sweep.plan.given_rows(0, 1).items()}
+        del rows["embedment_ratio"]
+        assert len(sides) > 2000
+        assert not (judges_of(sweep).own(block_of(rows | inputs)).verdict == PASS).any()
+
+
 def test_one_boulder_is_scaled_with_its_proportions() -> None:
     frame = need(site(height="3 m", site="embedment_ratio: 0.65"), "mass").frame
     assert np.allclose(frame.boulder_height_m / frame.boulder_length_m, 3.0 / 1.65, rtol=2e-3)
@@ -207,11 +312,69 @@ def test_one_boulder_is_scaled_with_its_proportions() -> None:
         ({"tolerance": "0 mm"}, "must be positive"),
         ({"tolerance": "1 deg"}, "a length is needed"),
         ({"most": "mass"}, "use --least mass"),
+        ({"least": "mass", "between": ("1 kg", "2 kg")}, "neither --between nor --tolerance"),
+        ({"least": "mass", "tolerance": "1 mm"}, "neither --between nor --tolerance"),
     ],
 )
 def test_questions_that_make_no_sense_are_refused(question: dict, message: str) -> None:
     with pytest.raises(QuestionError, match=message):
         need(site(), **question)
+
+
+@pytest.mark.parametrize(
+    ("question", "message"),
+    [
+        (
+            {"most": "speed", "between": ("12 m/s", "18 m/s"), "tolerance": "20 m/s"},
+            "the range to search, 12 to 18 m/s, holds no multiple of the tolerance, 20 m/s; give a smaller --tolerance",
+        ),
+        ({"most": "speed", "between": ("12 m/s", "18 m/s"), "tolerance": "15 m/s"}, "holds only one multiple"),
+        ({"between": ("1.9491 m", "1.9499 m")}, r"1\.9491 to 1\.9499 m, holds no multiple of the tolerance, 0\.001 m"),
+        ({"tolerance": "2 m"}, r"0\.91 to 2\.1 m, holds only one multiple of the tolerance, 2 m"),
+        ({"tolerance": "20 m"}, "holds no multiple of the tolerance, 20 m"),
+        ({"tolerance": "1e-20 m"}, "too many multiples of the tolerance, 1e-20 m; give a larger --tolerance"),
+        ({"least": "embedment_ratio", "between": (0.61, 0.69), "tolerance": 0.1}, r"0\.61 to 0\.69, holds no multiple"),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_a_tolerance_that_does_not_suit_the_range_is_refused(question: dict, message: str) -> None:
+    with pytest.raises(QuestionError, match=message):
+        need(site(height="2.6 m"), **question)
+
+
+def test_an_axis_between_two_multiples_is_refused_and_searched_with_a_finer_tolerance() -> None:
+    sweep = site(height="3 m", friction="40 deg", site="embedment_depth: [1.9491, 1.9499] m")
+    with pytest.raises(QuestionError, match="holds no multiple"):
+        need(sweep)
+    assert need(sweep, tolerance="0.1 mm", both_readings=False).frame.passes_at[0] == 1.9491
+
+
+@pytest.mark.parametrize("question", [{}, {"least": "embedment_ratio"}, {"tolerance": "1 in"}])
+def test_the_end_of_the_range_tells_what_is_blocked_and_not_the_last_multiple_before_it(question: dict) -> None:
+    found = need(site(height="2.6 m"), both_readings=False, **question).frame
+    assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap"]
+    assert need(site(height="2.6 m"), between=("1.5 m", "2 m"), both_readings=False).frame.found[0] == "never"
+
+
+def test_a_curve_of_the_chart_holds_one_ratio_of_embedment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table holds depths; the file gives ratios, of which the chart shows one and says which."""
+    curves = []
+    monkeypatch.setattr("boulder_sweep.views.design_chart._curve", lambda *words: curves.append(words[2]))
+    monkeypatch.setattr("matplotlib.axes.Axes.legend", lambda *_, **__: None)  # of no curve
+    sweep = site(height="[3, 3.2, 3.4] m", friction="40 deg", site="embedment_ratio: [0.6, 0.65, 0.7]")
+    need(sweep, most="speed", both_readings=False).plot(tmp_path / "chart.png")
+    assert [rows.boulder_height_m.tolist() for rows in curves] == [[3.0, 3.2, 3.4]]
+    assert (curves[0].embedment_depth_m / curves[0].boulder_height_m).tolist() == pytest.approx([0.65] * 3)
+
+
+def test_ranges_that_are_narrow_by_themselves_are_searched() -> None:
+    """Ends of half a millimetre where the truck goes over, no range at all, and one value that is not round."""
+    found = need(site(height="[0.7, 0.7696, 3] m", friction="40 deg"), both_readings=False).frame
+    assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap", "found"]
+    one = need(site(height="2.999 m", friction="40 deg", site="embedment_ratio: [0.7]"), both_readings=False).frame
+    assert one.found.tolist() == ["always"]
+    coarse = need(site(height="[0.7, 3] m", friction="40 deg"), tolerance="5 cm", both_readings=False).frame
+    assert coarse.found.tolist() == ["blocked_by_overlap", "found"]
 
 
 def test_a_list_of_designs_has_no_bounds_for_the_mass() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.printing import reserve_lines
 from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, classes, reserves
 from boulder_sweep.columns import INPUT_COLUMNS
@@ -28,8 +29,8 @@ def passes(frame: pd.DataFrame, **inputs: np.ndarray) -> np.ndarray:
     return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS
 
 
-def replace_mass(sweep: Sweep, mass: float) -> Sweep:
-    return dataclasses.replace(sweep, constants=sweep.constants | {"vehicle_mass_kg": mass})
+def with_constants(sweep: Sweep, **values: float) -> Sweep:
+    return dataclasses.replace(sweep, constants=sweep.constants | values)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +76,7 @@ def test_speeds_of_iso_22343_are_named_for_trucks_of_7200_kg_only() -> None:
     mass = np.array([7200.0] * 5 + [6800.0])
     named = ["48 km/h", "64 km/h", "64 km/h", "80 km/h", None]
     assert classes(speed, mass, ISO_SPEEDS, ISO_MASS_KG) == [None, *named]
-    frame = reserves(replace_mass(site(), 7200.0)).frame
+    frame = reserves(with_constants(site(), vehicle_mass_kg=7200.0)).frame
     assert set(frame.simulated_iso_speed.dropna()) == {"48 km/h"}
     assert frame.simulated_class.isna().all()
     assert reserves(site()).frame.simulated_iso_speed.isna().all()
@@ -90,6 +91,43 @@ def test_crash_tests() -> None:
     lines = reserve_lines(found)
     assert all(len(line) <= 80 for line in lines)
     assert "M30" in lines[-1]
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "shown"),
+    [
+        ("impact_speed_m_s", 45.0, "≥45.00 (+0%)"),
+        ("vehicle_mass_kg", 70_000.4, "≥70000 (+0%)"),
+        ("friction_angle_deg", 14.0, "≤14.00 (+0%)"),
+    ],
+)
+def test_a_design_that_passes_beyond_what_is_tried_withstands_its_own_value(
+    column: str, value: float, shown: str
+) -> None:
+    strong = site(height="3.2 m", site="embedment_depth: 2.2 m", friction="44 deg")
+    mild = {"impact_speed_m_s": 2.0, "vehicle_mass_kg": 100.0}
+    found = reserves(with_constants(strong, **(mild | {column: value})))
+    (row,) = found.frame.to_dict("records")
+    assert row["verdict"] == "pass"
+    (own,) = (reserve for reserve in RESERVES if key_of(reserve.input).name == column)
+    assert row[own.column] == value
+    lines = reserve_lines(found)
+    assert shown in lines[3]
+    assert lines[-1].startswith("≥, ≤: ")
+    assert all("≥" in line or "≤" in line for line in reserve_lines(found, units="us")[3:])
+
+
+def test_a_design_that_fails_beyond_the_best_value_tried_withstands_none() -> None:
+    fast = {"impact_speed_m_s": 22.0}
+    frame = reserves(with_constants(site(friction="59.5 deg", site="embedment_depth: 1.2 m"), **fast)).frame
+    assert (frame.verdict == "fail").all()
+    assert frame.withstands_friction_angle_deg.isna().all()
+
+
+def test_only_the_end_of_what_is_tried_is_marked() -> None:
+    text = "\n".join(reserve_lines(reserves(site())))
+    assert "≥" not in text
+    assert "≤" not in text
 
 
 def test_threads_do_not_matter() -> None:
