@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from boulder_sweep.judge.validity import BY_FLAG
-from boulder_sweep.report.rows import NOT_YET, SOIL, Rows
+from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
+from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.views.wording import REASON_WORDS
 
 SAFE = 0.95
@@ -72,11 +74,15 @@ def answer_of(rows: Rows) -> Answer:
     if n == 0:
         none = "No design passes at the means." if uncertain else "No design passes."
         return Answer((*sentences, (none,)), tuple(own for _, own in uncertain if own))
-    soils = tuple(place for place, name in enumerate(rows.axes) if name in SOIL and rows.shape[place] > 1)
-    found = [_least(rows, passing, soils, what) for what in ("mass", "depth")]
-    if soils and not passing.all(axis=soils).any():
-        number = int(np.prod([rows.shape[place] for place in soils]))
-        sentences.append((f"No boulder passes in all {number} soils; the least ones below pass in their own.",))
+    withstood = _withstood(rows, passing)
+    found = [_least(rows, withstood, what) for what in ("mass", "depth")]
+    if withstood.kinds != _varied(rows):
+        sentences.append(
+            (
+                f"No boulder passes {_where(rows, _varied(rows))}; "
+                "the least ones below pass only under the conditions named with them.",
+            )
+        )
     for sentence, _ in found:
         sentences.append(sentence)
     named = {own.number: own for _, own in uncertain if own}
@@ -105,15 +111,20 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
         best = int(chances.argmax())
         largest = f"{first}; the largest is {chances[best]:.1%} (design {best:,})."
         return [((largest,), Named("Design with the largest probability of passing", best))]
-    mass = np.where(safe, np.broadcast_to(rows.mass(), rows.shape).ravel(), np.inf)
-    number = int(mass.argmin())
-    depth = float(np.broadcast_to(rows.depth(), rows.shape).ravel()[number])
+    withstood = _withstood(rows, safe.reshape(rows.shape))
+    mass = np.where(withstood.designs, rows.mass(), np.inf)
+    siblings = rows.siblings(int(mass.argmin()), withstood.kinds)
+    kinds = withstood.kinds if len(siblings) > 1 else ()
+    number = int(siblings[chances[siblings].argmin()])
+    depth = float(np.broadcast_to(rows.depth(), rows.shape).flat[number])
     sentence: Sentence = (
-        f"{first}. The lightest of them: ",
-        *(Quantity(float(mass[number]), "kg"), " of rock, "),
-        *(Quantity(depth, "m"), f" deep (design {number:,}, P(pass) = {chances[number]:.1%})."),
+        f"{first}. The lightest {f'boulder that does so {_where(rows, kinds)}' if kinds else 'of them'}",
+        *_beyond(rows, siblings, kinds),
+        *(": ", Quantity(float(mass.flat[number]), "kg"), " of rock, "),
+        *(Quantity(depth, "m"), f" deep (design {number:,}, P(pass) = {chances[number]:.1%}{_worst(rows, kinds)})."),
     )
-    return [(sentence, Named(f"Lightest boulder that passes with a probability of {SAFE:.0%}", number))]
+    title = f"Lightest boulder that passes with a probability of {SAFE:.0%}"
+    return [(sentence, Named(f"{title} {_where(rows, kinds)}".rstrip(), number))]
 
 
 def _in_words(name: str) -> str:
@@ -127,38 +138,94 @@ def _share(n: int, total: int) -> str:
     return f"{n / total if n in (0, total) else min(max(n / total, 0.001), 0.999):.1%}"
 
 
-def _least(rows: Rows, passing: np.ndarray, soils: tuple[int, ...], what: str) -> tuple[Sentence, Named]:
-    """Find the design of least mass or depth, passing in every soil if any boulder does."""
+class Withstood(NamedTuple):
+    """Designs of boulders that hold under as many of the conditions of a result as any boulder does."""
+
+    designs: np.ndarray
+    """Whether a row is one of them, in the shape of the grid."""
+    kinds: tuple[str, ...]
+    """The conditions under all of which they hold."""
+
+
+def _varied(rows: Rows) -> tuple[str, ...]:
+    """Conditions that vary."""
+    kinds = {condition_of(name) for name in rows.varying()}
+    return tuple(kind for kind in CONDITIONS if kind in kinds)
+
+
+def _withstood(rows: Rows, holds: np.ndarray) -> Withstood:
+    """Find the boulders that hold under all conditions, or else under as many as possible; soils count first."""
+    varied = _varied(rows)
+    # The rows of a list need not have every combination.
+    sizes = range(len(varied), -1, -1) if rows.axes else (len(varied), 0)
+    for kinds in (kinds for size in sizes for kinds in combinations(varied, size)):
+        designs = rows.everywhere(holds, kinds)
+        if designs.any():
+            break
+    return Withstood(designs, kinds)
+
+
+def _where(rows: Rows, kinds: tuple[str, ...]) -> str:
+    """Say under which conditions; empty without any."""
+    if not kinds:
+        return ""
+    if not rows.axes:
+        return "in every row of the list that has it"
+    words = [CONDITIONS[kind] for kind in kinds]
+    return f"{_listed(words)} of the sweep"
+
+
+def _worst(rows: Rows, kinds: tuple[str, ...]) -> str:
+    """Say of which row a margin is."""
+    if not kinds:
+        return ""
+    if not rows.axes:
+        return " in the row that is worst for it"
+    if len(kinds) > 1:
+        return f" in the combination of {_listed(kinds)} that is worst for it"
+    before = {"soil": "in", "vehicle": "against", "speed": "at"}[kinds[0]]
+    return f" {before} the {kinds[0]} that is worst for it"
+
+
+def _beyond(rows: Rows, siblings: np.ndarray, kinds: tuple[str, ...]) -> Sentence:
+    """Name the conditions of a boulder where the sweep has others, under which it need not hold."""
+    said: list[str | Quantity] = []
+    for name in rows.varying():
+        kind = condition_of(name)
+        if not kind or (rows.axes and kind in kinds):
+            continue
+        if not rows.axes and set(rows.inputs[name][siblings]) == set(rows.inputs[name]):
+            continue
+        said.append(f"{',' if said else ', with'} {label_of(name)} ")
+        unit = BY_NAME[name].unit if name in BY_NAME else ""
+        low, high = (end if isinstance(end, str) else Quantity(end, unit) for end in rows.ends(name, siblings))
+        said += [low] if low == high else [low, " to ", high]
+    return tuple(said)
+
+
+def _listed(words: tuple[str, ...] | list[str]) -> str:
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
+
+
+def _least(rows: Rows, withstood: Withstood, what: str) -> tuple[Sentence, Named]:
+    """Find the design of least mass or depth among boulders that pass, in the row that is worst for it."""
     values, other = (rows.mass(), rows.depth()) if what == "mass" else (rows.depth(), rows.mass())
-    everywhere = passing.all(axis=soils, keepdims=True) if soils else passing
-    robust = bool(everywhere.any())
-    eligible = np.broadcast_to(everywhere, rows.shape) if robust else passing
-    least = np.where(eligible, values, np.inf)
+    least = np.where(withstood.designs, values, np.inf)
     # Ties are broken by the other quantity.
     ties = least <= least.min() * (1.0 + 1e-9)
-    first = int(np.argmin(np.where(ties, other, np.inf)))
-    number, where = first, "in every soil of the sweep" if soils and robust else "among them"
-    if soils and robust:
-        number = _weakest(rows, first, soils)
-    row = rows.row(number)
+    siblings = rows.siblings(int(np.argmin(np.where(ties, other, np.inf))), withstood.kinds)
+    kinds = withstood.kinds if len(siblings) > 1 else ()
+    margins = rows.margins(siblings)
+    number = int(siblings[np.argmin(np.where(np.isnan(margins), np.inf, margins))])
     mass, depth = (float(np.broadcast_to(value, rows.shape).flat[number]) for value in (rows.mass(), rows.depth()))
     title = "Lightest boulder that passes" if what == "mass" else "Shallowest embedment that passes"
-    margin = row["margin"]
+    margin = rows.row(number)["margin"]
     held = f", margin {margin:.1%}" if margin is not None else ""
-    weakest = " in the soil that is worst for it" if soils and robust else ""
+    where = _where(rows, kinds)
     sentence: Sentence = (
-        f"{'The lightest boulder' if what == 'mass' else 'The shallowest embedment'} that passes {where}: ",
-        *(Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), f" deep (design {number:,}{held}{weakest})."),
+        f"The {title[0].lower()}{title[1:]} {where or 'among them'}",
+        *_beyond(rows, siblings, kinds),
+        *(": ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m")),
+        f" deep (design {number:,}{held}{_worst(rows, kinds)}).",
     )
-    return sentence, Named(f"{title} {where}" if soils and robust else title, number)
-
-
-def _weakest(rows: Rows, first: int, soils: tuple[int, ...]) -> int:
-    """Return the row of the least margin among the soils of one boulder."""
-    place = [np.array(k) for k in np.unravel_index(first, rows.shape)]
-    lines = np.meshgrid(*(np.arange(rows.shape[axis]) for axis in soils), indexing="ij")
-    for axis, line in zip(soils, lines, strict=True):
-        place[axis] = line.ravel()
-    numbers = np.sort(np.ravel_multi_index(np.broadcast_arrays(*place), rows.shape).ravel())
-    margins = rows.margins(numbers)
-    return int(numbers[np.nanargmin(np.where(np.isnan(margins), np.inf, margins))])
+    return sentence, Named(f"{title} {where}".rstrip(), number)

@@ -78,9 +78,7 @@ def intermediate_code() -> str:
         code = re.sub(r"^target triple = .*$", f'target triple = "{TRIPLE}"', code, flags=re.MULTILINE)
         code = re.sub(r"^target datalayout = .*$", f'target datalayout = "{LAYOUT}"', code, flags=re.MULTILINE)
         # Arrays are only views of the page's memory, so no references need to be counted.
-        code = re.sub(
-            r"^(define .*@NRT_(?:incref|decref)\(.*)$[\s\S]*?^\}$", r"\1\n ret void\n}", code, flags=re.MULTILINE
-        )
+        code = COUNTING.sub(r"\1\n ret void\n}", code)
         module = llvm.parse_assembly(code)
         module.get_function(compiled.fndesc.llvm_func_name).name = name
         modules.append(module)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from boulder_sweep.errors import ReportError
 from boulder_sweep.store.provenance import PREFIX
-from boulder_sweep.text import one_line
+from boulder_sweep.text import counted, one_line
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -63,5 +63,5 @@ class ChanceFile:
             There is no such row.
         """
         if not 0 <= number < self.rows:
-            raise IndexError(f"the file has {self.rows:,} designs, numbered from 0; there is no {number}")
+            raise IndexError(f"the file has {counted(self.rows, 'design')}, numbered from 0; there is no {number}")
         return self._table.slice(number, 1)

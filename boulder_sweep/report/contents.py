@@ -12,10 +12,11 @@ import numpy as np
 
 from boulder_kernels import SIMULATED, Control, Readings, SecondSpring, Status
 from boulder_kernels.design import G
+from boulder_kernels.layered import PRESSURE_SLOPE, SoilLayers
 from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
-from boulder_sweep.judge.refinement import finer_controls
+from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.uplift import WALL_FRICTION
 from boulder_sweep.judge.validity import (
     FLAGS,
@@ -29,8 +30,9 @@ from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M, STATUS_REASONS, ST
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, PARTS
-from boulder_sweep.report.rows import SIZES, Rows, Thinned
+from boulder_sweep.report.rows import SIZES, Rows, Thinned, label_of
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.layers import WATER_KG_M3
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 from boulder_sweep.settings.notes import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
@@ -67,8 +69,6 @@ def page_data(
 ) -> dict[str, Any]:
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
     ground = Ground.of_dict(settings["model"].get("ground", {}))
-    water = [] if ground.water_table_m is None else [f"water_table: {ground.water_table_m} m"]
-    slope = [f"slope: {ground.slope_deg} deg"] if ground.slope_deg else []
     return {
         "title": title,
         "units": units,
@@ -84,12 +84,13 @@ def page_data(
         ],
         "start": dict(start),
         "resistance": settings["model"].get("resistance", RESISTANCES[0]),
-        "ground": ground.as_dict(),
+        "ground": {**ground.as_dict(), "is_proportional": ground.is_proportional, "water_kg_m3": WATER_KG_M3},
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": REASONS,
         "words": REASON_WORDS,
+        "step_s": reported_step_s(control),
         "finer": [
-            {"h": finer.h, "locate_yield": float(finer.locate_yield)}
+            {"h": finer.h, "locate_yield": float(finer.locate_yield), "step_s": reported_step_s(finer)}
             for finer in finer_controls(control._replace(elements=0))
             if not finer.last_resort
         ],
@@ -97,7 +98,7 @@ def page_data(
         "colours": COLOURS,
         "yaml": _yaml(settings),
         "vehicle": [f"calibrated_crush: {settings['model']['calibrated_crush_m']} m"],
-        "soil": [*water, *slope],
+        "soil": _ground_entries(ground),
         "chosen": [dict(one) for one in chosen],
         "kernel": base64.b64encode(KERNEL.read_bytes()).decode(),
     }
@@ -115,9 +116,10 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
     return {
         "names": rows.names,
         "grid": bool(rows.axes),
+        "mapped": any(len(set(along)) > 1 for along in values.values()),
         "values": values,
         "given": {name: float(value) for name, value in rows.inputs.items() if value.shape == ()},
-        "labels": {name: name if name in rows.sets else _label(name) for name in values},
+        "labels": {name: label_of(name) for name in values},
         "units": {name: "" if name in rows.sets else BY_NAME[name].unit for name in values},
         "sets": {
             axis: {"names": own.names, "inputs": {name: along.tolist() for name, along in own.inputs.items()}}
@@ -158,6 +160,8 @@ def _layout() -> dict[str, Any]:
         "settings": entry_points.SETTINGS,
         "outcome": entry_points.OUTCOME,
         "history": entry_points.HISTORY,
+        "layer": PRESSURE_SLOPE + 1,  # the last of its columns
+        "layer_room": len(SoilLayers._fields),
         "columns": {**SOURCES, **dict(zip(SecondSpring._fields, OPTIONAL_COLUMNS, strict=True))},
     }
 
@@ -204,11 +208,6 @@ def _units() -> list[str]:
     return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES)} | {"J", "N"})
 
 
-def _label(name: str) -> str:
-    """Name of an input in words, without its unit."""
-    return BY_NAME[name].path.replace(".", " ").replace("_", " ").removeprefix("site ")
-
-
 def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Description of an input: words, unit, range of its slider, admitted and usual values."""
     field, here, axis = BY_NAME[name], start[name], settings["inputs"].get(name)
@@ -224,7 +223,7 @@ def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -
         "name": name,
         "section": field.section,
         "key": field.key,
-        "label": _label(name),
+        "label": label_of(name),
         "unit": field.unit,
         "low": field.admitted.low,
         "high": field.admitted.high,
@@ -232,6 +231,22 @@ def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -
         "to": max(ends),
         "usual": field.usual,
     }
+
+
+def _ground_entries(ground: Ground) -> list[str]:
+    """The entries of a settings file for the soil as it lies."""
+    entries = [f"cohesion: {ground.cohesion_kPa} kPa"] if ground.cohesion_kPa else []
+    if ground.water_table_m is not None:
+        entries.append(f"water_table: {ground.water_table_m} m")
+    if ground.slope_deg:
+        entries.append(f"slope: {ground.slope_deg} deg")
+    layers = [
+        f"{{from: {layer.from_m} m, density: {layer.density_kg_m3} kg/m^3, "
+        f"friction_angle: {layer.friction_angle_deg} deg, subgrade_reaction: {layer.subgrade_reaction_MN_m3} MN/m^3, "
+        f"cohesion: {layer.cohesion_kPa} kPa}}"
+        for layer in ground.layers
+    ]
+    return [*entries, f"layers: [{', '.join(layers)}]"] if layers else entries
 
 
 def _yaml(settings: Mapping[str, Any]) -> list[str]:

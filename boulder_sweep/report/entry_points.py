@@ -19,17 +19,20 @@ from boulder_kernels import (
     Control,
     Design,
     DesignTable,
+    Outcome,
     OutcomeTable,
     Readings,
     Record,
     SecondSpring,
+    Status,
     constants_of,
 )
 from boulder_kernels._jit import array_kernel, inlined
-from boulder_kernels.design import design_in
+from boulder_kernels.design import constants_with, design_in
 from boulder_kernels.dynamics import State, acceleration
 from boulder_kernels.energy import stored_energies
-from boulder_kernels.impact import simulate_on_springs
+from boulder_kernels.impact import failed, simulate_on_springs, simulate_with_springs
+from boulder_kernels.layered import SoilLayers, bounds_of_layers, fill_layers, layered
 from boulder_kernels.modes import Modes, switches_of
 from boulder_kernels.outcomes import write_outcome
 from boulder_kernels.second_spring import on_second_spring, spent_energy
@@ -54,8 +57,8 @@ ENERGY = HISTORY.index("vehicle_kinetic")
 """Index of the first energy."""
 _DOUBLES = types.CPointer(types.float64)
 EXPORTS = {
-    "outcomes": (_DOUBLES, types.int32, _DOUBLES, _DOUBLES, _DOUBLES),
-    "history": (_DOUBLES, _DOUBLES, types.int32, *(_DOUBLES,) * 7),
+    "outcomes": (_DOUBLES, types.int32, _DOUBLES, types.int32, *(_DOUBLES,) * 4),
+    "history": (_DOUBLES, _DOUBLES, types.int32, _DOUBLES, _DOUBLES, types.int32, *(_DOUBLES,) * 7),
 }
 """The functions that the page calls, and the types of their arguments."""
 
@@ -67,9 +70,9 @@ def readings_from(s: np.ndarray) -> Readings:
 
 
 @inlined
-def control_from(s: np.ndarray, halved: bool) -> Control:
-    """Return the control, which follows the readings, with its step or half of it."""
-    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, halved, s[13], False, ELASTIC)
+def control_from(s: np.ndarray, refined: bool) -> Control:
+    """Return the control, which follows the readings, with its step or a third of it."""
+    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, refined, s[13], False, ELASTIC)
 
 
 @inlined
@@ -84,8 +87,47 @@ def outcomes_from(t: np.ndarray) -> OutcomeTable:
     return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9])
 
 
+@inlined
+def layers_from(t: np.ndarray) -> SoilLayers:
+    """Return the rows of an array as the layers of one design."""
+    return SoilLayers(t[0], t[1], t[2], t[3], t[4])
+
+
+@inlined
+def constants_inside(design: Design, layers: np.ndarray, soil: Any, readings: Readings) -> Any:
+    """Return the constants of a design in layers of soil: `boulder_kernels.layered.constants_in`.
+
+    Not that function, since it returns them in memory, and they hold addresses.
+    """
+    mass, b = fill_layers(design, layers, soil), bounds_of_layers(soil)
+    return layered(constants_with(design, readings, b.elements, mass, b.K_soil, b.R_soil, b.x_yield), soil)
+
+
+@inlined
+def simulate_inside(
+    design: Design,
+    second: SecondSpring,
+    layers: np.ndarray,
+    soil: SoilLayers,
+    readings: Readings,
+    control: Control,
+    record: Record,
+) -> Outcome:
+    """Simulate one impact in layers of soil, or in a uniform soil where there are none."""
+    if len(layers) == 0:
+        outcome = simulate_on_springs(design, readings, control, record, second)
+    elif design.H - design.d <= design.e_bumper:
+        outcome = failed(Status.NO_CONTACT.value)
+    else:
+        c = constants_inside(design, layers, soil, readings)
+        outcome = simulate_with_springs(c, readings, control, record, second)
+    return outcome
+
+
 @array_kernel
-def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at: Any) -> None:
+def outcomes(
+    designs_at: Any, n: int, layers_at: Any, m: int, soil_at: Any, settings_at: Any, fine_at: Any, coarse_at: Any
+) -> None:
     """Simulate n designs, and estimate their errors if the settings ask for it.
 
     Parameters
@@ -94,6 +136,12 @@ def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at:
         Inputs, shape (len(DESIGN), n).
     n
         Number of designs.
+    layers_at
+        Layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`.
+    m
+        Number of layers; 0 for a uniform soil.
+    soil_at
+        Room for the layers of one design, shape (5, m).
     settings_at
         Settings, shape (len(SETTINGS),).
     fine_at
@@ -104,14 +152,17 @@ def outcomes(designs_at: Any, n: int, settings_at: Any, fine_at: Any, coarse_at:
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, estimated = readings_from(s), s[9] > 0.0
     designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (10, n)), carray(coarse_at, (10, n))
+    layers, soil = carray(layers_at, (n, m, 6)), layers_from(carray(soil_at, (5, m)))
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
     for row in range(n):
         design, second = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
         finer[:, row] = np.nan
-        write_outcome(finer, row, simulate_on_springs(design, readings, control_from(s, estimated), record, second))
-        if estimated:
-            write_outcome(coarser, row, simulate_on_springs(design, readings, control_from(s, False), record, second))
+        for solution in range(2 if estimated else 1):
+            refined = estimated and solution == 0
+            control = control_from(s, refined)
+            found = simulate_inside(design, second, layers[row], soil, readings, control, record)
+            write_outcome(coarser if solution else finer, row, found)
     if not estimated:
         return
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
@@ -130,52 +181,19 @@ def modes_of(y: State, turning: float, touching: float, c: Constants) -> Modes:
     return Modes(int(turning), touching > 0.0, corner, arm, 0, 0)
 
 
-@array_kernel
-def history(
-    design_from: Any,
-    settings_at: Any,
-    n: int,
-    times_at: Any,
-    states_at: Any,
-    modes_at: Any,
-    exchanged_at: Any,
-    offset_at: Any,
-    history_at: Any,
-    centre_at: Any,
+@inlined
+def write_history(
+    first: Any,
+    design: Design,
+    second: SecondSpring,
+    readings: Readings,
+    record: Record,
+    out: np.ndarray,
+    centre: np.ndarray,
 ) -> None:
-    """Simulate one design, and evaluate its motion, force and energies at n times.
-
-    Parameters
-    ----------
-    design_from
-        Inputs, shape (len(DESIGN),).
-    settings_at
-        Settings, shape (len(SETTINGS),).
-    n
-        Number of samples.
-    times_at
-        Their times, ascending [s], shape (n,).
-    states_at, modes_at, exchanged_at, offset_at
-        Room for the record, shapes (n, 6), (2, n), (n, 4) and (n,).
-    history_at
-        Where the results go, shape (len(HISTORY), n); NaN where the simulation does not get.
-    centre_at
-        Where c_x and c_y go, the common centre of mass of boulder and soil (Eqs 3, 4).
-    """
-    s = carray(settings_at, (SETTINGS_COUNT,))
-    readings, control = readings_from(s), control_from(s, s[9] > 0.0)
-    given = carray(design_from, (17, 1))
-    design, second = design_in(given, 0), SecondSpring(given[15, 0], given[16, 0])
-    out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
-    exchanged, offset = carray(exchanged_at, (n, 4)), carray(offset_at, (n,))
-    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
-    out[:] = np.nan
-    record.states[:] = np.nan
-    simulate_on_springs(design, readings, control, record, second)
-    first = constants_of(design, readings, control.elements)
-    centre = carray(centre_at, (2,))
+    """Evaluate motion, force and energies of a record whose constants are `first` until a second spring takes over."""
     centre[0], centre[1] = first.c_x, first.c_y
-    for i in range(n):
+    for i in range(record.times.size):
         y = State(
             record.states[i, 0],
             record.states[i, 1],
@@ -186,7 +204,7 @@ def history(
         )
         if np.isnan(y.x_b):
             break
-        c = first if offset[i] == 0.0 else on_second_spring(first, second.k_2, offset[i])
+        c = first if record.offset[i] == 0.0 else on_second_spring(first, second.k_2, record.offset[i])
         mode = modes_of(y, record.turning[i], record.touching[i], c)
         rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(mode, readings, c), c)
         # Printed separation: the spring keeps pulling the truck after release, so it always holds energy.
@@ -210,5 +228,61 @@ def history(
         out[12, i] = stored.crush_elastic
         out[13, i] = stored.gravity if readings.restoring_gravity else restoring
         # What is spent where the second spring takes over is lasting crush, as what the damper takes up.
-        lasting = damper + spent_energy(offset[i], design.k_v, second.k_2)
+        lasting = damper + spent_energy(record.offset[i], design.k_v, second.k_2)
         out[14, i], out[15, i], out[16, i] = drag, lasting, -pull
+
+
+@array_kernel
+def history(
+    design_from: Any,
+    layers_at: Any,
+    m: int,
+    soil_at: Any,
+    settings_at: Any,
+    n: int,
+    times_at: Any,
+    states_at: Any,
+    modes_at: Any,
+    exchanged_at: Any,
+    offset_at: Any,
+    history_at: Any,
+    centre_at: Any,
+) -> None:
+    """Simulate one design, and evaluate its motion, force and energies at n times.
+
+    Parameters
+    ----------
+    design_from
+        Inputs, shape (len(DESIGN),).
+    layers_at, m, soil_at
+        Layers of its soil, as of `outcomes`.
+    settings_at
+        Settings, shape (len(SETTINGS),).
+    n
+        Number of samples.
+    times_at
+        Their times, ascending [s], shape (n,).
+    states_at, modes_at, exchanged_at, offset_at
+        Room for the record, shapes (n, 6), (2, n), (n, 4) and (n,).
+    history_at
+        Where the results go, shape (len(HISTORY), n); NaN where the simulation does not get.
+    centre_at
+        Where c_x and c_y go, the common centre of mass of boulder and soil (Eqs 3, 4).
+    """
+    s = carray(settings_at, (SETTINGS_COUNT,))
+    readings, control = readings_from(s), control_from(s, s[9] > 0.0)
+    given = carray(design_from, (17, 1))
+    design, second = design_in(given, 0), SecondSpring(given[15, 0], given[16, 0])
+    out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
+    exchanged, offset = carray(exchanged_at, (n, 4)), carray(offset_at, (n,))
+    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
+    out[:] = np.nan
+    record.states[:] = np.nan
+    layers, soil = carray(layers_at, (1, m, 6))[0], layers_from(carray(soil_at, (5, m)))
+    simulate_inside(design, second, layers, soil, readings, control, record)
+    centre = carray(centre_at, (2,))
+    if m == 0:
+        write_history(constants_of(design, readings, control.elements), design, second, readings, record, out, centre)
+    else:
+        c = constants_inside(design, layers, soil, readings)
+        write_history(c, design, second, readings, record, out, centre)

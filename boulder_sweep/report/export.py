@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.errors import ReportError
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.report.contents import setting_lines
-from boulder_sweep.settings.shown_units import Shown, shown_column
+from boulder_sweep.settings.shown_units import Shown, check_system, shown_column
 from boulder_sweep.store.finished import FinishedRows
+from boulder_sweep.store.targets import check_target
 from boulder_sweep.text import printable
 from boulder_sweep.views.wording import NOT_A_TEST
 
@@ -46,14 +47,19 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
     Raises
     ------
     ReportError
-        The kind is unknown, a sheet cannot hold so many rows, or openpyxl, an extra, is not installed.
+        The kind is unknown, the folder of the table does not exist or is the result of a run, a sheet cannot hold so
+        many rows, the table cannot be written, or openpyxl, an extra, is not installed.
     StoreError
         There is no result in the folder, or it is damaged.
+    ValueError
+        The units are unknown.
     """
+    check_system(units)
     target, finished = Path(file), FinishedRows(place_of(out))
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
+    check_target(target, ReportError)
     if kind == ".xlsx" and finished.rows_done > MOST_SHEET_ROWS:
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
@@ -63,6 +69,8 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
     try:
         rows = writer(passing, finished, units)
         passing.replace(target)
+    except OSError as problem:
+        raise ReportError(f"{file} cannot be written: {problem.strerror or problem}") from problem
     finally:
         passing.unlink(missing_ok=True)
     return rows

@@ -7,18 +7,13 @@ page's script finds figures and sources by name and sets their data.
 from __future__ import annotations
 
 from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
-from bokeh.models.annotations import BoxAnnotation
+from bokeh.models.annotations import BoxAnnotation, Legend
 from bokeh.plotting import figure
 
-COLOURS = {
-    "pass": "#0072B2",
-    "fail": "#E69F00",
-    "fail: no_contact": "#F7DC9C",
-    "undecided": "#CC79A7",
-    "error": "#666666",
-    "none": "#BBBBBB",
-}
-"""Colours of verdicts, and of reasons that have their own; distinct without red and green, and in grey."""
+from boulder_sweep.views.figures import VERDICTS
+
+COLOURS = {**VERDICTS, "none": "#BBBBBB"}
+"""Colours of verdicts, those of `sweep plot`."""
 LINES = ("#1E88C9", "#D55E00", "#009E73")
 PARTS = {
     "vehicle_kinetic": ("vehicle, moving", "#0072B2"),
@@ -69,7 +64,12 @@ def curves(panel: str) -> list[figure]:
         legend_label=[word for word, _ in PARTS.values()],
     )
     for plot in (displacement, energy):
-        plot.add_layout(plot.legend[0], "right")
+        beside = plot.legend[0]
+        plot.add_layout(beside, "right")
+        # The page shows this one in place of the other on narrow screens.
+        below = Legend(items=beside.items, visible=False, location="top_left", spacing=4, margin=0)
+        below.label_text_font_size, below.glyph_width, below.glyph_height = "12px", 14, 14
+        plot.add_layout(below, "below")
     figures = [rotation, displacement, force, energy]
     for plot in figures:
         plot.x_range = DataRange1d(range_padding=0)
@@ -119,7 +119,9 @@ def _plot(panel: str, kind: str, tooltips: list[tuple[str, str]], height: int = 
         outline_line_color=None,
     )
     if tooltips:
-        plot.add_tools(HoverTool(tooltips=tooltips, mode="mouse" if kind == "map" else "vline"))
+        hover = HoverTool(tooltips=tooltips, mode="mouse" if kind == "map" else "vline")
+        hover.name = f"{panel}-{kind}-hover"
+        plot.add_tools(hover)
     plot.xaxis.name, plot.yaxis.name = f"{panel}-{kind}-x", f"{panel}-{kind}-y"
     for axis in (plot.xaxis, plot.yaxis):
         axis.axis_label_text_font_style = "normal"

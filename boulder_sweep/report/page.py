@@ -14,10 +14,8 @@ from bokeh.embed.util import standalone_docs_json_and_render_items
 from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.errors import ReportError
 from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, verdict_map
-from boulder_sweep.settings.model import Ground
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
@@ -26,12 +24,11 @@ if TYPE_CHECKING:
     from boulder_sweep.report.rows import Rows, Thinned
 
 ASSETS = Path(__file__).with_name("assets")
-SCRIPTS = ("kernel", "verdict", "simulator", "units", "plots", "scene", "maps", "walker", "controls", "texts", "page")
-"""Our own script, in this order."""
-NO_LAYERS = (
-    "the simulator in the page knows neither layers, nor cohesion, nor a water table below the soil line; "
-    "`sweep plot`, `sweep simulate` and `sweep explain` do"
+SCRIPTS = (
+    *("kernel", "verdict", "simulator", "units", "plots", "scene", "maps"),
+    *("walker", "controls", "choices", "player", "texts", "page"),
 )
+"""Our own script, in this order."""
 MAIN = (
     "embedment_depth_m",
     "friction_angle_deg",
@@ -89,19 +86,13 @@ def assembled(
     -------
     str
         HTML.
-
-    Raises
-    ------
-    ReportError
-        The simulator in the page does not know the soil.
     """
-    if not Ground.of_dict(settings["model"].get("ground", {})).is_proportional:
-        raise ReportError(NO_LAYERS)
     panels = ["live", *(f"chosen{place}" for place in range(len(chosen)))]
     document = Document()
     for plot in [*(plot for panel in panels for plot in curves(panel)), verdict_map("live")]:
         document.add_root(plot)
-    if rows is not None:
+    table = None if rows is None or kept is None else table_data(rows, kept)
+    if table is not None and table["mapped"]:
         document.add_root(verdict_map("sweep"))
     docs, items = standalone_docs_json_and_render_items(list(document.roots))
     places = {plot.id: f"figure-{plot.name}" for plot in document.roots}
@@ -114,9 +105,9 @@ def assembled(
         chosen=chosen,
         units=units,
     )
-    data["rows"] = None if rows is None or kept is None else table_data(rows, kept)
+    data["rows"] = table
     data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": places} for item in items]}
-    script = "\n".join((ASSETS / f"{name}.js").read_text() for name in SCRIPTS)
+    script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(ASSETS),
@@ -133,6 +124,7 @@ def assembled(
         main=MAIN,
         chosen=data["chosen"],
         thinned=kept.words if kept is not None else None,
+        mapped=table is not None and table["mapped"],
         facts=facts,
         notes=notes,
         settings=settings,
@@ -141,7 +133,7 @@ def assembled(
         ground=ground_words(settings),
         law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),
         data=script_data(data),
-        style=(ASSETS / "page.css").read_text(),
+        style=(ASSETS / "page.css").read_text(encoding="utf-8"),
         script=script,
         library=library,
         policy=_policy(library, script),

@@ -7,29 +7,49 @@ axes, their inputs follow from the settings and are not read.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.places import Place
 from boulder_sweep.report.chances import ChanceFile
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.reader import read_row
+from boulder_sweep.text import counted
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
-SOIL = ("soil", "soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3", "strain_rate_factor")
+CONDITIONS = {"soil": "in every soil", "vehicle": "against every vehicle", "speed": "at every speed"}
+"""What a boulder must withstand as it is, in the words of a sentence; not the designer's choice."""
 NOT_YET = "not computed yet"
 MOST_CELLS = 1_500_000
 """Most designs of a grid whose verdicts go into the page; of larger grids, some values of the longest axes are left
 out."""
 MOST_POINTS = 20_000
 """The same for a list of designs, each of which carries its inputs."""
+
+
+def condition_of(name: str) -> str:
+    """Return which of the conditions an axis or a column belongs to; empty for what the designer chooses."""
+    if name == "impact_speed_m_s":
+        return "speed"
+    if name == "impact_height_m":  # where the vehicle hits
+        return "vehicle"
+    section = BY_NAME[name].section if name in BY_NAME else name
+    return section if section in CONDITIONS else ""
+
+
+def label_of(name: str) -> str:
+    """Return the name of an input in words, without its unit; a named set is called what it is."""
+    if name not in BY_NAME:
+        return name
+    return BY_NAME[name].path.replace(".", " ").replace("_", " ").removeprefix("site ")
 
 
 class NamedSets(NamedTuple):
@@ -106,6 +126,76 @@ class Rows:
         length, width, height, density = (self.inputs[name] for name in SIZES)
         return length * width * height * density
 
+    def varying(self) -> tuple[str, ...]:
+        """Axes of more than one value; of a list, the columns of more than one value."""
+        if self.axes:
+            return tuple(name for name, values in self.axes.items() if len(values) > 1)
+        return tuple(name for name, column in self.inputs.items() if column.ndim and (column != column[0]).any())
+
+    def ends(self, name: str, numbers: np.ndarray) -> tuple[str | float, str | float]:
+        """Return the least and the greatest value of designs on an axis or in a column; the name of a named set."""
+        if not self.axes:
+            values = self.inputs[name][numbers]
+        else:
+            index = np.unravel_index(numbers, self.shape)[list(self.axes).index(name)]
+            if name in self.sets:
+                return self.sets[name].names[int(index.min())], self.sets[name].names[int(index.max())]
+            values = self.axes[name][index]
+        return float(values.min()), float(values.max())
+
+    def everywhere(self, holds: np.ndarray, kinds: Sequence[str]) -> np.ndarray:
+        """Return which designs hold whatever is varied of some conditions.
+
+        Parameters
+        ----------
+        holds : ndarray of bool, shape ``self.shape``
+            Whether a design holds in its own row.
+        kinds
+            Conditions of `CONDITIONS`.
+
+        Returns
+        -------
+        ndarray of bool, shape ``self.shape``
+            Whether all rows hold that differ from a row in nothing else.
+        """
+        over = [name for name in self.varying() if condition_of(name) in kinds]
+        if not over:
+            return holds
+        if self.axes:
+            places = tuple(list(self.axes).index(name) for name in over)
+            return np.broadcast_to(holds.all(axis=places, keepdims=True), self.shape)
+        boulders = self._boulders(over)
+        found = np.ones(boulders.max() + 1, bool)
+        np.logical_and.at(found, boulders, holds)
+        return found[boulders]
+
+    def siblings(self, number: int, kinds: Sequence[str]) -> np.ndarray:
+        """Return the rows, in ascending order, that differ from one in nothing but some conditions."""
+        over = [name for name in self.varying() if condition_of(name) in kinds]
+        if not self.axes:
+            boulders = self._boulders(over)
+            return np.flatnonzero(boulders == boulders[number])
+        here = np.unravel_index(number, self.shape)
+        lines = [
+            np.arange(length) if name in over else here[place : place + 1]
+            for place, (name, length) in enumerate(zip(self.axes, self.shape, strict=True))
+        ]
+        return np.sort(np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), self.shape).ravel())
+
+    def _boulders(self, over: Sequence[str]) -> np.ndarray:
+        """Return a number for every design of a list, the same for those that differ in nothing but some columns."""
+        boulders = np.zeros(len(self.codes), np.int64)
+        for name in self.varying():
+            if name not in over:
+                # Columns that follow from others may differ in their last digits.
+                values = np.unique(self.inputs[name])
+                apart = np.diff(values, prepend=values[:1]) > 1e-12 * np.abs(values)
+                places = np.cumsum(apart)[np.searchsorted(values, self.inputs[name])]
+                # Rows that are not computed yet have no inputs: they are no rows of a known boulder.
+                places = np.where(np.isnan(self.inputs[name]), places.max() + 1, places)
+                boulders = np.unique(boulders * (places.max() + 1) + places, return_inverse=True)[1]
+        return boulders
+
     def margins(self, numbers: np.ndarray) -> np.ndarray:
         """Return the margin of some rows, given in ascending order; NaN for none."""
         found = np.full(len(numbers), np.nan)
@@ -140,9 +230,13 @@ def read_rows(folder: Place) -> Rows:
     ------
     StoreError
         There is no result in the folder, or it is damaged.
+    ReportError
+        The file is not one of `sweep uncertainty`, or rows of it are missing or in another order.
     """
     finished = ChanceFile(folder) if isinstance(folder, Path) and folder.is_file() else FinishedRows(folder)
     settings = finished.identity["settings"]
+    if isinstance(finished, ChanceFile):
+        _check_whole(finished, folder)
     order, given = settings["order"], settings["inputs"]
     sets = {} if order == "table" else dict(_sets(settings))
     # Very long axes and the columns of a list are only in the table.
@@ -167,11 +261,21 @@ def read_rows(folder: Place) -> Rows:
     if order == "table":
         inputs |= {name: _column(columns, name) for name in wanted}
     else:
-        axes = dict(_axes(order, given, sets, columns))
+        axes = dict(_axes(settings, sets, columns))
     for place, (axis, values) in enumerate(axes.items()):
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
     return Rows(folder, finished, (*names, NOT_YET), codes, flag_counts(flags.items()), axes, sets, inputs)
+
+
+def _check_whole(file: ChanceFile, path: Place) -> None:
+    """Refuse a file from which rows were taken, or whose rows were put in another order."""
+    asked, ids = file.identity["settings"]["n_designs"], next(file.tables(["design_id"])).column("design_id").to_numpy()
+    if len(ids) != asked or not np.array_equal(ids, np.arange(asked)):
+        raise ReportError(
+            f"{path} does not hold the rows of its {counted(asked, 'design')} in their order; "
+            "write it again with `sweep uncertainty`"
+        )
 
 
 def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:
@@ -193,11 +297,11 @@ def _column(columns: dict[str, np.ndarray], name: str) -> np.ndarray:
 
 
 def _axes(
-    order: list[str], given: dict[str, Any], sets: dict[str, NamedSets], columns: dict[str, np.ndarray]
+    settings: dict[str, Any], sets: dict[str, NamedSets], columns: dict[str, np.ndarray]
 ) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the axes with their values."""
-    lengths = [len(sets[name].names) if name in sets else _length(given[name]) for name in order]
-    for place, (name, length) in enumerate(zip(order, lengths, strict=True)):
+    given, lengths = settings["inputs"], _lengths(settings)
+    for place, (name, length) in enumerate(zip(settings["order"], lengths, strict=True)):
         if name in sets:
             yield name, np.arange(length)
         elif isinstance(given[name], list):
@@ -207,8 +311,11 @@ def _axes(
             yield name, _column(columns, name)[: step * length : step]
 
 
-def _length(values: Any) -> int:
-    return int(values["count"]) if isinstance(values, dict) else len(values)
+def _lengths(settings: dict[str, Any]) -> list[int]:
+    """Return the number of values along each axis; named sets count their names."""
+    given = settings["inputs"] | settings.get("labels", {})
+    axes = (given[name] for name in settings["order"])
+    return [int(axis["count"]) if isinstance(axis, dict) else len(axis) for axis in axes]
 
 
 def _flags_of_passes(table: Any) -> dict[str, int]:
@@ -253,9 +360,10 @@ class Thinned:
 def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
     """Choose the rows that go into the page: all, or values spread evenly along the longest axes."""
     if not rows.axes:
-        n, kept = len(rows.codes), min(len(rows.codes), most_points)
+        computed = np.flatnonzero(~rows.having(NOT_YET))  # the inputs of the others are in no file yet
+        n, kept = len(computed), min(len(computed), most_points)
         words = f"{kept:,} of the {n:,} designs of the list, spread evenly" if kept < n else ""
-        return Thinned((np.round(np.linspace(0, n - 1, kept)).astype(np.int64),), words)
+        return Thinned((computed[np.round(np.linspace(0, n - 1, kept)).astype(np.int64)],), words)
     lengths = list(rows.shape)
     while np.prod(lengths, dtype=float) > most_cells:
         longest = int(np.argmax(lengths))

@@ -18,12 +18,14 @@ from boulder_sweep.report.answers import Named, answer_of
 from boulder_sweep.report.rows import read_rows, thinned
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import SolverSettings
+from boulder_sweep.settings.shown_units import check_system
 from boulder_sweep.store.files import put_file
 from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
-from boulder_sweep.text import printable
+from boulder_sweep.store.targets import check_target
+from boulder_sweep.text import counted, printable
 from boulder_sweep.views.wording import UNLOADING_WORDS
 
-FACTS = ("versions", "settings_sha256", "kernels_sha256")
+KINDS = (".html", ".htm")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
 
 
@@ -37,13 +39,13 @@ def write_report(
     out
         Folder that a sweep wrote; a run may still be writing into it.
     page
-        The file; replaced if it exists.
+        The file, ``.html`` or ``.htm``; replaced if it exists.
     designs
         Rows to be shown in full; by default those named in the answer.
     units
         Units shown first, ``si`` or ``us``; the reader can switch.
     command
-        Command that makes the page again.
+        Command that regenerates the page.
 
     Returns
     -------
@@ -53,12 +55,17 @@ def write_report(
     Raises
     ------
     ReportError
-        There is nothing to report, a design does not exist, or the extra ``report`` is not installed.
+        There is nothing to report, a design does not exist, the page cannot be written, or the extra ``report`` is
+        not installed.
     StoreError
         There is no result in the folder, or it is damaged.
+    ValueError
+        The units are unknown.
     """
+    check_system(units)
     assembled = _page_maker()
     rows = read_rows(place_of(out))
+    target = checked_page(page)
     if rows.finished.rows_done == 0:
         raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` shows its progress")
     answer = answer_of(rows)
@@ -96,7 +103,7 @@ def write_report(
         raise ReportError(
             f"{out} was written by another version, whose settings lack {missing}; run it again"
         ) from None
-    return _written(Path(page), text)
+    return _written(target, text)
 
 
 def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = "si", command: str = "") -> Path:
@@ -114,11 +121,18 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
     Raises
     ------
     ReportError
-        The design cannot be computed, or the extra ``report`` is not installed.
+        There is no such design or it cannot be computed, the page cannot be written, or the extra ``report`` is not
+        installed.
+    ValueError
+        The units are unknown.
     """
+    target = checked_page(page)
+    check_system(units)
     sweep.require_values()
+    if not 0 <= number < sweep.n_designs:
+        held = counted(sweep.n_designs, "design")
+        raise ReportError(f"{sweep.name} holds {held}, numbered from 0; there is no {number}")
     assembled = _page_maker()
-    sweep.require_values()
     block = sweep.block(number, number + 1)
     if block.reasons[0]:
         raise ReportError(f"design {number} cannot be computed: {block.reasons[0]}")
@@ -134,7 +148,22 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         notes=_general_notes(settings, control),
         units=units,
     )
-    return _written(Path(page), text)
+    return _written(target, text)
+
+
+def checked_page(path: str | Path) -> Path:
+    """Return the path of a page if it can be written there.
+
+    Raises
+    ------
+    ReportError
+        Its name has another ending, or its folder does not exist or holds the result of a run.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in KINDS:
+        raise ReportError(f"{path}: the name of a page must end in {' or '.join(KINDS)}")
+    check_target(target, ReportError)
+    return target
 
 
 def example() -> Sweep:
@@ -174,7 +203,7 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
     if control.unloading:
         notes.append(
             f"The table was computed with soil that stays pressed ({UNLOADING_WORDS[control.unloading]}); what is "
-            "simulated in this page uses soil that springs back whole."
+            "simulated in this page uses elastic soil."
         )
     if control.elements:
         notes.append(
@@ -196,6 +225,15 @@ def _facts(
 
 
 def _written(page: Path, text: str) -> Path:
-    """Write a file as a whole or not at all."""
-    put_file(page.parent, page.name, text.encode())
+    """Write a file as a whole or not at all.
+
+    Raises
+    ------
+    ReportError
+        The system refuses it.
+    """
+    try:
+        put_file(page.parent, page.name, text.encode())
+    except OSError as problem:
+        raise ReportError(f"{page} cannot be written: {problem.strerror}") from problem
     return page

@@ -55,14 +55,9 @@ def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) 
     PictureError
         There is nothing to draw, the kind is unknown, ffmpeg or matplotlib is missing, or the file cannot be written.
     """
-    target = figures.checked_kind(path, KINDS)
+    target = checked_animation(path)
     require_samples(trajectory)
     kind = target.suffix.lower()
-    if kind == ".mp4" and shutil.which("ffmpeg") is None:
-        raise PictureError(
-            f"{path}: an MP4 animation needs the program ffmpeg, which is not installed; "
-            f"{target.with_suffix('.gif').name} or {target.with_suffix('.html').name} need nothing more"
-        )
     try:
         if kind == ".html":
             target.write_text(page(trajectory), encoding="utf-8")
@@ -72,6 +67,23 @@ def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) 
             _write_mp4(trajectory, target, told)
     except OSError as problem:
         raise PictureError(f"{path} cannot be written: {problem.strerror or problem}") from problem
+
+
+def checked_animation(path: str | Path) -> Path:
+    """Return the path of an animation if it can be written there.
+
+    Raises
+    ------
+    PictureError
+        The kind is unknown, its folder does not exist or holds the result of a run, or ffmpeg is missing.
+    """
+    target = figures.checked_kind(path, KINDS)
+    if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+        raise PictureError(
+            f"{path}: an MP4 animation needs the program ffmpeg, which is not installed; "
+            f"{target.with_suffix('.gif').name} or {target.with_suffix('.html').name} need nothing more"
+        )
+    return target
 
 
 def frames(trajectory: Trajectory, told: Told | None = None) -> Iterator[np.ndarray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,8 +11,8 @@ import numpy as np
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, figure
-from boulder_sweep.views.labels import label, name_of, size_of, sized, value_text
+from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, caption, figure, headline
+from boulder_sweep.views.labels import RATIO, label, name_of, size_of, sized, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +31,6 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 SET_COLOURS = (*COLOURS, SKY, AMBER, BLACK)
 """Of named soils or vehicles, each of which gets its curve; beyond that the dashes differ."""
 DASHES = ("-", "--", "-.", (0, (1, 1)))
-CHARACTERS_PER_INCH = 15
 
 
 def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> None:
@@ -55,6 +53,9 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
     frame = need.frame
     sets = {axis.name: axis.labels for axis in need.sweep.axes if axis.labels}
     open_ = [name for name in need.sweep.plan.columns if name not in (need.key.name, *need.derived)]
+    if RATIO in need.sweep.plan.given and RATIO not in need.derived:  # the table holds depths
+        frame = frame.assign(**{RATIO: (frame["embedment_depth_m"] / frame["boulder_height_m"]).round(9)})
+        open_.append(RATIO)
     varying = [name for name in open_ if BY_NAME[name].section not in sets and len(frame[name].unique()) > 1]
     across = next((name for name in ACROSS if name in varying), next(iter(varying), None))
     if across is None:
@@ -80,14 +81,8 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
         axes.set_xlabel(label(across, units))
         axes.set_ylabel(_answer_label(need, units))
         axes.legend(loc="best")
-        fig.suptitle(f"{need.sweep.name}: {_title(need)}", x=0.01, ha="left", fontsize=11.5, fontweight="bold")
-        fig.supxlabel(
-            textwrap.fill(_caption(need, held, units), int(CHARACTERS_PER_INCH * 7.2)),
-            x=0.01,
-            ha="left",
-            fontsize=8.0,
-            color=GREY,
-        )
+        headline(fig, f"{need.sweep.name}: {_title(need)}")
+        caption(fig, _caption(need, held, units))
 
 
 def _curves(
@@ -127,7 +122,8 @@ def _curve(
 
 def _title(need: Need) -> str:
     word = "largest" if need.key.most else "smallest"
-    return f"{word} {_words(need)} that passes"
+    sure = "" if need.probability is None else f" with a probability of at least {100.0 * need.probability:.10g} %"
+    return f"{word} {_words(need)} that passes{sure}"
 
 
 def _words(need: Need) -> str:
@@ -150,5 +146,5 @@ def _caption(need: Need, held: Mapping[str, float | str], units: str) -> str:
     parts.append("hollow: passes in the whole range searched; no point: nothing passes")
     if need.others:
         own, other = (name.replace("_", " ") for name in (need.sweep.model.preset, need.others[0]))
-        parts.append(f"solid: {own}, dotted: {other}, the band is the doubt that the readings leave")
+        parts.append(f"solid: {own}, dotted: {other}, the band shows the spread between them")
     return "; ".join(parts)

@@ -15,7 +15,6 @@ from boulder_sweep.views.figures import (
     BLUE,
     BROWN,
     GREEN,
-    GREY,
     LIGHT_GREY,
     ORANGE,
     PALE_ORANGE,
@@ -111,8 +110,8 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
             fontweight="normal",
         )
         axes.legend(handles=handles[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5))
-        fig.suptitle(verdict_line(trajectory), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
-        fig.supxlabel(design_line(trajectory, units), x=0.01, ha="left", fontsize=8.0, color=GREY)
+        figures.headline(fig, verdict_line(trajectory))
+        figures.caption(fig, design_line(trajectory, units))
 
 
 def _mark_limit(axes: Axes, trajectory: Trajectory) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from bisect import bisect_left
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import PictureError
-from boulder_sweep.text import printable
+from boulder_sweep.store.targets import check_target
+from boulder_sweep.text import NO_BREAK_SPACE, printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +21,17 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, YELLOW, AMBER, BLACK = "#56B4E9", "#F0E442", "#E69F00", "#222222"
 PALE_ORANGE, BROWN = "#EDB08A", "#8C6D46"
-GREY, LIGHT_GREY = "#6E6E6E", "#D9D9D9"
+GREY, LIGHT_GREY, DARK_GREY = "#6E6E6E", "#D9D9D9", "#444444"
+VERDICTS = {
+    "pass": BLUE,
+    "undecided": AMBER,
+    "fail": PALE_ORANGE,
+    "fail: penetration": PURPLE,
+    "fail: no_contact": LIGHT_GREY,
+    "error": DARK_GREY,
+}
+"""Colours of verdicts, and of reasons that have their own, in pictures and on pages. Passes differ from all others for
+every kind of colour vision and in grey; errors can be seen on a dark page, too."""
 
 STYLE: Any = {
     "font.size": 9.0,
@@ -41,6 +54,8 @@ STYLE: Any = {
     "svg.hashsalt": "boulder-sweep",
 }
 KINDS = (".png", ".svg", ".pdf")
+MARGIN = 0.01
+"""Beside titles and captions, as a share of the width."""
 
 
 def require_matplotlib() -> None:
@@ -63,13 +78,12 @@ def checked_kind(path: str | Path, kinds: tuple[str, ...] = KINDS) -> Path:
     Raises
     ------
     PictureError
-        Its extension is not one of `kinds`, or its folder does not exist.
+        Its extension is not one of `kinds`, or its folder does not exist or holds the result of a run.
     """
     target = Path(path)
     if target.suffix.lower() not in kinds:
         raise PictureError(f"{path}: the name of a picture must end in {', '.join(kinds)}")
-    if not target.absolute().parent.is_dir():
-        raise PictureError(f"{path}: the folder {target.absolute().parent} does not exist")
+    check_target(target, PictureError)
     return target
 
 
@@ -111,8 +125,10 @@ def figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
     # Not a figure of pyplot: no window and no global state that could disturb a user's own plots.
     with matplotlib.rc_context(STYLE):
         fig = Figure(figsize=(width, height), layout="constrained")
-        yield fig
-        save(fig, target)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", r"Glyph .* missing from", UserWarning)  # drawn as a box
+            yield fig
+            save(fig, target)
 
 
 def save(fig: Figure, target: Path) -> None:
@@ -135,6 +151,47 @@ def _keep_text_plain(fig: Figure) -> None:
         if text not in ticks:
             text.set_parse_math(False)
             text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+
+
+def headline(fig: Figure, words: str, beside_in: float = 0.0) -> str:
+    """Write the title of a picture at the left, in lines that leave some inches at the right; return it as written."""
+    style: Any = {"fontsize": 11.5, "fontweight": "bold"}
+    title = broken(fig, words, (1.0 - 2.0 * MARGIN) * fig.get_figwidth() - beside_in, **style)
+    fig.suptitle(title, x=MARGIN, ha="left", **style)
+    return title
+
+
+def caption(fig: Figure, words: str, size: float = 8.0) -> None:
+    """Write the caption of a picture below it, in lines that fit."""
+    text = broken(fig, words, (1.0 - 2.0 * MARGIN) * fig.get_figwidth(), fontsize=size)
+    fig.supxlabel(text, x=MARGIN, ha="left", fontsize=size, color=GREY)
+
+
+def broken(fig: Figure, words: str, inches: float, **style: Any) -> str:
+    """Break words into lines of at most so many inches: at spaces, and within a word where it is longer."""
+    from matplotlib.text import Text
+
+    text = Text(parse_math=False, **style)
+    text.set_figure(fig)
+
+    def fits(line: str) -> bool:
+        text.set_text(line)
+        return bool(text.get_window_extent().width <= inches * fig.dpi)
+
+    return "\n".join(part for line in words.split("\n") for part in _parts(line, fits))
+
+
+def _parts(line: str, fits: Callable[[str], bool]) -> Iterator[str]:
+    """Yield a line in parts that fit."""
+    while not fits(line):
+        # The most characters that fit, at least one.
+        most = max(1, bisect_left(range(1, len(line)), True, key=lambda count: not fits(line[:count])))
+        cut = max(line.rfind(" ", 1, most + 1), 0) or max(line.rfind(NO_BREAK_SPACE, 1, most + 1), 0) or most
+        if cut >= len(line):
+            break
+        yield line[:cut]
+        line = line[cut:].lstrip(f" {NO_BREAK_SPACE}")
+    yield line
 
 
 def limit_y(axes: Axes, low: float, high: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from boulder_sweep.columns import BY_NAME
 from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.text import NO_BREAK_SPACE
 
 RATIO = "embedment_ratio"
 WORDS = {
@@ -26,6 +27,8 @@ SYMBOLS = {
     "vehicle_spring_N_m": "spring {}",
     "vehicle_damper_N_s_m": "damper {}",
 }
+USUAL = (("strain_rate_factor", 1.0),)
+"""Constants that a caption need not mention."""
 PRINTED = {"1": "", "MN/m^3": "MN/m³", "kg/m^3": "kg/m³", "kN*s/m": "kN·s/m", "lb*s/in": "lb·s/in", "kip*ft": "kip·ft"}
 
 
@@ -72,3 +75,8 @@ def value_text(name: str, value: float, units: str = "si") -> str:
     number = f"{value / size_of(name, units):.5g}"
     shown = f"{number}°" if unit == "deg" else f"{number} {unit}".rstrip()
     return SYMBOLS[name].format(shown) if name in SYMBOLS else f"{name_of(name)} {shown}"
+
+
+def unbroken(words: str) -> str:
+    """Return words that stay on one line."""
+    return words.replace(" ", NO_BREAK_SPACE)

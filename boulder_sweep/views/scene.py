@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_kernels.design import G, shear_wedge_angle
+from boulder_kernels.design import G, wedge_slope
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
 from boulder_sweep.views.shapes import Shape
@@ -47,7 +47,7 @@ class SideView:
     def window(self) -> Window:
         """The whole impact with some space around it."""
         design, inputs = self.trajectory.motion.design, self.trajectory.inputs
-        wedge = design.L + design.d * math.tan(shear_wedge_angle(design.phi))
+        wedge = design.L + design.d * wedge_slope(design.phi)
         reach = max(wedge, self.rating_line + 0.3) + 0.6
         return Window(
             left=-(inputs["bed_offset_m"] + 1.6),
@@ -131,7 +131,7 @@ class SideView:
         """The soil that moves with the boulder: a wedge cut into slices, each moving with its element."""
         motion = self.trajectory.motion
         c, design = motion.constants, motion.design
-        slope = math.tan(shear_wedge_angle(design.phi))
+        slope = wedge_slope(design.phi)
         levels = [k / 24 * c.d for k in range(25)]
         near = [self._place(sample, c.l_n, c.z_0 - level) for level in levels]
         far = [(x + (c.d - level) * slope, y) for (x, y), level in zip(near, levels, strict=True)]

@@ -53,8 +53,8 @@ def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "s
         for axes in (boulder, vehicle):
             axes.set_xlabel("time since first touch [s]")
         _peaks(rotation, force, boulder, vehicle, trajectory, units)
-        fig.suptitle(verdict_line(trajectory), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
-        fig.supxlabel(design_line(trajectory, units), x=0.01, ha="left", fontsize=8.5, color=GREY)
+        figures.headline(fig, verdict_line(trajectory))
+        figures.caption(fig, design_line(trajectory, units), size=8.5)
 
 
 def require_samples(trajectory: Trajectory) -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
-from boulder_sweep.views.figures import BLUE, GREY, LIGHT_GREY, ORANGE, PALE_ORANGE, figure
-from boulder_sweep.views.labels import label, name_of, size_of
+from boulder_sweep.text import chance_text
+from boulder_sweep.views.figures import BLUE, GREY, LIGHT_GREY, ORANGE, PALE_ORANGE, caption, figure, headline
+from boulder_sweep.views.labels import USUAL, label, name_of, size_of, unbroken, value_text
+from boulder_sweep.views.wording import terms_line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,6 +23,8 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.uncertainty import Uncertainty
 
 FIFTHS = 5
+LEAST_RANGE = 0.01
+"""Least width of the axis of probabilities."""
 
 
 def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0, units: str = "si") -> None:
@@ -47,17 +54,31 @@ def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0
     names = [name for name in samples.columns if name not in ("design_id", "distance")]
     changes = {name: _by_fifths(samples, name) for name in names}
     order = sorted(names, key=lambda name: float(np.ptp(changes[name])), reverse=True)
-    with figure(path, 9.6, 4.4) as fig:
+    with figure(path, 9.6, 4.9) as fig:
         left, right = fig.subplots(1, 2, width_ratios=(1.1, 1.0))
         _scatter(left, samples, order, units)
         _tornado(right, changes, order, row["p_pass"])
-        fig.suptitle(
-            f"{found.sweep.name}: P(pass) = {row['p_pass']:.3f} ({row['p_pass_low']:.3f} to {row['p_pass_high']:.3f})",
-            x=0.01,
-            ha="left",
-            fontsize=11.5,
-            fontweight="bold",
-        )
+        name = found.sweep.name if len(found) == 1 else f"{found.sweep.name} #{design_id}"
+        chance, low, high = (chance_text(row[key]) for key in ("p_pass", "p_pass_low", "p_pass_high"))
+        headline(fig, f"{name}: P(pass) = {chance} ({low} to {high})")
+        caption(fig, _caption(found, row, names, units))
+
+
+def _caption(found: Uncertainty, row: Mapping[str, Any], uncertain: Sequence[str], units: str) -> str:
+    """Say which design it is, with the means of its uncertain inputs, and what a pass means."""
+    sets = [f"{axis.name}: {row[axis.name]}" for axis in found.sweep.axes if axis.labels]
+    follows = () if "impact_height_m" in found.sweep.plan.given else ("impact_height_m",)
+    values = {
+        name: unbroken(value_text(name, row[name], units))
+        for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS)
+        if row.get(name) is not None and name not in follows and (name, row[name]) not in USUAL
+    }
+    design = ", ".join([*map(unbroken, sets), *(words for name, words in values.items() if name not in uncertain)])
+    means = ", ".join(values[name] for name in uncertain if name in values)
+    of = f"Design #{row['design_id']} of #0 to #{len(found) - 1}" if len(found) > 1 else "Design"
+    least = json.loads(found.arrow.schema.metadata[b"boulder_sweep.question"])["margin"]
+    margin = f" Here a pass also has a margin of at least {least:.0%}." if least else ""
+    return f"{of}: {design}. Means of the uncertain inputs: {means}.\n{terms_line(found.sweep.resolved())}{margin}"
 
 
 def _by_fifths(samples: pd.DataFrame, name: str) -> np.ndarray:
@@ -84,22 +105,30 @@ def _tornado(axes: Axes, changes: dict[str, np.ndarray], order: list[str], p_pas
     """Draw the chance where an input lies in its lowest and in its highest fifth."""
     for place, name in enumerate(reversed(order)):
         low, high = changes[name][0], changes[name][-1]
-        axes.barh(place, low - p_pass, left=p_pass, height=0.55, color=PALE_ORANGE)
-        axes.barh(place, high - p_pass, left=p_pass, height=0.55, color=BLUE)
-        for value, word in ((low, "low"), (high, "high")):
-            axes.annotate(
-                f"{word} {value:.2f}",
-                (value, place),
-                xytext=(4 if value >= p_pass else -4, 0),
-                textcoords="offset points",
-                ha="left" if value >= p_pass else "right",
-                va="center",
-                fontsize=8,
-                color=GREY,
-            )
+        for value, colour, words in ((low, PALE_ORANGE, "lowest fifth (low)"), (high, BLUE, "highest fifth (high)")):
+            bar = "" if place else words
+            axes.barh(place, value - p_pass, left=p_pass, height=0.55, color=colour, label=bar)
+        axes.annotate(
+            f"low {chance_text(low)}, high {chance_text(high)}",
+            (0.02, place + 0.3),
+            xycoords=("axes fraction", "data"),
+            va="bottom",
+            fontsize=8,
+            color=GREY,
+        )
     axes.axvline(p_pass, color=LIGHT_GREY, zorder=0)
     axes.set_yticks(range(len(order)), [name_of(name) for name in reversed(order)])
-    axes.margins(x=0.3)
+    axes.set_xlim(*_range([p_pass, *(end for change in changes.values() for end in change[[0, -1]])]))
+    axes.set_ylim(-0.5, len(order) - 0.3)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("P(pass) where the input lies in its lowest or highest fifth")
     axes.set_title("what each input does")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+
+
+def _range(chances: Sequence[float]) -> tuple[float, float]:
+    """Return limits around some probabilities: within 0 and 1, and never closer than `LEAST_RANGE`."""
+    room = 0.08 * (max(chances) - min(chances))
+    low = max(min(chances) - room, 0.0)
+    high = min(max(max(chances) + room, low + LEAST_RANGE), 1.0)
+    return min(low, high - LEAST_RANGE), high

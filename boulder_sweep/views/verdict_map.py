@@ -11,34 +11,41 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views import figures
-from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREY, LIGHT_GREY, PALE_ORANGE, PURPLE
-from boulder_sweep.views.labels import label, name_of, size_of, value_text
+from boulder_sweep.views.figures import VERDICTS
+from boulder_sweep.views.labels import USUAL, label, name_of, size_of, unbroken, value_text
 from boulder_sweep.views.pieces import Pieces
 from boulder_sweep.views.slices import Slice, plane, select
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 CLASSES = (
-    ("pass", BLUE, "pass"),
-    ("undecided", AMBER, "undecided"),
-    ("fail/overturns", PALE_ORANGE, "fail: overturns"),
-    ("fail/penetration", PURPLE, "fail: truck gets too far"),
-    ("fail/no_contact", LIGHT_GREY, "fail: truck passes over it"),
-    ("error", BLACK, "not computed"),
+    ("pass", VERDICTS["pass"], "pass"),
+    ("undecided", VERDICTS["undecided"], "undecided"),
+    ("fail/overturns", VERDICTS["fail"], "fail: overturns"),
+    ("fail/penetration", VERDICTS["fail: penetration"], "fail: truck gets too far"),
+    ("fail/no_contact", VERDICTS["fail: no_contact"], "fail: truck passes over it"),
+    ("error", VERDICTS["error"], "not computed"),
 )
 """Verdict, or verdict and reason; colour; words of the legend."""
 MOST_CELLS = 400
 """A map with more values along an axis is drawn as points."""
 NARROW = 2
-"""With up to so many maps side by side there is no room for the legend beside the title."""
+"""With up to so many maps side by side there is no room for the legend above them."""
+LEGEND_IN = 1.8
+"""Width of the legend beside the maps."""
+GAP_IN = 0.15
+"""Least space between title and legend."""
+AXIS_IN = 0.8
+"""Width of the labels at the left of the maps."""
+LINE_IN = {"title": 0.19, "map": 0.14}
+"""Height of a further line of a title."""
 CHARACTERS_PER_INCH = 15
 """Of the caption."""
 CAPTION_LINE_IN = 0.15
 """Height of a line of the caption."""
-USUAL = (("strain_rate_factor", 1.0),)
-"""Constants that a caption need not mention."""
 
 
 def draw_verdict_map(
@@ -91,8 +98,7 @@ def draw_verdict_map(
             "hold values that occur together (--at), or draw the table in a notebook"
         )
     n_columns, n_rows = len(shown.column_values), len(shown.row_values)
-    beside = n_columns <= NARROW
-    width = max(2.2 * n_columns + 1.9, 5.2) + 1.8 * beside
+    width = max(2.2 * n_columns + 1.9, 5.2) + LEGEND_IN * (n_columns <= NARROW)
     caption = _caption(shown, terms, int(CHARACTERS_PER_INCH * width), units)
     height = max(1.9 * n_rows + 1.45, 3.45) + CAPTION_LINE_IN * (caption.count("\n") + 1)
     with figures.figure(path, width, height) as fig:
@@ -103,21 +109,13 @@ def draw_verdict_map(
                 axes = grid[row, column]
                 cell_rows = select(select(shown.rows, shown.columns, column_value), shown.rows_over, row_value)
                 present |= _panel(axes, cell_rows, shown, units)
-                axes.set_title(_panel_title(shown, row_value, column_value, units), fontsize=8.5)
                 axes.grid(visible=False)
         for axes in grid[-1]:
             axes.set_xlabel(label(shown.across, units))
         for axes in grid[:, 0]:
             axes.set_ylabel(label(shown.up, units))
-        _legend(fig, present, beside=beside)
-        fig.suptitle(
-            f"{title}: which designs stop the truck" if title else "Which designs stop the truck",
-            x=0.01,
-            ha="left",
-            fontsize=11.5,
-            fontweight="bold",
-        )
-        fig.supxlabel(caption, x=0.01, ha="left", fontsize=8.0, color=GREY)
+        _titles(fig, grid, present, shown, f"{title}: which" if title else "Which", units)
+        figures.caption(fig, caption)
     return shown
 
 
@@ -167,9 +165,38 @@ def _edges(levels: np.ndarray) -> np.ndarray:
     return np.concatenate(([2 * levels[0] - middles[0]], middles, [2 * levels[-1] - middles[-1]]))
 
 
-def _panel_title(shown: Slice, row_value: float, column_value: float, units: str) -> str:
+def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, which: str, units: str) -> None:
+    """Write the title of the picture and of every map, in as many lines as they need, and draw the legend."""
+    n_columns = grid.shape[1]
+    words = f"{which} designs stop the truck"
+    beside = n_columns <= NARROW
+    legend_in = _legend(fig, present, beside=beside)
+    headline = figures.headline(fig, words, legend_in + GAP_IN)
+    if not beside and "\n" in headline:
+        fig.legends[0].remove()
+        beside = True
+        fig.set_figwidth(fig.get_figwidth() + LEGEND_IN)
+        legend_in = _legend(fig, present, beside=True)
+        headline = figures.headline(fig, words, legend_in + GAP_IN)
+    map_in = (fig.get_figwidth() - AXIS_IN - legend_in * beside) / n_columns - GAP_IN
+    style: Any = {"fontsize": 8.5, "fontweight": "bold"}
+    further = headline.count("\n") * LINE_IN["title"]
+    for row, row_value in enumerate(shown.row_values):
+        lines = []
+        for column, column_value in enumerate(shown.column_values):
+            parts = _panel_title(shown, row_value, column_value, units)
+            name = figures.broken(fig, ", ".join(parts), map_in, **style)
+            if "\n" in name:
+                name = figures.broken(fig, "\n".join(parts), map_in, **style)
+            grid[row, column].set_title(name, **style)
+            lines.append(name.count("\n"))
+        further += max(lines) * LINE_IN["map"]
+    fig.set_figheight(fig.get_figheight() + further)
+
+
+def _panel_title(shown: Slice, row_value: float, column_value: float, units: str) -> list[str]:
     pairs = ((shown.rows_over, row_value), (shown.columns, column_value))
-    return ", ".join(_held(shown, name, value, units) for name, value in pairs if name is not None)
+    return [_held(shown, name, value, units) for name, value in pairs if name is not None]
 
 
 def _held(shown: Slice, name: str, value: float, units: str) -> str:
@@ -179,24 +206,25 @@ def _held(shown: Slice, name: str, value: float, units: str) -> str:
     return value_text(name, value, units)
 
 
-def _legend(fig: Any, present: set[int], *, beside: bool) -> None:
-    """Draw the legend above the maps, or beside them if the title leaves no room."""
+def _legend(fig: Any, present: set[int], *, beside: bool) -> float:
+    """Draw the legend above the maps, or beside them if the title leaves no room; return its width in inches."""
     from matplotlib.patches import Patch
 
     handles = [Patch(color=colour, label=words) for k, (_, colour, words) in enumerate(CLASSES) if k in present]
     place, columns = ("outside right upper", 1) if beside else ("outside upper right", len(handles))
-    fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
+    drawn = fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
+    return float(drawn.get_window_extent().width / fig.dpi)
 
 
 def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     """Say what is shown, what all designs have in common, and what a pass means, each on a new line."""
-    fixed = ", ".join(_unbroken(_held(shown, name, value, units)) for name, value in shown.fixed.items())
+    fixed = ", ".join(unbroken(_held(shown, name, value, units)) for name, value in shown.fixed.items())
     words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
     for name, count in shown.left_out.items():
         words.append(f"{name_of(name)}: {count} values, not all shown")
     same = [
-        _unbroken(_held(shown, name, value, units))
+        unbroken(_held(shown, name, value, units))
         for name, value in shown.constants.items()
         if (name, value) not in USUAL
     ]
@@ -211,12 +239,7 @@ def _flagged(shown: Slice) -> str:
     shares = {name: count / shown.passing for name, count in shown.flags.items()}
     inside = shares.pop("", 0.0)
     most = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
-    named = ", ".join(_unbroken(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
+    named = ", ".join(unbroken(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
     if not named:
         return "No pass lies outside what the model was tested on"
     return f"Of the passes {1.0 - inside:.0%} lie outside what the model was tested on: {named}"
-
-
-def _unbroken(words: str) -> str:
-    """Return words that stay on one line."""
-    return words.replace(" ", "\N{NO-BREAK SPACE}")

@@ -21,6 +21,13 @@ soil:
   - {name: dense sand, density: 1900 kg/m^3, friction_angle: 42 deg, subgrade_reaction: 90 MN/m^3}
 vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
 """
+LIST = """\
+name: list
+table: designs.csv
+boulder: {length: 1.65 m, width: 1.68 m, density: 2600 kg/m^3}
+soil: {density: 1860 kg/m^3, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -12,8 +13,10 @@ import boulder_sweep
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import Quantity, answer_of
+from boulder_sweep.report.chances import ChanceFile
 from boulder_sweep.report.rows import read_rows
-from tests.answers.designs import site
+from boulder_sweep.settings import load_text
+from tests.answers.designs import DEFAULTS, SITE, site
 
 UNCERTAIN = {"friction": "{mean: [36, 40] deg, cov: 5 %}", "height": "[3.0, 3.6] m", "site": "embedment_depth: 2.2 m"}
 
@@ -26,6 +29,19 @@ def chances(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.fixture(scope="module")
+def of_a_list(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of a list of three designs."""
+    folder = tmp_path_factory.mktemp("list")
+    (folder / "designs.csv").write_text("boulder_height_m\n3.0\n3.2\n3.6\n")
+    settings = SITE.format(**DEFAULTS | UNCERTAIN).replace("height: [3.0, 3.6] m, ", "").replace("[36, 40]", "40")
+    found = boulder_sweep.uncertainty(
+        load_text(f"table: designs.csv\n{settings}", folder / "list.yaml"), half_width=0.1
+    )
+    found.write(folder / "list.parquet")
+    return folder / "list.parquet"
+
+
 def test_the_probabilities_are_said_first(chances: Path) -> None:
     rows = read_rows(chances)
     frame = boulder_sweep.uncertainty(site(**UNCERTAIN), half_width=0.1).frame
@@ -36,8 +52,9 @@ def test_the_probabilities_are_said_first(chances: Path) -> None:
     mass = safe.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3").astype(float)
     lightest = int(mass.idxmin())
     assert [part.value for part in answer.sentences[0] if isinstance(part, Quantity)] == pytest.approx(
-        [mass[lightest], 2.2]
+        [40.0, mass[lightest], 2.2]  # in the looser soil it is not safe, so its soil is named
     )
+    assert answer.sentences[0][1] == ", with soil friction angle "
     assert f"P(pass) = {frame.p_pass[lightest]:.1%}" in str(answer.sentences[0][-1])
     assert answer.named[0].number == lightest
     assert "at the means of their uncertain inputs" in str(answer.sentences[1][0])
@@ -77,6 +94,24 @@ def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
         write_report(tmp_path / "text.parquet", tmp_path / "page.html")
     with pytest.raises(ReportError, match="there is no 9"):
         write_report(chances, tmp_path / "page.html", designs=[9])
+    one = tmp_path / "one.parquet"
+    pq.write_table(pq.read_table(chances).slice(0, 1), one)
+    with pytest.raises(IndexError, match="the file has 1 design, numbered from 0; there is no 9"):
+        ChanceFile(one).row(9)
+
+
+@pytest.mark.parametrize(
+    "kept", [lambda table: table.slice(1), lambda table: table.slice(0, len(table) - 1), lambda table: table[::-1]]
+)
+@pytest.mark.parametrize("kind", ["grid", "list"])
+def test_a_file_with_rows_removed_or_moved_is_refused(
+    kind: str, chances: Path, of_a_list: Path, tmp_path: Path, kept: Any
+) -> None:
+    table = pq.read_table({"grid": chances, "list": of_a_list}[kind])
+    assert len(table) > 1
+    pq.write_table(kept(table), tmp_path / "other.parquet")
+    with pytest.raises(ReportError, match=rf"does not hold the rows of its {len(table)} designs in"):
+        write_report(tmp_path / "other.parquet", tmp_path / "page.html")
 
 
 def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> None:

@@ -1,6 +1,10 @@
 """Tables for colleagues: the same rows, in units that names of columns end in, and harmless in a spreadsheet."""
 
 import csv
+import errno
+import os
+import subprocess
+import sys
 
 import numpy as np
 import openpyxl
@@ -12,7 +16,9 @@ import boulder_sweep
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import export as module
+from boulder_sweep.report import write_explorer, write_report, writing
 from boulder_sweep.report.export import export
+from boulder_sweep.report.page import ASSETS, SCRIPTS
 from boulder_sweep.settings.shown_units import shown_column
 from boulder_sweep.settings.units import factor
 
@@ -109,6 +115,25 @@ def test_a_text_about_the_table_is_no_formula_either(result, tmp_path, monkeypat
     assert not cells[0].value.startswith(module.FORMULA_SIGNS)
 
 
+def test_a_result_is_never_written_into(result):
+    (part,) = result.glob("rows-*.parquet")
+    before = {path.name: path.read_bytes() for path in result.iterdir()}
+    for name in ("all.parquet", "all.csv", "all.xlsx", part.name):
+        with pytest.raises(ReportError, match="holds the result of a run; name a file outside it"):
+            export(result, result / name)
+    assert {path.name: path.read_bytes() for path in result.iterdir()} == before
+
+
+def test_a_table_that_has_no_place_is_refused_by_the_name_given(result, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ReportError, match=rf"^none/base\.csv: the folder {tmp_path}/none does not exist$"):
+        export(result, "none/base.csv")
+    (tmp_path / "base.csv").mkdir()
+    with pytest.raises(ReportError, match=r"^base\.csv cannot be written: Is a directory$"):
+        export(result, "base.csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["base.csv"]
+
+
 def test_what_cannot_be_written_is_refused(result, tmp_path, monkeypatch):
     with pytest.raises(ReportError, match=r"must end in \.xlsx, \.csv or \.parquet"):
         export(result, tmp_path / "designs.ods")
@@ -116,3 +141,47 @@ def test_what_cannot_be_written_is_refused(result, tmp_path, monkeypatch):
     with pytest.raises(ReportError, match="a sheet holds 100 rows, not 252"):
         export(result, tmp_path / "designs.xlsx")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_the_system_refuses_is_an_error_of_the_report(result, tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(module.Path, "replace", refuse)
+    with pytest.raises(ReportError, match=r"designs\.csv cannot be written: Permission denied"):
+        export(result, tmp_path / "designs.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_units_are_si_or_us(result, tmp_path):
+    with pytest.raises(ValueError, match="units must be si or us, not 'metric'"):
+        export(result, tmp_path / "designs.csv", units="metric")
+    with pytest.raises(ValueError, match="units must be si or us, not 'metric'"):
+        write_report(result, tmp_path / "page.html", units="metric")
+    with pytest.raises(ValueError, match="units must be si or us, not 'metric'"):
+        write_explorer(writing.example(), 0, tmp_path / "page.html", units="metric")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [-1, 1, 5])
+def test_a_page_needs_a_design_that_exists(tmp_path, number):
+    with pytest.raises(ReportError, match=f"holds 1 design, numbered from 0; there is no {number}"):
+        write_explorer(writing.example(), number, tmp_path / "page.html")
+
+
+def test_a_page_that_the_system_refuses_is_an_error_of_the_report(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(writing, "put_file", refuse)
+    with pytest.raises(ReportError, match=r"page\.html cannot be written: Read-only file system"):
+        write_explorer(writing.example(), 0, tmp_path / "page.html")
+
+
+def test_a_page_holds_its_scripts_whatever_the_locale(tmp_path):
+    code = "from boulder_sweep.report import writing as w; w.write_explorer(w.example(), 0, 'page.html')"
+    plain = os.environ | {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=plain, check=True)
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    for script in SCRIPTS:
+        assert (ASSETS / f"{script}.js").read_text(encoding="utf-8").strip() in page

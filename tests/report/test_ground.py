@@ -1,15 +1,79 @@
-"""What the page says of soils as they lie."""
+"""Soils as they lie in the page: its simulator has the same physics as the command line."""
 
+from itertools import product
+
+import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_sweep.errors import ReportError
-from boulder_sweep.report import write_explorer
+from boulder_sweep.report import write_explorer, write_report
+from boulder_sweep.settings.model import RESISTANCES
 from tests.judge.test_ground import IN_FILE
 
+pytestmark = pytest.mark.slow  # compiles kernels of its own
+LAYERS, COHESION, WATER, SLOPE = IN_FILE
+SOILS = {
+    "layers": (LAYERS,),
+    "cohesion": (COHESION,),
+    "water": (WATER,),
+    "water at a boundary": (LAYERS, "soil.water_table=0.5 m"),
+    "water up to the soil line": (LAYERS, "soil.water_table=0 m"),
+    "all": IN_FILE,
+}
 
-def test_the_page_refuses_what_its_simulator_does_not_know(tmp_path) -> None:
-    """Layers, cohesion, water below the soil line; a slope it knows."""
-    for entry in IN_FILE[:3]:
-        with pytest.raises(ReportError, match="neither layers, nor cohesion, nor a water table below the soil line"):
-            write_explorer(boulder_sweep.load("configs/rwg.yaml", [entry]), 0, tmp_path / "page.html")
+
+@pytest.mark.parametrize(
+    ("soil", "law"), [*((soil, RESISTANCES[0]) for soil in SOILS), *product(["all"], RESISTANCES[1:])]
+)
+def test_the_simulator_has_the_soil_of_the_command_line(soil, law, tmp_path, opened):
+    sweep = boulder_sweep.load("configs/rwg.yaml", [*SOILS[soil], f"model.resistance={law}"])
+    page = opened(write_explorer(sweep, 0, tmp_path / "page.html"))
+    found = page.evaluate("page.simulator.whole(page.design)")["judged"]
+    known = boulder_sweep.simulate(sweep).summary()
+    for name in ("verdict", "reason", "rating", "validity", "step_s"):
+        assert found[name] == known[name], name
+    for name in ("max_rotation_deg", "max_displacement_m", "vehicle_crush_m", "peak_force_kN", "end_time_s"):
+        assert found[name] == pytest.approx(known[name], rel=1e-9), name
+    for name in ("rotation_error_deg", "displacement_error_m"):  # differences of solutions that agree to many digits
+        assert found[name] == pytest.approx(known[name], rel=1e-5, abs=1e-11), name
+
+
+def test_curves_and_energies_are_those_of_the_command_line(tmp_path, opened):
+    """With a second spring, whose soil stays the same where it takes over."""
+    stages = "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.4 m, stiffness: 9 MN/m}]"
+    sweep = boulder_sweep.load("configs/rwg.yaml", [*IN_FILE, stages])
+    page = opened(write_explorer(sweep, 0, tmp_path / "page.html"))
+    columns = page.evaluate(
+        "Object.fromEntries(Object.entries(page.motions.live.motion.columns).map(([k, v]) => [k, [...v]]))"
+    )
+    theirs = boulder_sweep.simulate(sweep, sample_s=0.5 / 400)
+    energy = theirs.energy()
+    np.testing.assert_allclose(columns["theta_b"], theirs.rotation_rad, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(columns["F_v"], theirs.contact_force_N, rtol=0, atol=1e-9 * theirs.contact_force_N.max())
+    for name in ("soil_elastic", "soil_drag", "gravity"):
+        np.testing.assert_allclose(columns[name], getattr(energy, f"{name}_J"), rtol=0, atol=1e-9 * energy.initial)
+    lasting = energy.crush_damper_J + energy.crush_spent_J
+    np.testing.assert_allclose(columns["crush_damper"], lasting, rtol=0, atol=1e-9 * energy.initial)
+    assert energy.crush_spent_J[-1] > 0.0
+
+
+def test_the_copied_file_has_it(tmp_path, opened):
+    sweep = boulder_sweep.load("configs/rwg.yaml", [*IN_FILE, "partial_factor.friction_angle=1.25"])
+    page = opened(write_explorer(sweep, 0, tmp_path / "page.html"))
+    (tmp_path / "copied.yaml").write_text(page.input_value("#yaml"))
+    assert boulder_sweep.load(tmp_path / "copied.yaml").model.ground == sweep.model.ground
+
+
+def test_a_report_has_it_in_its_rows(tmp_path, opened):
+    """Rows of several depths, for some of which not every layer is in the way."""
+    depths = "site.embedment_depth=[0.4, 0.5, 0.9, 1.6, 2.3] m"
+    grid = boulder_sweep.load("configs/rwg.yaml", [*IN_FILE, depths, "soil.friction_angle=[34, 40] deg"])
+    boulder_sweep.run(grid, tmp_path / "soil.sweep")
+    table = boulder_sweep.read(tmp_path / "soil.sweep")
+    page = opened(write_report(tmp_path / "soil.sweep", tmp_path / "soil.html", designs=[0]))
+    rows = [{name: float(table[name][k]) for name in grid.plan.columns} for k in range(len(table))]
+    found = page.evaluate("(designs) => page.simulator.rows(designs)", rows)
+    assert [one["verdict"] for one in found] == table.verdict.tolist()
+    np.testing.assert_allclose([one["max_rotation_deg"] for one in found], table.max_rotation_deg, rtol=1e-9)
+    assert "3 layers of soil, cohesion 4 / 2 / 0 kPa, water table 0.8 m down" in page.inner_text("main")
+    assert table.verdict.nunique() > 1

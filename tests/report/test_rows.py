@@ -3,13 +3,16 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import boulder_sweep
+from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import Quantity, answer_of
 from boulder_sweep.report.contents import table_data
 from boulder_sweep.report.rows import NOT_YET, read_rows, thinned
-from tests.report.conftest import SETS
+from tests.report.conftest import GRID, LIST, SETS
+from tests.store.folders import rewrite_records
 
 
 @pytest.fixture(scope="module")
@@ -86,11 +89,7 @@ def test_a_list_of_designs_keeps_its_inputs(tmp_path, result):
     table = boulder_sweep.read(result)
     inputs = table[["boulder_height_m", "embedment_depth_m", "friction_angle_deg"]]
     inputs.iloc[::7].to_csv(tmp_path / "designs.csv", index=False)
-    (tmp_path / "list.yaml").write_text(
-        "name: list\ntable: designs.csv\nboulder: {length: 1.65 m, width: 1.5 m, density: 2600 kg/m^3}\n"
-        "soil: {density: 1860 kg/m^3, subgrade_reaction: 60 MN/m^3}\n"
-        "vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}\n"
-    )
+    (tmp_path / "list.yaml").write_text(LIST)
     boulder_sweep.run(boulder_sweep.load(tmp_path / "list.yaml"), tmp_path / "list.sweep")
     rows = read_rows(tmp_path / "list.sweep")
     assert rows.axes == {}
@@ -112,6 +111,22 @@ def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path)
     )
     assert unfinished.counts()[NOT_YET] == 152
     assert any("152 designs are not computed yet" in str(sentence[0]) for sentence in answer_of(unfinished).sentences)
+
+
+def test_a_list_that_is_not_finished_has_a_report_of_its_finished_rows(tmp_path):
+    designs = pd.DataFrame({"boulder_height_m": np.linspace(2.0, 3.8, 10).tolist() * 2})
+    designs["friction_angle_deg"] = np.repeat([44.0, 30.0], 10)
+    designs["embedment_depth_m"] = 0.6 * designs.boulder_height_m
+    designs.to_csv(tmp_path / "designs.csv", index=False)
+    (tmp_path / "list.yaml").write_text(LIST)
+    out = tmp_path / "list.sweep"
+    boulder_sweep.run(boulder_sweep.load(tmp_path / "list.yaml"), out, rows_per_part=15)
+    rewrite_records(out, lambda records: [records["parts"].pop(name) for name in sorted(records["parts"])[1:]])
+    rows = read_rows(out)
+    assert rows.counts()[NOT_YET] == 5
+    assert thinned(rows).places[0].tolist() == list(range(15))
+    assert boulder_sweep.read(out).verdict[answer_of(rows).named[0].number] == "pass"
+    assert write_report(out, tmp_path / "list.html").stat().st_size > 100_000
 
 
 def test_named_soils_are_one_axis_that_gives_all_their_inputs(tmp_path):
@@ -140,3 +155,80 @@ def test_the_largest_map_takes_little_of_a_page(rows):
     assert kept.words == ""
     assert len(json.dumps(table_data(large, kept))) < 1_000_000
     assert thinned(large, most_cells=1_400_000).words == "75 of 150 values of boulder_height_m, spread evenly"
+
+
+FAST = GRID.replace("speed: 30 mph", "speed: [30, 40] mph")
+BOULDER = ["boulder_width_m", "boulder_height_m", "embedment_depth_m"]
+
+
+def ran(text, folder, name="grid"):
+    """Run a file; return what the page reads of it, and its table with the masses."""
+    (folder / f"{name}.yaml").write_text(text)
+    out = boulder_sweep.run(boulder_sweep.load(folder / f"{name}.yaml"), folder / f"{name}.sweep").out
+    table = boulder_sweep.read(out)
+    mass = table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")
+    return read_rows(out), table.assign(mass=mass)
+
+
+def said_of(rows, word):
+    """Return the sentence with a word, with its numbers in the units of the table."""
+    sentence = next(one for one in answer_of(rows).sentences if word in str(one[0]))
+    return "".join(part if isinstance(part, str) else f"{part.value:.6g} {part.unit}" for part in sentence)
+
+
+def test_the_least_boulder_withstands_every_speed(tmp_path):
+    rows, table = ran(FAST.replace("angle: [36, 40]", "angle: [40, 43]"), tmp_path)
+    everywhere = table.groupby(BOULDER).verdict.transform(lambda verdicts: (verdicts == "pass").all())
+    lightest = table[everywhere].sort_values(["mass", "embedment_depth_m", "margin"]).iloc[0]
+    assert lightest.mass > table[table.verdict == "pass"].mass.min()
+    said = said_of(rows, "lightest")
+    assert said.startswith(
+        "The lightest boulder that passes in every soil and at every speed of the sweep: "
+        f"{lightest.mass:.6g} kg of rock"
+    )
+    assert f"margin {lightest.margin:.1%} in the combination of soil and speed that is worst for it" in said
+    assert answer_of(rows).named[0].number == lightest.design_id
+    shallowest = table.embedment_depth_m[answer_of(rows).named[-1].number]
+    assert shallowest == pytest.approx(table[everywhere].embedment_depth_m.min())
+
+
+def test_a_speed_that_no_boulder_withstands_is_said_and_the_other_named(tmp_path):
+    rows, table = ran(FAST.replace("[30, 40] mph", "[30, 90] mph"), tmp_path)
+    assert not (table[table.impact_speed_m_s > 20].verdict == "pass").any()
+    none = "No boulder passes in every soil and at every speed of the sweep; "
+    assert said_of(rows, "No boulder").startswith(none)
+    assert "passes in every soil of the sweep, with vehicle speed 13.4112 m/s: " in said_of(rows, "lightest")
+
+
+def test_vehicles_by_name_are_withstood_all(tmp_path):
+    vehicle = "mass: 15000 lb, spring: 3103.3 kN/m, damper: 138.91 kN*s/m"
+    trucks = f"[{{name: slow, speed: 30 mph, {vehicle}}}, {{name: fast, speed: 90 mph, {vehicle}}}]"
+    text = GRID.split("vehicle:")[0]
+    rows, _ = ran(f"{text}vehicle: {trucks}\n", tmp_path)
+    assert "passes in every soil of the sweep, with vehicle slow: " in said_of(rows, "lightest")
+    rows, _ = ran(f"{text}vehicle: {trucks.replace('90', '31')}\n", tmp_path, "both")
+    said = said_of(rows, "lightest")
+    assert "passes in every soil and against every vehicle of the sweep: " in said
+
+
+def test_a_boulder_of_a_list_passes_in_all_of_its_rows(tmp_path):
+    angles = {3.2: (30, 42), 3.4: (38, 42), 3.6: (42,)}
+    lines = [
+        f"{height},{height * 0.65},{angle}" for angle in (30, 38, 42) for height in angles if angle in angles[height]
+    ]
+    (tmp_path / "designs.csv").write_text("boulder_height_m,embedment_depth_m,friction_angle_deg\n" + "\n".join(lines))
+    rows, table = ran(LIST, tmp_path)
+    assert table.verdict.tolist() == ["fail", "pass", "pass", "pass", "pass"]
+    said = said_of(rows, "lightest")
+    # The lightest that passes at all fails in the other soil of the list.
+    assert said.startswith(
+        "The lightest boulder that passes in every row of the list that has it, "
+        "with soil friction angle 38 deg to 42 deg: "
+    )
+    assert answer_of(rows).named[0].number == 1
+    (tmp_path / "designs.csv").write_text(
+        "boulder_height_m,embedment_depth_m,friction_angle_deg\n3.2,2.08,30\n3.2,2.08,42\n"
+    )
+    rows, _ = ran(LIST, tmp_path, "none")
+    assert said_of(rows, "No boulder").startswith("No boulder passes in every row of the list that has it; ")
+    assert "passes among them, with soil friction angle 42 deg: " in said_of(rows, "lightest")

@@ -20,6 +20,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import PictureError
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
+from boulder_sweep.settings import load_text
 from boulder_sweep.views import figures
 from boulder_sweep.views.energy import LAYERS
 from boulder_sweep.views.figures import checked_kind
@@ -111,6 +112,52 @@ def test_every_picture_says_that_it_is_a_simulation(
     DRAWERS[name](held, tmp_path / "picture.png")
     words = [text.get_text() for text in drawn[0].findobj(Text)]
     assert any("Simulation, not a rating by test" in text for text in words)
+
+
+LAYERED = """\
+name: north gate of the depot
+boulder: {length: 1.65 m, width: 1.68 m, height: 3 m, density: 2600 kg/m^3}
+site: {embedment_depth: 1.8 m}
+soil:
+  density: 1860 kg/m^3
+  friction_angle: 38 deg
+  subgrade_reaction: 60 MN/m^3
+  cohesion: 5 kPa
+  water_table: 1.2 m
+  slope: 5 deg
+  layers: [{from: 0.8 m, density: 1900 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 80 MN/m^3}]
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+@pytest.mark.parametrize("name", ["history", "energy"])
+def test_a_caption_tells_all_of_the_ground_within_the_picture(drawn: list[Figure], tmp_path: Path, name: str) -> None:
+    sweep = load_text(LAYERED, tmp_path / "layered.yaml")
+    object.__setattr__(sweep, "name", "W" * 80)
+    DRAWERS[name](simulate(sweep), tmp_path / "picture.png")
+    FigureCanvasAgg(drawn[0]).draw()
+    title, caption = drawn[0].texts
+    for text in (title, caption):
+        extent = text.get_window_extent()
+        assert drawn[0].bbox.x0 <= extent.x0 < extent.x1 <= drawn[0].bbox.x1
+        assert drawn[0].bbox.y0 <= extent.y0 < extent.y1 <= drawn[0].bbox.y1
+    words = " ".join(caption.get_text().split())
+    ground = "readings corrected, 2 layers of soil, cohesion 5 / 0 kPa, water table 1.2 m down, ground falling by 5°"
+    assert ground in words
+    assert title.get_text().replace("\n", "").startswith("W" * 80)
+
+
+@pytest.mark.parametrize("words", ["", "one", "one two three", "x" * 90, "one " + "y" * 70 + " two", "a\nb c"])
+@pytest.mark.parametrize("inches", [0.01, 0.5, 2.0])
+def test_a_broken_text_loses_nothing_but_spaces(words: str, inches: float) -> None:
+    fig = Figure()
+    found = figures.broken(fig, words, inches)
+    assert found.replace("\n", "").replace(" ", "") == words.replace("\n", "").replace(" ", "")
+    lines = found.split("\n")
+    for line in lines:
+        text = fig.text(0.0, 0.0, line)
+        assert len(line) <= 1 or text.get_window_extent().width <= inches * fig.dpi
+    assert inches < 2.0 or "x" in words or "y" in words or lines == words.split("\n"), "what fits stays as it is"
 
 
 def test_printed_readings_show_what_comes_out_of_nothing(held: Trajectory, tmp_path: Path) -> None:

@@ -264,8 +264,11 @@ def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str]) -> N
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--at", "subgrade_reaction_MN_m3"], "no = found"),
+        (["--at", "subgrade_reaction_MN_m3"], "missing ="),
         (["--at", "subgrade_reaction_MN_m3=stiff"], "must be COLUMN=VALUE"),
+        (["--at", "subgrade_reaction_MN_m3=nan"], "with a finite number in the column's unit"),
+        (["--at", "subgrade_reaction_MN_m3=1e400"], "with a finite number in the column's unit"),
+        (["--at", "subgrade_reaction_MN_m3=60", "--at", "subgrade_reaction_MN_m3 = 95"], "is given twice"),
         (["--across", "weight"], "is not an input column"),
         (["-o", "map.jpeg"], "must end in .png"),
     ],

@@ -2,8 +2,10 @@
 "use strict";
 
 /**
- * Names of the numbers that the kernel takes and gives, each in its order; written by Python.
- * @typedef {{design: string[], settings: string[], outcome: string[], history: string[]}} Layout
+ * Names of the numbers that the kernel takes and gives, each in its order, how many numbers a layer of soil has, and how
+ * many the kernel makes of it; written by Python.
+ * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], layer: number,
+ *   layer_room: number}} Layout
  */
 
 /**
@@ -75,41 +77,53 @@ class Kernel {
   /**
    * Simulate designs up to their verdict.
    * @param {KernelDesign[]} designs
+   * @param {number[][]} layers of the soil of each, as many for all; none in a uniform soil
    * @param {number[]} settings in the order of `Layout.settings`
    * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome`
    */
-  outcomes(designs, settings) {
-    const { design, outcome } = this.layout;
+  outcomes(designs, layers, settings) {
+    const { design, outcome, layer, layer_room } = this.layout;
     const n = designs.length;
-    const { at, views } = this.room([2, design.length * n, settings.length, outcome.length * n, outcome.length * n]);
+    const given = layers.flat();
+    const m = n > 0 ? layers[0].length / layer : 0;
+    const { at, views } = this.room([
+      2, design.length * n, given.length, layer_room * m, settings.length, outcome.length * n, outcome.length * n,
+    ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
-    views[2].set(settings);
-    this.call("outcomes", [at[1], n, at[2], at[3], at[4]]);
-    return Object.fromEntries(outcome.map((name, k) => [name, views[3].slice(k * n, (k + 1) * n)]));
+    views[2].set(given);
+    views[4].set(settings);
+    this.call("outcomes", [at[1], n, at[2], m, ...at.slice(3)]);
+    return Object.fromEntries(outcome.map((name, k) => [name, views[5].slice(k * n, (k + 1) * n)]));
   }
 
   /**
    * Simulate one design over time.
    * @param {KernelDesign} one
+   * @param {number[]} layers of its soil; none in a uniform soil
    * @param {number[]} settings in the order of `Layout.settings`
    * @param {Float64Array} times ascending [s]
    * @returns {Motion}
    */
-  history(one, settings, times) {
-    const { design, history } = this.layout;
+  history(one, layers, settings, times) {
+    const { design, history, layer, layer_room } = this.layout;
     const n = times.length;
-    const { at, views } = this.room([2, design.length, settings.length, n, 6 * n, 2 * n, 4 * n, n, history.length * n, 2]);
+    const m = layers.length / layer;
+    const { at, views } = this.room([
+      2, design.length, layers.length, layer_room * m, settings.length, n, 6 * n, 2 * n, 4 * n, n, history.length * n, 2,
+    ]);
     design.forEach((name, field) => (views[1][field] = one[name]));
-    views[2].set(settings);
-    views[3].set(times);
-    this.call("history", [at[1], at[2], n, ...at.slice(3)]);
-    const end = views[8].subarray(0, n).findIndex(Number.isNaN);
+    views[2].set(layers);
+    views[4].set(settings);
+    views[5].set(times);
+    this.call("history", [at[1], at[2], m, at[3], at[4], n, ...at.slice(5)]);
+    const [found, centre] = views.slice(-2);
+    const end = found.subarray(0, n).findIndex(Number.isNaN);
     const reached = end < 0 ? n : end;
     return {
       time: times.slice(0, reached),
-      columns: Object.fromEntries(history.map((name, k) => [name, views[8].slice(k * n, k * n + reached)])),
-      c_x: views[9][0],
-      c_y: views[9][1],
+      columns: Object.fromEntries(history.map((name, k) => [name, found.slice(k * n, k * n + reached)])),
+      c_x: centre[0],
+      c_y: centre[1],
     };
   }
 }

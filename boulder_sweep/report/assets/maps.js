@@ -6,6 +6,7 @@
  * @typedef {object} TableRows
  * @property {string[]} names what a code stands for
  * @property {boolean} grid
+ * @property {boolean} mapped whether anything varies
  * @property {Record<string, number[]>} values along each axis, or of each design of the list
  * @property {Record<string, number>} given inputs that are the same for all
  * @property {Record<string, string>} labels
@@ -15,9 +16,15 @@
  */
 
 /**
- * One rectangle of a map.
- * @typedef {{x: number, y: number, name: string, margin?: number | null, pick: () => Record<string, number>}} Cell
+ * One rectangle of a map; `names` are those of all designs that lie there, `name` is that of the worst, which is picked.
+ * @typedef {{x: number, y: number, name: string, margin?: number | null, pick: () => Record<string, number>,
+ *   names?: string[]}} Cell
  */
+
+/** Where the rectangles of a strip lie, which has one input only. */
+const STRIP = 0.5;
+/** Verdicts, from the best to the worst that a rectangle can show for designs that lie on each other. */
+const WORSE = ["pass", "not computed yet", "undecided", "error", "fail"];
 
 /**
  * Unpack what Python packed.
@@ -68,12 +75,13 @@ function drawCells(plots, panel, cells, labels, shownUnits, units, colours, here
     bottom: cells.map((cell) => limit(ys, cell.y, 0) / sy),
     top: cells.map((cell) => limit(ys, cell.y, 1) / sy),
     colour: cells.map((cell) => colourOf(cell.name, colours)),
-    verdict: cells.map((cell) => cell.name),
+    verdict: cells.map(wordsOf),
     across: cells.map((cell) => cell.x / sx),
     up: cells.map((cell) => cell.y / sy),
     margin: cells.map((cell) => cell.margin ?? NaN),
   });
   plots.fill(`${panel}-here`, here === null ? { x: [], y: [] } : { x: [here.x / sx], y: [here.y / sy] });
+  plots.flatten(panel, labels.y === "");
   plots.title(`${panel}-map`, units.title(labels.x, shownUnits.x), units.title(labels.y, shownUnits.y));
 }
 
@@ -82,36 +90,76 @@ function colourOf(name, colours) {
   return colours[name] ?? colours[name.split(":")[0]] ?? colours.none;
 }
 
+/** @param {Cell} cell @returns {string} its verdict, and whether other designs lie there */
+function wordsOf(cell) {
+  const words = cell.name.replaceAll("_", " ");
+  return (cell.names?.length ?? 1) > 1 ? `${words} (the worst of ${cell.names?.length} designs here)` : words;
+}
+
+/** @param {Cell[]} cells @returns {string} how many designs pass, and whether some lie on each other */
+function summed(cells) {
+  const all = cells.flatMap((cell) => cell.names ?? [cell.name]);
+  const [passing, total, places] = [all.filter((name) => name === "pass").length, all.length, cells.length].map((n) => n.toLocaleString("en-US"));
+  const first = `${passing} of the ${total} designs shown pass.`;
+  if (all.length === cells.length) return first;
+  return `${first} Designs lie on each other: the map has ${places} ${cells.length === 1 ? "place" : "places"}, each shown as the worst of its designs, which a click or Enter simulates.`;
+}
+
+/**
+ * One rectangle for all designs that lie at the same place, as the worst of them.
+ * @param {Cell[]} cells
+ * @returns {Cell[]}
+ */
+function merged(cells) {
+  const worse = (/** @type {Cell} */ cell) => WORSE.indexOf(cell.name.split(":")[0]);
+  /** @type {Map<string, Cell>} */
+  const places = new Map();
+  for (const cell of cells) {
+    const place = `${cell.x} ${cell.y}`;
+    const known = places.get(place);
+    const names = known?.names ?? [];
+    names.push(cell.name);
+    if (known === undefined || worse(cell) > worse(known)) places.set(place, { ...cell, names });
+  }
+  return [...places.values()];
+}
+
 /**
  * The cells of a table over two of its inputs, the others held.
  * @param {TableRows} rows
  * @param {Uint8Array} codes
  * @param {string} across
- * @param {string} up
+ * @param {string} up empty for a single strip
  * @param {Record<string, number>} held place along every other axis
  * @returns {Cell[]}
  */
 function tableCells(rows, codes, across, up, held) {
   const names = Object.keys(rows.values);
   if (!rows.grid) {
-    return [...codes].map((code, row) => ({
-      x: rows.values[across][row],
-      y: rows.values[up][row],
-      name: rows.names[code],
-      pick: () => Object.fromEntries(names.map((name) => [name, rows.values[name][row]])),
-    }));
+    // Columns that follow from others differ in their last digits.
+    const at = (/** @type {string} */ name, /** @type {number} */ row) => Number(rows.values[name][row].toPrecision(12));
+    return merged(
+      [...codes].map((code, row) => ({
+        x: at(across, row),
+        y: up === "" ? STRIP : at(up, row),
+        name: rows.names[code],
+        pick: () => Object.fromEntries(names.map((name) => [name, rows.values[name][row]])),
+      })),
+    );
   }
   const lengths = names.map((name) => rows.values[name].length);
   const strides = lengths.map((_, k) => lengths.slice(k + 1).reduce((a, b) => a * b, 1));
   const [i, j] = [names.indexOf(across), names.indexOf(up)];
   const base = names.reduce((sum, name, k) => sum + (k === i || k === j ? 0 : held[name] * strides[k]), 0);
-  return rows.values[across].flatMap((x, a) =>
-    rows.values[up].map((y, b) => ({
-      x,
-      y,
-      name: rows.names[codes[base + a * strides[i] + (j === i ? 0 : b * strides[j])]],
-      pick: () =>
-        Object.fromEntries(names.map((name) => [name, name === across ? x : name === up ? y : rows.values[name][held[name]]])),
-    })),
+  return merged(
+    rows.values[across].flatMap((x, a) =>
+      (up === "" ? [STRIP] : rows.values[up]).map((y, b) => ({
+        x,
+        y,
+        name: rows.names[codes[base + a * strides[i] + (up === "" ? 0 : b * strides[j])]],
+        pick: () =>
+          Object.fromEntries(names.map((name) => [name, name === across ? x : name === up ? y : rows.values[name][held[name]]])),
+      })),
+    ),
   );
 }

@@ -5,6 +5,8 @@ const AROUND = 40;
 const SPREAD = 0.25;
 /** Time without a change after which the rest of the page follows the controls [ms]. */
 const PAUSE = 150;
+/** Screens on which legends stand below their figures; the style of the page has the same. */
+const NARROW = "(max-width: 46rem)";
 /** Width of a sheet of A4 between its margins [px]. */
 const PAPER = 680;
 
@@ -32,6 +34,12 @@ class Page {
     this.printing = false;
     /** @type {Record<string, Cell[]>} */
     this.cells = {};
+    this.axes = { live: new Axes("live-across", "live-up"), sweep: data.rows?.mapped ? new Axes("across", "up") : null };
+    const panels = ["live", ...data.chosen.map((/** @type {any} */ _, /** @type {number} */ k) => `chosen${k}`)];
+    /** @type {Record<string, Player>} */
+    this.players = Object.fromEntries(
+      panels.map((panel) => [panel, new Player(panel, this.simulator.times, () => this.showScene(panel))]),
+    );
     /** @type {Record<string, Walker>} */
     this.walkers = { live: new Walker("live", plots, this.units), sweep: new Walker("sweep", plots, this.units) };
   }
@@ -65,9 +73,7 @@ class Page {
     byId(`${panel}-flags`).replaceChildren(...flags.map((name) => element("li", this.data.rules.tested.meanings[name])));
     this.plots.draw(panel, motion, this.units, this.data.rules.rotation);
     this.motions[panel] = { scene: this.scene(inputs), motion };
-    const slider = byId(`${panel}-time`);
-    slider.max = Math.max(motion.time.length - 1, 0);
-    slider.value = this.telling(motion);
+    this.players[panel].load(Math.max(motion.time.length - 1, 0), this.telling(motion));
     this.showScene(panel);
   }
 
@@ -137,7 +143,7 @@ class Page {
 
   /** Simulate designs over two inputs around the one of the controls. */
   showAround() {
-    const [across, up] = [byId("live-across").value, byId("live-up").value];
+    const { across, up } = this.axes.live;
     /** @param {string} name */
     const line = (name) => {
       const input = /** @type {Input} */ (this.inputs.find((one) => one.name === name));
@@ -167,16 +173,16 @@ class Page {
   /** Draw the map of the table. */
   showTable() {
     const { rows } = this.data;
-    const [across, up] = [byId("across").value, byId("up").value];
+    const { across, up } = /** @type {Axes} */ (this.axes.sweep);
     for (const control of byId("held").children) control.hidden = [across, up].includes(control.dataset.name);
     const cells = tableCells(rows, this.codes, across, up, this.held);
     this.cells = { ...this.cells, sweep: cells };
-    const [labels, units] = [{ x: rows.labels[across], y: rows.labels[up] }, { x: rows.units[across], y: rows.units[up] }];
+    const labels = { x: rows.labels[across], y: up === "" ? "" : rows.labels[up] };
+    const units = { x: rows.units[across], y: up === "" ? "" : rows.units[up] };
     drawCells(this.plots, "sweep", cells, labels, units, this.units, this.data.colours, null);
     this.walkers.sweep.over(cells, labels, units, null);
     this.legend("sweep", cells);
-    const passing = cells.filter((cell) => cell.name === "pass").length;
-    byId("sweep-words").textContent = `${passing.toLocaleString("en-US")} of the ${cells.length.toLocaleString("en-US")} designs shown pass.`;
+    byId("sweep-words").textContent = summed(cells);
   }
 
   /** @param {string} panel @param {Cell[]} cells */
@@ -231,7 +237,7 @@ class Page {
         ...this.inputs.map((input) => this.row(input.label, one.inputs[input.name], input.unit)),
       );
     });
-    if (this.data.rows !== null) {
+    if (this.axes.sweep !== null) {
       this.showHeld();
       this.showTable();
     }
@@ -295,13 +301,10 @@ class Page {
       this.design[name] = value;
       this.update();
     });
-    for (const panel of ["live", ...data.chosen.map((/** @type {any} */ _, /** @type {number} */ k) => `chosen${k}`)]) {
-      byId(`${panel}-time`).addEventListener("input", () => this.showScene(panel));
-      byId(`${panel}-play`).addEventListener("click", () => this.play(panel));
-    }
-    for (const name of ["live-across", "live-up"]) byId(name).addEventListener("change", () => this.showAround());
-    for (const name of ["across", "up"]) byId(name)?.addEventListener("change", () => this.showTable());
-    for (const panel of ["live", ...(data.rows === null ? [] : ["sweep"])]) {
+    for (const player of Object.values(this.players)) player.listen();
+    this.axes.live.listen(() => this.showAround());
+    this.axes.sweep?.listen(() => this.showTable());
+    for (const panel of ["live", ...(this.axes.sweep === null ? [] : ["sweep"])]) {
       const source = this.plots.find(`${panel}-cells`);
       source.selected.properties.indices.change.connect(() => {
         const [picked] = source.selected.indices;
@@ -329,6 +332,9 @@ class Page {
       this.refresh();
     });
     byId("theme").addEventListener("change", () => this.paint());
+    const narrow = matchMedia(NARROW);
+    narrow.addEventListener("change", () => this.plots.place(narrow.matches));
+    this.plots.place(narrow.matches);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.paint());
     /** @type {HTMLDetailsElement[]} */
     let opened = [];
@@ -374,45 +380,22 @@ class Page {
     setTimeout(() => (byId("copy").textContent = "Copy as YAML"), 2000);
   }
 
-  /** @param {string} panel */
-  play(panel) {
-    const slider = byId(`${panel}-time`);
-    const last = Number(slider.max);
-    const begun = performance.now();
-    /** @param {number} now */
-    const tick = (now) => {
-      // Five times as slow as it is.
-      const sample = Math.min(Math.floor(((now - begun) / 5000) * (last / this.simulator.times[last])), last);
-      slider.value = String(Math.max(sample, 0));
-      this.showScene(panel);
-      if (sample < last) requestAnimationFrame(tick);
-    };
-    if (last > 0) requestAnimationFrame(tick);
-  }
-
   /** Fill the lists that axes are chosen from. */
   offer() {
     const { rows } = this.data;
-    /** @param {string} id @param {[string, string][]} options @param {string} first */
-    const fill = (id, options, first) => {
-      byId(id).replaceChildren(...options.map(([value, words]) => Object.assign(element("option", words), { value })));
-      byId(id).value = first;
-    };
     const inputs = this.inputs.filter((input) => input.name !== "impact_height_m");
     const all = /** @type {[string, string][]} */ (inputs.map((input) => [input.name, input.label]));
-    fill("live-across", all, "embedment_depth_m");
-    fill("live-up", all, "friction_angle_deg");
+    this.axes.live.offer(all, "embedment_depth_m", "friction_angle_deg");
     byId("units").value = this.units.system;
-    if (rows === null) return;
+    if (this.axes.sweep === null) return;
     const varying = Object.keys(rows.values).filter((name) => new Set(rows.values[name]).size > 1);
     // Numbers make the better axes; names stay on a slider as long as there are enough of them.
     const numbers = varying.filter((name) => !(name in rows.sets));
-    const names = numbers.length > 1 ? numbers : varying.length > 0 ? varying : Object.keys(rows.values);
+    const names = numbers.length > 1 ? numbers : varying;
     const options = /** @type {[string, string][]} */ (names.map((name) => [name, rows.labels[name]]));
     const first = names.find((name) => name.startsWith("embedment")) ?? names[0];
-    const second = names.find((name) => name === "boulder_height_m" && name !== first) ?? names.find((name) => name !== first) ?? first;
-    fill("across", options, first);
-    fill("up", options, second);
+    const second = names.find((name) => name === "boulder_height_m" && name !== first) ?? names.find((name) => name !== first) ?? "";
+    this.axes.sweep.offer(options, first, second);
   }
 }
 

@@ -1,6 +1,9 @@
 // @ts-check
 "use strict";
 
+/** Heights of curves and of the line of a legend, of maps and of strips [px]. */
+const [HEIGHT, LEGEND_LINE, MAP_HEIGHT, STRIP_HEIGHT] = [240, 20, 420, 170];
+
 /** @param {Iterable<number>} times @returns {number[]} so rounded that the axis ends at 1, not a last bit before it */
 function rounded(times) {
   return [...times].map((t) => Number(t.toPrecision(12)));
@@ -51,17 +54,45 @@ class Plots {
     const style = getComputedStyle(document.documentElement);
     const [text, line] = ["--text", "--line"].map((name) => style.getPropertyValue(name).trim());
     for (const figure of this.document.roots()) {
-      for (const axis of [...figure.left, ...figure.below]) {
+      for (const axis of [...figure.left, ...figure.below].filter((part) => part.type !== "Legend")) {
         axis.axis_label_text_color = axis.major_label_text_color = text;
         axis.axis_line_color = axis.major_tick_line_color = axis.minor_tick_line_color = line;
       }
       for (const part of figure.center) if (part.type === "Grid") part.grid_line_color = line;
-      for (const part of figure.right) {
+      for (const part of [...figure.right, ...figure.below]) {
         if (part.type !== "Legend") continue;
         part.label_text_color = text;
         part.background_fill_color = part.border_line_color = null;
       }
     }
+  }
+
+  /**
+   * Put legends below their figures, or beside them where the screen has room.
+   * @param {boolean} narrow
+   */
+  place(narrow) {
+    for (const figure of this.document.roots()) {
+      const legends = (/** @type {any[]} */ parts) => parts.filter((part) => part.type === "Legend");
+      for (const legend of legends(figure.right)) legend.visible = !narrow;
+      for (const legend of legends(figure.below)) {
+        legend.visible = narrow;
+        figure.height = HEIGHT + (narrow ? LEGEND_LINE * (legend.items.length + 1) : 0);
+      }
+    }
+  }
+
+  /**
+   * Show a map as a strip if it has one input only.
+   * @param {string} panel
+   * @param {boolean} flat
+   */
+  flatten(panel, flat) {
+    this.find(`${panel}-map-y`).visible = !flat;
+    const map = this.find(`${panel}-map`);
+    map.height = flat ? STRIP_HEIGHT : MAP_HEIGHT;
+    const [verdict, across, up] = [["", "@verdict"], ["across", "@across{0.000a}"], ["up", "@up{0.000a}"]];
+    this.find(`${panel}-map-hover`).tooltips = flat ? [verdict, across] : [verdict, across, up];
   }
 
   /**

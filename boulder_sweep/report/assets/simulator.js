@@ -10,29 +10,76 @@ const BEFORE_THE_END = 1 - 1e-14;
 const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"];
 
 /**
+ * The soil where it is not the same at every depth or not level; written by Python.
+ * @typedef {{from_m: number, density_kg_m3: number, friction_angle_deg: number, subgrade_reaction_MN_m3: number,
+ *   cohesion_kPa: number}} Layer
+ * @typedef {{layers: Layer[], cohesion_kPa: number, water_table_m: number | null, slope_deg: number,
+ *   is_proportional: boolean, water_kg_m3: number}} Ground `is_proportional`: whether resistance grows with depth
+ */
+
+/** @param {number} phi [rad] @returns {number} Rankine's coefficient of passive earth pressure */
+function passiveCoefficient(phi) {
+  return Math.tan(Math.PI / 4 + phi / 2) ** 2;
+}
+
+/**
  * The coefficient of a law of the soil's ultimate resistance over the paper's: `boulder_sweep.judge.resistance`.
  * @param {string} law
  * @param {KernelDesign} design
  * @returns {number}
  */
 function resistanceFactor(law, { phi, W, d }) {
-  const K_p = Math.tan(Math.PI / 4 + phi / 2) ** 2;
+  const K_p = passiveCoefficient(phi);
   if (law === "broms") return 3 / K_p;
   if (law === "width_capped") return Math.min(1, (1 + (1.6 * (K_p - 1 / K_p) ** 0.67) / (1 + (5 * W) / d)) / K_p);
   return 1;
 }
 
 /**
- * What a slope and water up to the soil line leave of the resistance: `boulder_sweep.judge.ground`.
- * @param {{slope_deg: number, water_table_m: number | null}} ground
- * @param {KernelDesign} design
+ * What a slope leaves of the resistance: `boulder_sweep.judge.ground.slope_factor`.
+ * @param {Ground} ground
+ * @param {number} phi [rad]
  * @returns {number}
  */
-function groundFactor({ slope_deg, water_table_m }, { phi, rho_s }) {
+function slopeFactor({ slope_deg }, phi) {
   const slope = slope_deg / DEGREES;
   const falling = 1 - Math.sqrt((Math.sin(phi) * Math.sin(Math.max(phi - slope, 0))) / Math.cos(slope));
-  const submerged = water_table_m === 0 ? 1 - 1000 / rho_s : 1;
-  return (slope ? ((1 - Math.sin(phi)) / falling) ** 2 : 1) * submerged;
+  return slope ? ((1 - Math.sin(phi)) / falling) ** 2 : 1;
+}
+
+/**
+ * The layers of the soil of a design as the kernel takes them: `boulder_sweep.judge.ground.layers_of`.
+ * @param {string} law
+ * @param {Ground} ground
+ * @param {KernelDesign} design
+ * @param {number} gravity [m/s^2]
+ * @returns {number[]} six numbers for each, from the top down
+ */
+function layersOf(law, ground, design, gravity) {
+  const water = ground.water_table_m ?? Infinity;
+  const uppermost = { from: 0, rho_s: design.rho_s, phi: design.phi, beta: design.beta, cohesion: ground.cohesion_kPa };
+  const soils = [
+    uppermost,
+    ...ground.layers.map((layer) => ({
+      from: layer.from_m,
+      rho_s: layer.density_kg_m3,
+      phi: layer.friction_angle_deg / DEGREES,
+      beta: layer.subgrade_reaction_MN_m3,
+      cohesion: layer.cohesion_kPa,
+    })),
+  ];
+  const bounds = [...new Set([...soils.map(({ from }) => from), ...(water < Infinity ? [water] : [])])].sort((a, b) => a - b);
+  let stress = 0;
+  return bounds.flatMap((top, m) => {
+    const bottom = bounds[m + 1] ?? Infinity;
+    const { rho_s, phi, beta, cohesion } = soils.filter(({ from }) => from <= top).at(-1) ?? uppermost;
+    const K_p = passiveCoefficient(phi);
+    const factor = resistanceFactor(law, { ...design, phi }) * K_p * slopeFactor(ground, phi);
+    const weight = gravity * (rho_s - (top >= water ? ground.water_kg_m3 : 0));
+    const above = K_p * (stress - weight * top) + 2000 * cohesion * Math.sqrt(K_p);
+    stress += weight * (bottom - top);
+    return [bottom, rho_s, phi, beta, factor * above, factor * K_p * weight];
+  });
 }
 
 /** Designs by the columns of the table in, judged rows and motions out. */
@@ -67,8 +114,15 @@ class Simulator {
     );
     // Without a second spring it is like the first, from a crush on that is never reached.
     const springs = { k_2: design.k_2 ?? design.k_v, s_2: design.s_2 ?? NEVER };
-    const factor = groundFactor(ground, design) * resistanceFactor(resistance, design);
-    return { ...design, ...springs, K_epsilon: design.K_epsilon * factor };
+    const submerged = ground.water_table_m === 0 ? 1 - ground.water_kg_m3 / design.rho_s : 1;
+    const factor = slopeFactor(ground, design.phi) * submerged * resistanceFactor(resistance, design);
+    return { ...design, ...springs, K_epsilon: design.K_epsilon * (ground.is_proportional ? factor : 1) };
+  }
+
+  /** @param {KernelDesign} design @returns {number[]} the layers of its soil; none where resistance grows with depth */
+  layers(design) {
+    const { resistance, ground, rules } = this.data;
+    return ground.is_proportional ? [] : layersOf(resistance, ground, design, rules.tested.gravity);
   }
 
   /**
@@ -126,25 +180,24 @@ class Simulator {
     const [judged] = this.judged([design], beyond);
     if (judged.verdict !== "error") for (const name of DECIDED) judged[name] = decided[name];
     const times = refusal === "" ? this.times : new Float64Array(0);
-    return { judged, motion: this.kernel.history(this.kernelDesign(inputs), this.settings(beyond), times), inputs };
+    const one = this.kernelDesign(inputs);
+    return { judged, motion: this.kernel.history(one, this.layers(one), this.settings(beyond), times), inputs };
   }
 
   /** @param {Record<string, number>} changed settings @returns {number} step of the solution that is reported [s] */
   step(changed) {
-    const settings = this.settings(changed);
-    /** @param {string} name */
-    const of = (name) => settings[this.data.layout.settings.indexOf(name)];
-    return of("error_estimate") > 0 ? 0.5 * of("h") : of("h");
+    return changed.step_s ?? this.data.step_s;
   }
 
   /**
    * @param {Record<string, number>[]} designs
-   * @param {Record<string, number>} changed settings
+   * @param {Record<string, number>} changed settings; with another step `h` also the `step_s` that is reported
    * @returns {Judged[]}
    */
   judged(designs, changed) {
     const complete = designs.map((design) => this.completed(design));
-    const outcomes = this.kernel.outcomes(complete.map((one) => this.kernelDesign(one.inputs)), this.settings(changed));
+    const given = complete.map((one) => this.kernelDesign(one.inputs));
+    const outcomes = this.kernel.outcomes(given, given.map((one) => this.layers(one)), this.settings(changed));
     return complete.map(({ inputs, refusal }, row) => {
       const found = judge(outcomes, row, inputs, this.data.rules);
       found.step_s = found.end_time_s === null ? null : this.step(changed);

@@ -65,7 +65,8 @@ class Walker {
     const [sx, sy] = [this.units.size(this.shown.x), this.units.size(this.shown.y)];
     this.plots.fill(`${this.panel}-here`, { x: [found.x / sx], y: [found.y / sy] });
     const words = (/** @type {"x" | "y"} */ axis) => `${this.labels[axis]} ${this.units.text(found[axis], this.shown[axis])}`;
-    byId(`${this.panel}-at`).textContent = `${words("x")}, ${words("y")}: ${found.name.replaceAll("_", " ")}`;
+    const place = this.labels.y === "" ? words("x") : `${words("x")}, ${words("y")}`;
+    byId(`${this.panel}-at`).textContent = `${place}: ${wordsOf(found)}`;
   }
 }
 

@@ -1,0 +1,96 @@
+"""What the picture of a probability says: of which design it is, and its numbers where it is small or none at all."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from boulder_sweep.answers.uncertainty import Uncertainty, uncertainty
+from boulder_sweep.text import chance_text
+from tests.answers.designs import site
+
+
+@pytest.fixture(scope="module")
+def found() -> Uncertainty:
+    """Probabilities of two designs, asked with a margin."""
+    sweep = site(height="[3.2, 3.4] m", site="embedment_depth: 2.2 m", friction="{mean: 38 deg, sd: 3 deg}")
+    return uncertainty(sweep, margin="25 %", half_width=0.05)
+
+
+def changed(found: Uncertainty, p_pass: float, passing: int) -> Uncertainty:
+    """Return a result with another probability, and so many samples that pass."""
+    distance = np.where(np.arange(len(found.samples)) % 4096 < passing, 1.0, -1.0)
+    samples = found.samples.set_column(found.samples.column_names.index("distance"), "distance", pa.array(distance))
+    arrow = found.arrow
+    for name in ("p_pass", "p_pass_low", "p_pass_high"):
+        arrow = arrow.set_column(arrow.column_names.index(name), name, pa.array([p_pass] * len(arrow)))
+    return replace(found, arrow=arrow, samples=samples)
+
+
+def figure_of(found: Uncertainty, path: Path, monkeypatch: pytest.MonkeyPatch, design_id: int = 1) -> Figure:
+    figures: list[Figure] = []
+    with monkeypatch.context() as patch:
+        patch.setattr("boulder_sweep.views.figures.save", lambda fig, target: figures.append(fig))
+        found.plot(path / "chance.png", design_id)
+    FigureCanvasAgg(figures[0]).draw()
+    return figures[0]
+
+
+@pytest.mark.parametrize(("p_pass", "passing"), [(0.0, 0), (1.0, 4096), (0.0004, 2), (0.9996, 4094), (0.5, 2048)])
+def test_probabilities_are_within_their_limits_and_readable(found, tmp_path, monkeypatch, p_pass, passing):
+    fig = figure_of(changed(found, p_pass, passing), tmp_path, monkeypatch)
+    tornado = fig.axes[1]
+    low, high = tornado.get_xlim()
+    assert 0.0 <= low < high <= 1.0
+    assert high - low >= 0.01 - 1e-12
+    assert low <= p_pass <= high
+    assert not tornado.xaxis.get_offset_text().get_text()
+    labels = [text.get_window_extent() for text in tornado.texts]
+    assert labels
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(labels, 2))
+    assert all(tornado.bbox.x0 <= one.x0 and one.x1 <= tornado.bbox.x1 for one in labels)
+    assert not any(one.overlaps(bar.get_window_extent()) for one in labels for bar in tornado.patches)
+    if passing == 2:
+        assert "P(pass) = 0.00040" in fig.texts[0].get_text()
+
+
+def test_the_picture_says_of_which_design_it_is(found, tmp_path, monkeypatch):
+    titles, captions = [], []
+    for design_id in (0, 1):
+        title, caption = figure_of(found, tmp_path, monkeypatch, design_id).texts
+        titles.append(title.get_text())
+        captions.append(" ".join(caption.get_text().split()))
+        assert caption.get_window_extent().x1 <= caption.figure.bbox.x1
+    assert [title.partition(":")[0] for title in titles] == ["site #0", "site #1"]
+    assert "Design #0 of #0 to #1: " in captions[0]
+    assert "height 3.2 m" in captions[0]
+    assert "height 3.4 m" in captions[1]
+    assert "Means of the uncertain inputs: φ′ = 38°." in captions[1]
+    assert captions[1].endswith(
+        "Pass: rotation up to 20° and rating P1 · readings corrected. Simulation, not a rating by test. "
+        "Here a pass also has a margin of at least 25%."
+    )
+
+
+@pytest.mark.parametrize(
+    ("chance", "text"),
+    [
+        (0.0, "0"),
+        (1.0, "1"),
+        (0.5, "0.500"),
+        (0.846, "0.846"),
+        (0.0098, "0.0098"),
+        (0.00004, "0.000040"),
+        (0.99987, "0.99987"),
+        (1e-16, "0"),
+    ],
+)
+def test_digits_of_a_probability(chance: float, text: str) -> None:
+    assert chance_text(chance) == text
