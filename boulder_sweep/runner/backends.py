@@ -7,6 +7,8 @@ from boulder_sweep.errors import BackendError
 THREADING, DASK = "threading", "dask"
 BACKENDS = (THREADING, DASK)
 """Threads of this process: the kernels run without the interpreter's lock. Or a Dask cluster."""
+MOST_JOBS = 4096
+"""Most workers that may be asked for, more than a machine has cores; starting a million would exhaust it."""
 
 
 def available_cores() -> int:
@@ -28,3 +30,39 @@ def check_backend(backend: str, scheduler: str | None) -> None:
         raise BackendError(f"unknown backend {backend!r}: choose one of {', '.join(BACKENDS)}")
     if scheduler is not None and backend != DASK:
         raise BackendError(f"a scheduler address needs the backend dask, not {backend}")
+
+
+def check_jobs(jobs: int | None) -> None:
+    """Refuse a number of workers that is not a whole number, below one, or above `MOST_JOBS`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Says what is allowed.
+    """
+    check_count("jobs", 1 if jobs is None else jobs)
+    if jobs is not None and jobs > MOST_JOBS:
+        raise ValueError(f"jobs must be at most {MOST_JOBS:,}, not {jobs:,}")
+
+
+def check_count(name: str, count: int) -> None:
+    """Refuse a count that is not a whole number, or below one; raises as `check_jobs`."""
+    if not isinstance(count, int) or isinstance(count, bool):
+        raise TypeError(f"{name} must be a whole number, not {type(count).__name__}")
+    if count < 1:
+        raise ValueError(f"{name} must be at least 1, not {count}")
+
+
+def start_failure(problem: BaseException, jobs: int | None) -> BackendError | None:
+    """Return the error to raise if a pool failed because the system starts no more threads, None otherwise.
+
+    `multiprocessing` then stumbles over the threads it has started, which cannot be terminated; the cause is the
+    context of its error.
+    """
+    cause: BaseException | None = problem
+    while cause is not None:
+        if isinstance(cause, RuntimeError) and "can't start new thread" in str(cause):
+            wanted = "a thread for every core" if jobs is None else f"{jobs:,} threads"
+            return BackendError(f"the system cannot start {wanted}; give a smaller number of --jobs")
+        cause = cause.__cause__ or cause.__context__
+    return None

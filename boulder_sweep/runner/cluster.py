@@ -32,6 +32,12 @@ _QUIET_S = 10.0
 """Time without any result after which the user is told [s]."""
 _TASKS_PER_THREAD = 2
 _TRIES = 3
+_FETCH_S = 2.0
+"""How long to wait for a result that a worker has finished; twice as long after each time that this was too short [s].
+
+If a worker dies between finishing a task and handing over the result, the scheduler may try to reach it for 30 s,
+Dask's limit for a connection. Asked again, it gives the result of the worker that has computed the task anew.
+"""
 _LOOPBACK = "127.0.0.1:0"
 
 
@@ -183,6 +189,9 @@ class ClusterWorkers(threading.Thread):
         """Tasks whose workers died; computed one by one."""
         self._in_flight: dict[Any, _Task] = {}
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._lost: list[Any] = []
+        """Futures in flight whose result was lost with its worker before it was received."""
+        self._fetch_s = _FETCH_S
         self._stopped = threading.Event()
         self._workers: dict[str, int] = {}
         self._without_worker_since: float | None = None
@@ -229,14 +238,14 @@ class ClusterWorkers(threading.Thread):
             elif not any(task.alone for task in self._in_flight.values()):
                 more = self._submit_some(shared)
             with suppress(queue.Empty):
-                future = self._arrived.get(timeout=_LOOK_EVERY_S / 4)
-                result = time.monotonic()
-                self._receive(future)
+                if self._receive(self._arrived.get(timeout=_LOOK_EVERY_S / 4)):
+                    result = time.monotonic()
             more = more or bool(self._again) or bool(self._suspects)
             now = time.monotonic()
             if now - looked > _LOOK_EVERY_S:
                 looked = now
                 self._look_at_workers()
+                self._expect_lost()
                 if now - result > _QUIET_S and self._workers:
                     result = now
                     self.messages.put(
@@ -258,16 +267,33 @@ class ClusterWorkers(threading.Thread):
         self._in_flight[future] = task
         future.add_done_callback(self._arrived.put)
 
-    def _receive(self, future: Any) -> None:
-        """Pass a result on, or retry."""
-        task = self._in_flight.pop(future)
-        if future.status == "finished":
-            done: Done = future.result()
-            self._accept(task, done)
-        elif future.status == "error":
-            self._retry(task, future.exception())
-        else:  # cancelled, as all are when the connection breaks
+    def _expect_lost(self) -> None:
+        """Wait again for lost results; Dask calls back at once for those that are still lost."""
+        lost, self._lost = self._lost, []
+        for future in lost:
+            future.add_done_callback(self._arrived.put)
+
+    def _receive(self, future: Any) -> bool:
+        """Pass a result on, or retry; False where the result has not come, and is still waited for."""
+        if future.cancelled():  # as all are when the connection breaks
             raise ClusterLostError(self._cluster.lost_text())
+        if not future.done():
+            self._lost.append(future)
+            return False
+        try:
+            done: Done = future.result(timeout=self._fetch_s)
+        except Exception as problem:
+            if future.status == "error":
+                self._retry(self._in_flight.pop(future), problem)
+            elif isinstance(problem, TimeoutError):
+                self._fetch_s *= 2.0
+                future.add_done_callback(self._arrived.put)
+                return False
+            else:
+                raise
+        else:
+            self._accept(self._in_flight.pop(future), done)
+        return True
 
     def _accept(self, task: _Task, done: Done) -> None:
         """Pass on the parts that a worker has written, or write those that it sent."""
@@ -279,7 +305,7 @@ class ClusterWorkers(threading.Thread):
             self.messages.put(staged)
         if len(here) < len(parts_of(task.start, task.stop, self._folder.manifest.rows_per_part)):
             if not task.relayed:
-                self.messages.put(Note("a worker does not share the output folder: its rows pass the scheduler"))
+                self.messages.put(Note("a worker does not share the output folder: its rows go through the scheduler"))
             there = {staged.part.first for staged in here}
             self._again += [
                 _Task(start, stop, task.tries + 1, relayed=True)

@@ -1,7 +1,7 @@
 """What a worker does with rows: simulate and judge them, retry failures, encode parts.
 
 A block that raises is tried again, then halved until the rows that raise are alone; those become rows of
-verdict ``error``.
+verdict ``error``. Where thousands of tries fail, nothing more is computed.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_sweep.columns import OUTCOMES, VERDICTS, OutcomeColumn
+from boulder_sweep.errors import ComputationError
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed
 from boulder_sweep.judge.validity import FLAGGED
 from boulder_sweep.text import one_line
@@ -23,7 +24,7 @@ MakeBlock = Callable[[int, int], "DesignBlock"]
 Evaluate = Callable[["DesignBlock"], Judged]
 _TRIES = 2
 _FAILURES_BUDGET = 5_000
-"""Failed tries after which blocks are no longer halved: then something is wrong with all of them."""
+"""Failed tries after which a run stops: something is then wrong with more than single designs."""
 
 
 class EncodedPart(NamedTuple):
@@ -73,7 +74,13 @@ class Computation:
         self._warm_up()
 
     def judged(self, start: int, stop: int, tries: int = _TRIES) -> Judged:
-        """Compute the rows [start, stop); those that fail every time are rows of verdict ``error``."""
+        """Compute the rows [start, stop); those that fail every time are rows of verdict ``error``.
+
+        Raises
+        ------
+        ComputationError
+            So many tries have failed, of these rows or others, that something must be wrong with all of them.
+        """
         reason = ""
         for _ in range(tries):
             try:
@@ -81,18 +88,21 @@ class Computation:
             except Exception as problem:
                 self._failures += 1
                 reason = one_line(problem)
-        if stop - start > 1 and self._failures < _FAILURES_BUDGET:
+        if self._failures >= _FAILURES_BUDGET:
+            raise ComputationError(f"{self._failures:,} attempts to compute designs failed, the last with: {reason}")
+        if stop - start > 1:
             middle = (start + stop) // 2
             return joined([self.judged(start, middle, 1), self.judged(middle, stop, 1)])
         return failed_rows(stop - start, f"the computation of this design failed: {reason}")
 
     def encoded(self, first: int, pieces: Sequence[Judged]) -> EncodedPart:
         """Encode consecutive judged rows from `first` on as one part."""
+        from boulder_sweep.store.provenance import cpu_metadata
         from boulder_sweep.store.schema import encode, part_table  # imports pyarrow
 
         judged = joined(list(pieces)).only(self._columns)
         rows = len(judged.verdict)
-        table = part_table(self._make_block(first, first + rows), judged, self._metadata)
+        table = part_table(self._make_block(first, first + rows), judged, {**self._metadata, **cpu_metadata()})
         return EncodedPart(first, rows, encode(table), verdict_counts(judged))
 
 

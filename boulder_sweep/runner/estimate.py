@@ -322,12 +322,19 @@ def peak_memory() -> int:
     Linux reports it in ``/proc``; the value of `getrusage` includes the process that started this one, such as a
     notebook with large tables.
     """
-    try:
-        status = Path("/proc/self/status").read_text()
-        return int(status.split("VmHWM:")[1].split()[0]) * 1024
-    except (OSError, IndexError):
+    peak = _own_memory("VmHWM")
+    if peak is None:
         most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return most if sys.platform == "darwin" else most * 1024
+    return peak
+
+
+def _own_memory(which: str) -> int | None:
+    """Return an entry of Linux on the memory of this process [bytes]; None on other systems."""
+    try:
+        return int(Path("/proc/self/status").read_text().split(f"{which}:")[1].split()[0]) * 1024
+    except (OSError, IndexError):
+        return None
 
 
 def _memory_free() -> int | None:
@@ -337,9 +344,10 @@ def _memory_free() -> int | None:
         free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
     except (OSError, StopIteration, ValueError):
         return None
+    free += _own_memory("VmRSS") or 0
     for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         try:
             free = min(free, int(Path(name).read_text()))
         except (OSError, ValueError):  # no such group, or "max"
             continue
-    return free + peak_memory()
+    return free

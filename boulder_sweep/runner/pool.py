@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
-from boulder_sweep.runner.backends import DASK, THREADING, available_cores, check_backend
+from boulder_sweep.runner.backends import DASK, THREADING, available_cores, check_backend, check_jobs, start_failure
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
@@ -32,18 +32,35 @@ class Pool:
         Threads; all cores by default. With one job everything runs in the calling thread.
     cluster
         Where to work instead.
+
+    Raises
+    ------
+    TypeError, ValueError
+        The number of threads is not a whole number, or out of range.
     """
 
     def __init__(self, jobs: int | None, cluster: Cluster | None = None):
+        check_jobs(jobs)
         self._jobs, self._cluster = jobs, cluster
 
     def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
-        """Make the calls."""
+        """Make the calls.
+
+        Raises
+        ------
+        BackendError
+            The system cannot start as many threads.
+        """
         if self._cluster is not None:
             return self._on_cluster(self._cluster, calls)
         import joblib
 
-        return joblib.Parallel(n_jobs=self._jobs or -1, backend="threading", return_as="generator")(calls)
+        try:
+            return joblib.Parallel(n_jobs=self._jobs or -1, backend="threading", return_as="generator")(calls)
+        except Exception as problem:
+            if failure := start_failure(problem, self._jobs):
+                raise failure from problem
+            raise
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Pool, (1,)
@@ -71,7 +88,7 @@ class Pool:
             try:
                 return future.result(timeout=_LOOK_EVERY_S)
             except TimeoutError as late:
-                if future.done():
+                if future.status == "error":  # the call itself ran out of time
                     raise BackendError(f"the workers cannot answer this: {one_line(late)}") from late
                 if not cluster.threads():
                     raise ClusterLostError(f"{cluster.lost_text()}: no worker is left") from None
@@ -91,6 +108,8 @@ def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = Non
     ------
     BackendError
         The workers are not available.
+    TypeError, ValueError
+        The number of jobs is not a whole number, or out of range.
     """
     check_backend(backend, scheduler)
     if backend != DASK:

@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 Report = Callable[[Progress], None]
-"""What is told of the progress."""
+"""Called with the progress."""
 _LOOK_EVERY_S = 0.1
 _PATIENCE_S = 0.6
 """How long an interrupted run waits for what is being written."""
 _PATIENCE_AFTER_PROBLEM_S = 6.0
-"""The same for a run stopped by a problem: nobody waits, and no worker should still write into a folder given up."""
+"""The same for a run stopped by a problem: no user waits, and no worker may write into a folder already released."""
 
 
 class Run:
@@ -60,7 +60,7 @@ class Run:
         self.firmness: dict[str, Any] = {}
         self._metadata: dict[bytes, bytes] = {}
         self._rows_before = folder.manifest.rows_done
-        self._jobs = 1
+        self.jobs = 1
         self._cluster: Cluster | None = None
         self._estimate: Estimate | None = None
         others = {session.cpu for session in folder.manifest.sessions} - {cpu_name()}
@@ -74,11 +74,12 @@ class Run:
 
     def prepare(self, backend: str, jobs: int, scheduler: str | None, dashboard: str | None, force: bool) -> None:
         """Connect to workers, warm up the kernels, and check that the result will fit."""
-        self._jobs = jobs
+        self.jobs = jobs
         try:
             if backend == DASK:
                 self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler, dashboard))
-                self._jobs = max(sum(self._cluster.threads().values()), 1)
+                self.jobs = max(sum(self._cluster.threads().values()), 1)
+                self.manifest.sessions[-1].jobs = self.jobs
             self.firmness = self._signals.call(lambda: firmness_of(self._sweep).to_dict())
             identity, command = self._folder.manifest.identity, repeat_command(self._sweep)
             self._metadata = file_metadata(identity, command, self.firmness)
@@ -146,7 +147,7 @@ class Run:
             take_sample(self._evaluation, self._sweep.block, rows, self._metadata),
             rows=rows,
             rows_to_compute=rows - self._rows_before,
-            jobs=self._jobs,
+            jobs=self.jobs,
             out=self._folder.path,
             rows_per_part=self._folder.manifest.rows_per_part,
         )
@@ -161,10 +162,10 @@ class Run:
         if self._cluster is not None:
             rows = rows_per_task(self._estimate, manifest.rows_per_part)
             return ClusterWorkers(self._cluster, computation, tasks(manifest.missing(), rows), size, self._folder)
-        admission.limit = rows_in_progress(size, self._jobs, manifest.rows_per_part)
+        admission.limit = rows_in_progress(size, self.jobs, manifest.rows_per_part)
         assembly = Assembly(manifest.missing(), commit_every_s)
         ranges = blocks(manifest.missing(), size)
-        return ThreadWorkers(self._jobs, computation, ranges, admission, assembly, self._folder)
+        return ThreadWorkers(self.jobs, computation, ranges, admission, assembly, self._folder)
 
     def _coordinate(
         self, workers: ThreadWorkers | ClusterWorkers | None, committer: Committer, progress: Report | None

@@ -11,13 +11,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.errors import ClusterLostError, Interrupted
+from boulder_sweep.errors import ClusterLostError, ComputationError, Interrupted
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
-from boulder_sweep.runner.backends import available_cores, check_backend
+from boulder_sweep.runner.backends import available_cores, check_backend, check_count, check_jobs
 from boulder_sweep.runner.commands import repeat_command
 from boulder_sweep.runner.commands import resume_command as default_resume_command
 from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample
@@ -107,6 +107,8 @@ def run(
         The workers are not available.
     ClusterLostError
         Scheduler or workers were lost; the run can be resumed.
+    ComputationError
+        Thousands of attempts to compute designs failed; the run can be resumed.
     Interrupted
         SIGINT or SIGTERM arrived (main thread only); the run can be resumed.
     """
@@ -142,10 +144,10 @@ def run(
         except Interrupted as stop:
             done = ended(f"interrupted by signal {stop.signum}")
             raise Interrupted(stop.signum, done, sweep.n_designs, again) from None
-        except ClusterLostError as lost:
-            done = ended(str(lost))
+        except (ClusterLostError, ComputationError) as problem:
+            done = ended(str(problem))
             safe = f"{done:,} of {sweep.n_designs:,} rows are safe"
-            raise ClusterLostError(f"{lost}. {safe}. Resume with: {again}") from lost
+            raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
         except BaseException as problem:
             ended(f"stopped by {type(problem).__name__}: {problem}")
             raise
@@ -155,7 +157,7 @@ def run(
         whole.manifest,
         rows_computed=whole.rows_computed,
         seconds=time.monotonic() - begun,
-        jobs=jobs,
+        jobs=whole.jobs,
         backend=backend,
         firmness=whole.firmness,
         notes=whole.notes,
@@ -183,7 +185,13 @@ def estimate(
     -------
     Estimate
         Rows, time, disk and memory; `Estimate.objections` lists what does not fit.
+
+    Raises
+    ------
+    TypeError, ValueError
+        The number of jobs is not a whole number, or out of range.
     """
+    check_jobs(jobs)
     sweep.require_values()
     accuracy = accuracy_of(sweep)
     evaluation = evaluation_of(sweep, accuracy, simulate)
@@ -226,11 +234,8 @@ def _check_arguments(
 
     if not isinstance(sweep, Sweep):
         raise TypeError(f"sweep must be what boulder_sweep.load returns, not {type(sweep).__name__}")
-    for name, count in (("jobs", 1 if jobs is None else jobs), ("rows_per_part", rows_per_part)):
-        if not isinstance(count, int) or isinstance(count, bool):
-            raise TypeError(f"{name} must be a whole number, not {type(count).__name__}")
-        if count < 1:
-            raise ValueError(f"{name} must be at least 1, not {count}")
+    check_jobs(jobs)
+    check_count("rows_per_part", rows_per_part)
     if not commit_every_s >= 0.0:
         raise ValueError(f"commit_every_s must not be negative, but is {commit_every_s}")
     if progress is not None and not callable(progress):

@@ -9,6 +9,7 @@ from typing import Any
 
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.assembly import Assembly, ReadyPart
+from boulder_sweep.runner.backends import start_failure
 from boulder_sweep.runner.computing import Computation
 from boulder_sweep.runner.messages import Computed, Ended, Message
 from boulder_sweep.store.writer import OutputFolder, StagedPart
@@ -79,7 +80,12 @@ class ThreadWorkers(threading.Thread):
         import joblib
 
         problem: BaseException | None = None
-        pool = {"backend": "threading", "return_as": "generator_unordered", "batch_size": 1, "pre_dispatch": "2*n_jobs"}
+        pool = {
+            "backend": "threading",
+            "return_as": "generator_unordered",
+            "batch_size": 1,
+            "pre_dispatch": 2 * self._jobs,
+        }
         try:
             with joblib.Parallel(n_jobs=self._jobs, **pool) as parallel:
                 while not self._stopped.is_set() and self._peek() is not None:
@@ -88,7 +94,7 @@ class ThreadWorkers(threading.Thread):
                     self._admission.wait(0.05)
         except BaseException as raised:
             if not self._stopped.is_set():
-                problem = raised
+                problem = start_failure(raised, self._jobs) or raised
         self.messages.put(Ended(problem))
 
     def _peek(self) -> tuple[int, int] | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import math
 import os
 import socket
 import time
@@ -43,7 +44,7 @@ class FolderLock:
     FolderInUseError
         Another run holds it.
     WriteError
-        The lock file cannot be created, as in a read-only folder.
+        The lock file cannot be created, as in a read-only folder, or not be locked.
     """
 
     def __init__(self, folder: Path, last_host: str | None, holder: str):
@@ -58,9 +59,11 @@ class FolderLock:
                 raise WriteError(f"cannot write into {folder}: {problem.strerror}") from problem
             try:
                 shared = _lock(descriptor)
-            except BlockingIOError:
+            except OSError as problem:
                 os.close(descriptor)
-                raise FolderInUseError(f"{folder} is being written by {holder}") from None
+                if isinstance(problem, BlockingIOError):
+                    raise FolderInUseError(f"{folder} is being written by {holder}") from None
+                raise WriteError(f"cannot lock {folder}: {problem.strerror}") from problem
             # The previous holder may have removed the file between opening and locking: then try again.
             if _is(self._path, descriptor):
                 break
@@ -73,8 +76,8 @@ class FolderLock:
                 f"If that run is dead, try again in {DEAD_AFTER_S:.0f} s"
             )
         self._descriptor: int | None = descriptor
-        self._renewed = time.monotonic()
-        os.utime(descriptor)
+        self._renewed = -math.inf
+        self.renew()
 
     def renew(self) -> None:
         """Send a heartbeat if one is due; cheap, call it often."""

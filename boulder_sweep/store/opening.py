@@ -115,7 +115,7 @@ def claim_output(out: Place, *, resume: bool = False, overwrite: bool = False) -
         The folder cannot be used; see the classes in `errors` for the reasons.
     """
     if resume and overwrite:
-        raise errors.StoreError("--resume and --overwrite exclude each other")
+        raise errors.StoreError("--resume and --overwrite cannot be used together")
     storage = storage_of(out)
     created = storage.make()
     lock = None
@@ -157,6 +157,7 @@ def _locked(out: Place, storage: Storage) -> Lock:
 
 def _allowed(out: Place, storage: Storage, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
     """Check that a run may use a folder; return its manifest, None if there is none to resume from."""
+    names = [name for name in names if not (name == ".DS_Store" or name.startswith(".nfs"))]  # of the system
     foreign = [name for name in names if not is_ours(name) or storage.is_folder(name)]
     there = None
     if not (overwrite and not _is_readable(out)):

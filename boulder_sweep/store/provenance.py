@@ -3,7 +3,8 @@
 The *identity* is what must be equal for rows to belong to one table: settings, control of the integration,
 versions and the hashes of the code that decides a row. It goes into every part and into the manifest, and a
 run is resumed only with the same. When, where and with how many workers rows were computed does not affect
-them; that is kept in the manifest only, so that equal runs give equal parts.
+them; that is kept in the manifest only, and the name of the processor in the parts, so that equal runs on equal
+machines give equal parts.
 """
 
 from __future__ import annotations
@@ -26,8 +27,13 @@ PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
-_DECIDING_SOURCES = ("designs.py", "columns.py", "judge/*.py")
-"""Modules, in addition to the kernels, whose code determines the rows."""
+_DECIDING_SOURCES = (
+    "designs.py",
+    "columns.py",
+    "judge/*.py",
+    *(f"settings/{name}.py" for name in ("fields", "layers", "model", "notes")),
+)
+"""Modules, in addition to the kernels, whose code determines the rows: of the settings those that judge/ imports."""
 
 
 def canonical(content: Any) -> str:
@@ -102,14 +108,20 @@ def file_metadata(
     firmness
         How many verdicts of a sample small changes would change, see `boulder_sweep.judge.firmness`.
     """
-    entries = {**identity_, "repeat": repeat, "commit": commit(), "cpu": cpu_name(), "firmness": firmness}
-    return {
+    entries = {**identity_, "repeat": repeat, "commit": commit(), "firmness": firmness}
+    found = {
         f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(
             errors="backslashreplace"
         )
         for key, value in entries.items()
         if value is not None
     }
+    return found | cpu_metadata()
+
+
+def cpu_metadata() -> dict[bytes, bytes]:
+    """Metadata of a part that only the worker that computes it knows: its processor."""
+    return {f"{PREFIX}cpu".encode(): cpu_name().encode(errors="backslashreplace")}
 
 
 def new_session(command: str, jobs: int, backend: str) -> Session:
@@ -166,7 +178,7 @@ def rules_sha256() -> str:
 def cpu_name() -> str:
     """Name of the processor."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
     names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
@@ -178,7 +190,7 @@ def commit() -> str | None:
     """Git commit of the source tree this package runs from; None for an installed package."""
     folder = _PACKAGE_FOLDER.parent
     try:
-        if 'name = "boulder-sweep"' not in (folder / "pyproject.toml").read_text():
+        if 'name = "boulder-sweep"' not in (folder / "pyproject.toml").read_text(encoding="utf-8"):
             return None
         head = (folder / ".git" / "HEAD").read_text().strip()
         if not head.startswith("ref: "):

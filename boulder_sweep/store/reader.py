@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from boulder_sweep.columns import OUTCOMES, column_spec
 from boulder_sweep.places import Place, RemotePath, place_of
 from boulder_sweep.store.finished import FinishedRows
+from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +41,12 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
         There is no result in the folder.
     DamagedError
         A part is missing, truncated or changed.
+    OtherVersionError
+        The result was written by a version whose results this one cannot read.
+    PlaceError
+        The folder is a URL that cannot be read.
+    ValueError
+        The result has no such column.
     """
     table, rows = _read(place_of(out), columns, verify)
     # Split into blocks: consolidating columns of one type would copy the whole table once more.
@@ -80,7 +87,8 @@ def read_row(folder: Place, design_id: int) -> pa.Table:
     """
     finished = FinishedRows(folder)
     if not 0 <= design_id < finished.rows:
-        raise IndexError(f"{folder} has {finished.rows:,} designs, numbered from 0; there is no {design_id}")
+        held = counted(finished.rows, "design")
+        raise IndexError(f"{folder} has {held}, numbered from 0; there is no {design_id}")
     row = finished.row(design_id)
     if row is None:
         raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` shows how to resume")
@@ -94,6 +102,9 @@ def _read(folder: Place, columns: Sequence[str] | None, verify: bool) -> tuple[p
     from boulder_sweep.store.schema import table_schema
 
     finished = FinishedRows(folder)
+    known = table_schema(more=finished.more_columns).names
+    if unknown := [name for name in columns or () if name not in known]:
+        raise ValueError(f"{folder} has no column {unknown[0]!r}; its columns are {', '.join(known)}")
     parts = list(finished.tables(columns, verify=verify))
     if not parts:
         empty = table_schema(more=finished.more_columns).empty_table()

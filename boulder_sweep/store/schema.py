@@ -135,7 +135,7 @@ def _input_array(column: Column) -> pa.Array:
     if column.codes is None:
         return _array(column.values, missing)
     mask = missing[column.codes] if missing.any() else None
-    return pa.DictionaryArray.from_arrays(_array(column.codes, mask), _array(column.values))
+    return pa.DictionaryArray.from_arrays(_array(column.codes, mask), _array(column.values), safe=False)
 
 
 def _outcome_array(spec: OutcomeColumn, judged: Judged) -> pa.Array:
@@ -148,7 +148,8 @@ def _outcome_array(spec: OutcomeColumn, judged: Judged) -> pa.Array:
 
 def _word_array(codes: np.ndarray, words: tuple[str, ...]) -> pa.DictionaryArray:
     """Array of words from codes; code -1 is null."""
-    return pa.DictionaryArray.from_arrays(_array(codes.astype(np.int32), codes < 0), _texts(words))
+    indices = _array(codes.astype(np.int32, copy=False), codes < 0)
+    return pa.DictionaryArray.from_arrays(indices, _texts(words), safe=False)
 
 
 def _array(values: np.ndarray, missing: np.ndarray | None = None) -> pa.Array:

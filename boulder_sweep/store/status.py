@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -42,7 +43,7 @@ class RunStatus:
     identity
         Settings, versions and hashes that all rows share.
     resume_command
-        The command that resumes the run; None if it is complete.
+        The command that resumes the run in this folder, which may have been moved; None if it is complete.
     """
 
     out: str
@@ -112,7 +113,17 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         missing=missing,
         verdicts=manifest.verdicts,
         bytes=sum(part.bytes for part in manifest.parts.values()),
-        resume_command=None if done == manifest.rows else manifest.resume_command,
+        resume_command=None if done == manifest.rows else _into(out, manifest.resume_command),
         sessions=manifest.sessions,
         identity=manifest.identity,
     )
+
+
+def _into(out: str | Path, command: str) -> str:
+    """Return the command that resumes a run, into the folder as it is named now."""
+    if not command.startswith("sweep run "):
+        return command
+    words = shlex.split(command)
+    if words[3:4] != ["-o"]:
+        return command
+    return shlex.join([*words[:4], str(out), *words[5:]])

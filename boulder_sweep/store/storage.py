@@ -136,7 +136,7 @@ class DiskStorage:
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, durably."""
-        names = list(names)
+        names = sorted(names, reverse=True)  # the last rows first: no gap, wherever a run is killed
         for name in names:
             (self._path / name).unlink(missing_ok=True)
         if names:

@@ -12,13 +12,14 @@ ever seen twice, and a run killed in the middle can finish the merge.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import NamedTuple
 
-from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.places import Place
 from boulder_sweep.store import errors
 from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
 from boulder_sweep.store.manifest import Manifest, Merge, Part, is_ours, is_part_name, part_name, save
@@ -28,6 +29,7 @@ from boulder_sweep.store.storage import Lock, Storage
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
 class StagedPart(NamedTuple):
@@ -233,7 +235,7 @@ class OutputFolder:
     def write_error(self, problem: OSError) -> errors.WriteError:
         """Describe why the folder cannot be written, and how to resume."""
         done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
-        advice = "resume" if isinstance(self.path, RemotePath) else "free some space and resume"
+        advice = "free some space and resume" if problem.errno in _NO_SPACE else "resume"
         return errors.WriteError(
             f"cannot write into {self.path}: {problem.strerror}. {done}; {advice} with: {self.manifest.resume_command}"
         )

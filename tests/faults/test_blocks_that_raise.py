@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from boulder_sweep.errors import ComputationError
+from boulder_sweep.runner import computing
 from boulder_sweep.runner.sweeper import run
+from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
 from tests.faults import faulty
 from tests.faults.processes import run_driver
@@ -48,3 +51,18 @@ def test_designs_that_raise(tmp_path, whole, backend):
     code, told, complaints = run_driver(tmp_path / "out", *options, **environment)
     assert (code, told["rows"], complaints) == (3, ROWS, "")
     assert_only_these_are_errors(tmp_path / "out", whole, rows, "failed: ArithmeticError: this design cannot be")
+
+
+@pytest.mark.parametrize("backend", ["threading", "dask"])
+def test_a_run_of_which_most_raises_stops_and_can_be_resumed(tmp_path, whole, monkeypatch, backend):
+    monkeypatch.setattr(computing, "_FAILURES_BUDGET", 10)
+    monkeypatch.setenv(faulty.POISON, poison(whole, list(range(35, 80))))
+    out = tmp_path / "out"
+    with pytest.raises(ComputationError, match=r"1\d attempts .*ArithmeticError.* 80 rows are safe\. Resume"):
+        run(grid_of(ROWS), out, rows_per_part=30, jobs=1, backend=backend, simulate=faulty.raises)
+    found = status(out)
+    assert found.rows_done < ROWS
+    assert not found.running
+    monkeypatch.setenv(faulty.POISON, "0")
+    run(grid_of(ROWS), out, rows_per_part=30, backend=backend, resume=True, simulate=faulty.raises)
+    assert same_bits(read_table(out), whole)

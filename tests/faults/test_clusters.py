@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
 import time
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
-from distributed import LocalCluster
+from distributed import Future, LocalCluster
 
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
@@ -79,6 +81,53 @@ def test_losing_the_last_worker_ends_the_run_resumable(tmp_path, monkeypatch):
         run(grid_of(rows), out, resume=True, **how)
     run(grid_of(rows), tmp_path / "whole", rows_per_part=5000, simulate=slowly)
     assert same_bits(read_table(out), read_table(tmp_path / "whole"))
+
+
+def test_a_result_lost_with_its_worker_is_computed_again(tmp_path, monkeypatch):
+    """The worker dies after finishing a task, before its result is fetched."""
+    rows, how = 4000, {"rows_per_part": 500, "simulate": slowly}
+    receive, lost, asked = backend.ClusterWorkers._receive, [], []
+    with Cluster(1, tmp_path) as cluster:
+
+        def receive_late(self, future):
+            if not lost:
+                cluster.start_worker(wait=True)
+                other = cluster.workers[-1]
+                other.send_signal(signal.SIGSTOP)  # so that it computes nothing anew before the loss is seen
+                cluster.kill_worker()
+                end = time.monotonic() + 30
+                while future.status == "finished" and time.monotonic() < end:
+                    time.sleep(0.01)
+                lost.append(future.status)
+                threading.Timer(2.5, other.send_signal, [signal.SIGCONT]).start()
+            asked.append(future.key)
+            return receive(self, future)
+
+        monkeypatch.setattr(backend.ClusterWorkers, "_receive", receive_late)
+        run(grid_of(rows), tmp_path / "out", backend="dask", scheduler=cluster.address, **how)
+    assert lost == ["lost"]
+    assert 2 <= max(Counter(asked).values()) < 20, "a lost result is asked for once a second"
+    run(grid_of(rows), tmp_path / "whole", **how)
+    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+
+
+def test_a_result_that_does_not_come_is_asked_for_again(tmp_path, monkeypatch):
+    """As where its worker has just died, and the scheduler still tries to reach it."""
+    rows, how = 2000, {"rows_per_part": 500, "simulate": plausible}
+    result, waited = Future.result, []
+
+    def comes_at_last(self, timeout=None):
+        waited.append(timeout)
+        if len(waited) < 3:
+            raise TimeoutError
+        return result(self, timeout)
+
+    monkeypatch.setattr(Future, "result", comes_at_last)
+    run(grid_of(rows), tmp_path / "out", backend="dask", jobs=1, **how)
+    assert waited[:2] == [2.0, 4.0]
+    assert set(waited[2:]) == {8.0}, "a slow connection is not found out again for every result"
+    run(grid_of(rows), tmp_path / "whole", **how)
+    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.faults
 def test_many_kills_lose_no_row_and_double_none(tmp_path, kills):
     seed = int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
     command = [sys.executable, "-m", "tests.faults.kills", str(tmp_path), str(kills), str(seed)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, f"TEST_SEED={seed}: {done.stderr[-3000:]}"
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["kills"] == kills

@@ -9,6 +9,8 @@ import pytest
 
 from boulder_sweep.errors import BackendError, QuestionError
 from boulder_sweep.runner.pool import Pool, pool
+from boulder_sweep.runner.sweeper import estimate
+from tests.runner.grids import grid_of
 
 
 def times(number, *, by=2):
@@ -63,3 +65,61 @@ def test_a_pool_that_is_sent_works_in_the_calling_thread():
 def test_unknown_backends_are_refused():
     with pytest.raises(BackendError, match="unknown backend"), pool(1, "ray"):
         pass
+
+
+@pytest.mark.parametrize("started", [0, 2])
+def test_threads_that_the_system_does_not_start_are_told_in_one_line(no_more_threads, started):
+    no_more_threads(started)
+    with pytest.raises(BackendError, match="the system cannot start 3,000 threads; give a smaller number of --jobs"):
+        list(Pool(3000)((times, (value,), {}) for value in range(9)))
+
+
+def test_other_failures_of_calls_are_passed_on():
+    with pytest.raises(ZeroDivisionError, match="by chance"):
+        list(Pool(2)([(fail, (1,), {})]))
+
+
+@pytest.mark.parametrize("jobs", [0, -5])
+def test_a_number_of_threads_below_one_is_refused(jobs):
+    with pytest.raises(ValueError, match=f"jobs must be at least 1, not {jobs}"):
+        Pool(jobs)
+    with pytest.raises(ValueError, match=f"jobs must be at least 1, not {jobs}"):
+        estimate(grid_of(10), jobs=jobs)
+
+
+class Late:
+    """A call on a cluster whose result is there, but takes its time to be sent."""
+
+    def __init__(self):
+        self.status, self.asked = "finished", 0
+
+    def done(self):
+        return True
+
+    def result(self, timeout):
+        self.asked += 1
+        if self.asked < 3:
+            raise TimeoutError(f"timed out after {timeout} s")
+        return 7
+
+
+class Failed(Late):
+    """A call that ran out of time itself."""
+
+    def result(self, timeout):
+        self.status = "error"
+        raise TimeoutError("no answer from the store")
+
+
+class Workers:
+    """A cluster of one worker that never works."""
+
+    def threads(self):
+        return {"tcp://worker": 1}
+
+
+def test_a_result_that_comes_late_is_waited_for():
+    assert Pool(1)._result(Workers(), late := Late()) == 7
+    assert late.asked == 3
+    with pytest.raises(BackendError, match="TimeoutError: no answer from the store"):
+        Pool(1)._result(Workers(), Failed())

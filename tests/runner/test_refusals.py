@@ -99,6 +99,7 @@ def test_an_output_that_exists(tmp_path, monkeypatch):
         ({"out": 5}, TypeError, "PathLike"),
         ({"jobs": 0}, ValueError, "jobs must be at least 1, not 0"),
         ({"jobs": -2}, ValueError, "jobs must be at least 1"),
+        ({"jobs": 1_000_000}, ValueError, "jobs must be at most 4,096, not 1,000,000"),
         ({"jobs": "two"}, TypeError, "jobs must be a whole number, not str"),
         ({"jobs": 2.0}, TypeError, "jobs must be a whole number, not float"),
         ({"jobs": True}, TypeError, "jobs must be a whole number, not bool"),

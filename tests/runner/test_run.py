@@ -186,7 +186,7 @@ def test_output_that_exists_is_refused_unless_told(finished):
     with pytest.raises(OutputExistsError, match=r"is finished.*--resume.*--overwrite") as refused:
         run(grid(), out)
     assert refused.value.exit_code == 4
-    with pytest.raises(StoreError, match="exclude each other"):
+    with pytest.raises(StoreError, match="cannot be used together"):
         run(grid(), out, resume=True, overwrite=True)
     assert part_files(out) == before
 

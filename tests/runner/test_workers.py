@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from boulder_sweep.columns import REASONS, VERDICTS
-from boulder_sweep.errors import BackendError
+from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.judged import Judged, not_computed
 from boulder_sweep.runner import committer
 from boulder_sweep.runner.admission import Admission
@@ -156,13 +156,26 @@ def test_only_the_rows_that_raise_become_errors(size):
     }
 
 
-def test_when_everything_raises_it_ends_all_the_same():
+def test_a_thousand_rows_that_raise_become_errors():
     def broken(block):
         raise ValueError("x" * 1000)
 
-    _, verdict, reasons = work_off(broken, rows=20_000, size=5000, part=20_000)
+    _, verdict, reasons = work_off(broken, rows=1000, size=500)
     assert (verdict == VERDICTS.index("error")).all()
     assert len(max(reasons, key=len)) < 300
+
+
+@pytest.mark.parametrize("size", [1, 5000])
+def test_when_everything_raises_nothing_more_is_computed(size):
+    """What has not been tried alone is never a row of verdict error."""
+
+    def broken(block):
+        raise ValueError("x" * 1000)
+
+    computation = Computation(broken, Rows, {})
+    judged = (computation.judged(start, start + size) for start in range(0, 20_000, size))
+    with pytest.raises(ComputationError, match="5,000 attempts to compute designs failed, the last with: ValueError"):
+        list(judged)
 
 
 def test_a_mistake_in_making_blocks_is_reported_like_one_in_computing_them():
@@ -259,3 +272,18 @@ def test_a_large_manifest_is_written_seldom(monkeypatch):
     writer.join(10)
     assert commits == [1, 9]
     assert writer.problem is None
+
+
+@pytest.mark.parametrize(("started", "jobs"), [(0, 3000), (2, 3000), (2, 1_000_000)])
+def test_threads_that_the_system_does_not_start_end_the_run(no_more_threads, started, jobs):
+    no_more_threads(started)
+    folder = Folder(1000, 100)
+    assembly = Assembly(folder.manifest.missing())
+    ranges = blocks(folder.manifest.missing(), 32)
+    workers = ThreadWorkers(jobs, Recorder(good, Rows, {}), ranges, Admission(10**9), assembly, folder)
+    workers.start()
+    message = workers.messages.get(timeout=60)
+    workers.join(10)
+    assert isinstance(message, Ended)
+    assert isinstance(message.problem, BackendError)
+    assert str(message.problem) == f"the system cannot start {jobs:,} threads; give a smaller number of --jobs"

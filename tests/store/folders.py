@@ -24,9 +24,16 @@ IDENTITY = {"settings": {"soil": 1}, "settings_sha256": "a" * 64, "versions": {"
 ROWS, SIZE = 441, 100
 
 
-def open_folder(out: Path, *, identity: dict[str, Any] = IDENTITY, rows: int = ROWS, **how: bool) -> OutputFolder:
+def open_folder(
+    out: Path,
+    *,
+    identity: dict[str, Any] = IDENTITY,
+    rows: int = ROWS,
+    resume_command: str = "sweep run x.yaml --resume",
+    **how: bool,
+) -> OutputFolder:
     """Take a folder for a run of 441 rows in parts of 100."""
-    manifest = Manifest(identity, rows, SIZE, "sweep run x.yaml --resume")
+    manifest = Manifest(identity, rows, SIZE, resume_command)
     return open_output(out, manifest, new_session("sweep run x.yaml", 2, "threading"), **how)
 
 

@@ -122,3 +122,18 @@ def test_the_holder_gives_signs_of_life(tmp_path, monkeypatch):
 def test_a_folder_that_is_gone_cannot_be_locked(tmp_path):
     with pytest.raises(WriteError, match="cannot write into"):
         FolderLock(tmp_path / "gone", None, "nobody")
+
+
+@pytest.mark.parametrize("call", ["flock", "utime"])
+def test_a_system_that_refuses_a_call_leaves_no_lock(tmp_path, monkeypatch, call):
+    def refuse(*_):
+        raise OSError(errno.EPERM, "Operation not permitted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fcntl if call == "flock" else os, call, refuse)
+        if call == "flock":
+            with pytest.raises(WriteError, match=r"cannot lock .*: Operation not permitted"):
+                FolderLock(tmp_path, None, "nobody")
+        else:
+            FolderLock(tmp_path, None, "nobody").release()
+    assert not is_locked(tmp_path)

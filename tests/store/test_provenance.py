@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -48,6 +50,7 @@ def test_every_module_that_decides_a_row_is_hashed(tmp_path, monkeypatch):
     deciding = [
         "designs.py",
         *(f"judge/{name}.py" for name in ("accuracy", "evaluation", "judged", "pilot", "verdict")),
+        *(f"settings/{name}.py" for name in ("fields", "notes")),
     ]
     for name in deciding:
         source = package / name
@@ -56,6 +59,28 @@ def test_every_module_that_decides_a_row_is_hashed(tmp_path, monkeypatch):
         assert hash_now() != before, name
         source.write_text(text)
     assert hash_now() == before
+
+
+def imported(source: Path) -> set[str]:
+    """Modules of this package that a module imports when it runs, as paths within the package."""
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = []
+    froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    found = [node.module for node in froms] + [f"{node.module}.{name.name}" for node in froms for name in node.names]
+    own = (f"{name.removeprefix('boulder_sweep.').replace('.', '/')}.py" for name in found if name)
+    return {name for name in own if (provenance._PACKAGE_FOLDER / name).is_file()}
+
+
+def test_what_deciding_modules_import_is_hashed():
+    """But for what only words an error or a line of text."""
+    package = provenance._PACKAGE_FOLDER
+    hashed = {path for pattern in provenance._DECIDING_SOURCES for path in package.glob(pattern)}
+    deciding = [path for path in hashed if path.parent.name != "settings"]
+    reached = set.union(*(imported(path) for path in deciding))
+    assert "settings/model.py" in reached
+    assert reached - {path.relative_to(package).as_posix() for path in hashed} <= {"text.py", "errors.py"}
 
 
 def test_sources_that_are_missing_are_an_error_and_not_an_empty_hash(tmp_path, monkeypatch):

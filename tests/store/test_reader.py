@@ -27,6 +27,12 @@ def test_some_columns(tmp_path):
     assert frame.attrs["units"] == {"margin": "1", "design_id": ""}
 
 
+def test_an_unknown_column_is_named(tmp_path):
+    finished_folder(tmp_path / "out")
+    with pytest.raises(ValueError, match=r"has no column 'nope'; its columns are design_id, "):
+        read(tmp_path / "out", columns=["margin", "nope"])
+
+
 def test_an_unfinished_result(tmp_path):
     folder = open_folder(tmp_path / "out")
     for reader in (read, pl.read_parquet):

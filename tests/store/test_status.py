@@ -82,3 +82,20 @@ def test_nothing_is_changed_by_looking(tmp_path):
 def test_no_result(tmp_path):
     with pytest.raises(NotASweepError):
         status(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        ("sweep run 'my grid.yaml' -o out --jobs 2 --resume", "sweep run 'my grid.yaml' -o '{}' --jobs 2 --resume"),
+        ("sweep run x.yaml --resume", "sweep run x.yaml --resume"),
+        ("boulder_sweep.run(sweep, 'out', resume=True)", "boulder_sweep.run(sweep, 'out', resume=True)"),
+    ],
+)
+def test_a_moved_folder_is_resumed_where_it_is_now(tmp_path, command, expected):
+    folder = open_folder(tmp_path / "out", resume_command=command)
+    commit(folder, 0)
+    folder.close("interrupted by signal 2")
+    moved = (tmp_path / "out").rename(tmp_path / "now here")
+    assert status(moved).resume_command == expected.format(moved)
+    assert status(str(moved) + "/").resume_command == expected.format(f"{moved}/")

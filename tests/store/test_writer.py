@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
+from contextlib import suppress
 
+import pandas as pd
 import pytest
 
 from boulder_sweep.store import status, storage, writer
@@ -19,7 +21,7 @@ from boulder_sweep.store.errors import (
 )
 from boulder_sweep.store.manifest import MANIFEST_NAME, load
 from boulder_sweep.store.reader import read_table
-from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder
+from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder, rewrite_records
 
 
 def names(folder):
@@ -77,6 +79,25 @@ def test_foreign_files_are_left_alone(tmp_path, how, name):
     assert names(out) == [name.rstrip("/")]
 
 
+@pytest.mark.parametrize("name", [".DS_Store", ".nfs000000000001"])
+def test_files_of_the_system_do_not_matter_and_stay(tmp_path, name):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / name).write_text("of the system")
+    open_folder(out).close("interrupted")
+    open_folder(out, overwrite=True).close("interrupted")
+    assert (out / name).read_text() == "of the system"
+
+
+@pytest.mark.parametrize(
+    ("number", "advice"), [(errno.ENOSPC, "free some space and resume"), (errno.EACCES, "; resume with: sweep run")]
+)
+def test_the_advice_depends_on_what_is_wrong(tmp_path, number, advice):
+    folder = open_folder(tmp_path / "out")
+    assert advice in str(folder.write_error(OSError(number, os.strerror(number))))
+    folder.close("interrupted")
+
+
 def test_a_file_that_is_only_named_like_a_part_is_foreign(tmp_path):
     out = tmp_path / "out"
     out.mkdir()
@@ -84,6 +105,30 @@ def test_a_file_that_is_only_named_like_a_part_is_foreign(tmp_path):
     with pytest.raises(ForeignFilesError, match="rows-000000000000"):
         open_folder(out, overwrite=True)
     assert (out / PARTS[0]).read_text() == "mine"
+
+
+@pytest.mark.parametrize("removed", range(4))
+def test_a_run_killed_while_it_removes_unrecorded_parts_leaves_no_gap(tmp_path, monkeypatch, removed):
+    """Killed between naming five parts and recording the last three, resumed, and killed again."""
+
+    class Killed(BaseException):
+        """Stands for SIGKILL."""
+
+    out = finished_folder(tmp_path / "out")
+    rewrite_records(out, lambda records: [records["parts"].pop(name) for name in PARTS[2:]])
+    unlink, done = storage.Path.unlink, []
+
+    def deadly(path, **how):
+        if path.name in PARTS and len(done) == removed:
+            raise Killed
+        unlink(path, **how)
+        done.append(path.name)
+
+    monkeypatch.setattr(storage.Path, "unlink", deadly)
+    with suppress(Killed):
+        open_folder(out, resume=True).close("interrupted")
+    ids = pd.read_parquet(out)["design_id"].to_list()
+    assert ids == list(range([ROWS, 400, 300, 200][removed]))
 
 
 def test_to_overwrite_a_result_with_foreign_files_is_refused(tmp_path):
