@@ -11,7 +11,6 @@ import csv
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -19,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_sweep.settings.numbers import NumberError, split_number
-from boulder_sweep.settings.problems import Place, Problem, ProblemList, SettingsError, did_you_mean, shorten
-from boulder_sweep.settings.source import check_regular_file
+from boulder_sweep.settings.problems import Place, ProblemList, cell_place, did_you_mean, shorten
+from boulder_sweep.settings.source import check_regular_file, refuse
 from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
 
 MOST_ROWS, MOST_COLUMNS = 2_000_000, 1000
@@ -97,26 +96,26 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
         Every mistake of the file, with line and column.
     """
     file = Path(path)
-    rows, delimiter = _rows(file)
+    header, *rows = _rows(file)
     problems = ProblemList()
-    line, header = rows[0]
-    if len(header) > MOST_COLUMNS:
-        raise _refusal(str(file), f"has {len(header):,} columns; at most {MOST_COLUMNS:,} are read")
-    columns = [_column(cell, Place(str(file), line), wanted, problems) for cell in header]
-    named = [column.signal.name for column in columns if column is not None]
-    for name in sorted({name for name in named if named.count(name) > 1}):
-        problems.add(Place(str(file), line), name, "stands in two columns")
+    if len(header.cells) > MOST_COLUMNS:
+        raise refuse(str(file), f"has {len(header.cells):,} columns; at most {MOST_COLUMNS:,} are read")
+    columns = [_column(cell, header.place(index), wanted, problems) for index, cell in enumerate(header.cells)]
+    named = [column and column.signal.name for column in columns]
+    for index, name in enumerate(named):
+        if name is not None and name in named[:index]:
+            problems.add(header.place(index), name, "stands in two columns")
     if not problems and TIME.name not in named:
-        problems.add(Place(str(file), line), "", "has no column of time, such as 'time [ms]'")
+        problems.add(header.place(0), "", "has no column of time, such as 'time [ms]'")
     if not problems and len(named) < 2:
         names = ", ".join(signal.name for signal in wanted if signal is not TIME)
-        problems.add(Place(str(file), line), "", f"has nothing beside time; it may hold {names}")
+        problems.add(header.place(0), "", f"has nothing beside time; it may hold {names}")
     problems.raise_if_any()
-    values = _values(file, rows[1:], header, columns, problems, delimiter)
-    time = values.pop(TIME.name)
+    values = _values(rows, columns, problems)
     if not problems:
-        _check_time(file, rows[1:], time, problems)
+        _check_time(rows, named.index(TIME.name), values[TIME.name], problems)
     problems.raise_if_any()
+    time = values.pop(TIME.name)
     return TimeHistory(file, time, values)
 
 
@@ -127,27 +126,41 @@ class _Column(NamedTuple):
     factor: float
 
 
-def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], str]:
-    """Return the lines that hold something, each with its number, cut into cells."""
+class _Row(NamedTuple):
+    """A line that holds something, cut into cells."""
+
+    file: Path
+    line: int
+    text: str
+    delimiter: str
+    cells: list[str]
+
+    def place(self, index: int) -> Place:
+        """Return where a cell begins."""
+        return cell_place(str(self.file), self.line, self.text, self.delimiter, index)
+
+
+def _rows(file: Path) -> list[_Row]:
+    """Return the lines that hold something."""
     label = str(file)
     check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
             lines = list(islice(_filled_lines(stream), MOST_ROWS + 2))
     except UnicodeDecodeError:
-        raise _refusal(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
+        raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
     except OSError as error:
-        raise _refusal(label, f"cannot be read ({error.strerror})") from None
+        raise refuse(label, f"cannot be read ({error.strerror})") from None
     if len(lines) < 3:
-        raise _refusal(label, "must hold a line of names and at least two rows of numbers")
+        raise refuse(label, "must hold a line of names and at least two rows of numbers")
     if len(lines) > MOST_ROWS + 1:
-        raise _refusal(label, f"has more than {MOST_ROWS:,} rows")
+        raise refuse(label, f"has more than {MOST_ROWS:,} rows")
     delimiter = next((sign for sign in ",;\t" if sign in lines[0][1]), ",")
     try:
         cells = csv.reader([text for _, text in lines], delimiter=delimiter)
-        return [(number, row) for (number, _), row in zip(lines, cells, strict=True)], delimiter
+        return [_Row(file, *line, delimiter, row) for line, row in zip(lines, cells, strict=True)]
     except (csv.Error, ValueError):
-        raise _refusal(label, "cannot be read as CSV: a cell runs over the end of its line") from None
+        raise refuse(label, "cannot be read as CSV: a cell runs over the end of its line") from None
 
 
 def _filled_lines(stream: Iterable[str]) -> Iterator[tuple[int, str]]:
@@ -157,10 +170,6 @@ def _filled_lines(stream: Iterable[str]) -> Iterator[tuple[int, str]]:
 
 def _holds_something(text: str) -> bool:
     return bool(text.strip(" \t\r\n,;")) and not text.startswith("#")
-
-
-def _refusal(label: str, message: str) -> SettingsError:
-    return SettingsError([Problem(label, None, None, "", message)])
 
 
 def _column(cell: str, place: Place, wanted: Sequence[Signal], problems: ProblemList) -> _Column | None:
@@ -205,54 +214,47 @@ def _factor(unit: str, target: str) -> float:
     try:
         return float(factor(f"({unit})*s", "m/s"))
     except UnitError:
-        raise UnitError(f"'{shorten(unit)}' is no unit of acceleration (m/s^2, ft/s^2 or g)") from None
+        raise UnitError(f"'{shorten(unit)}' is not a unit of acceleration (m/s^2, ft/s^2 or g)") from None
 
 
-def _values(
-    file: Path,
-    rows: list[tuple[int, list[str]]],
-    header: list[str],
-    columns: Sequence[_Column | None],
-    problems: ProblemList,
-    delimiter: str,
-) -> dict[str, np.ndarray]:
+def _values(rows: list[_Row], columns: Sequence[_Column | None], problems: ProblemList) -> dict[str, np.ndarray]:
     """Return the numbers of every column, converted; NaN for an empty cell."""
     values = {column.signal.name: np.full(len(rows), np.nan) for column in columns if column is not None}
-    for row, (line, cells) in enumerate(rows):
-        if len(cells) != len(header):
-            plural = "" if len(cells) == 1 else "s"
-            message = f"has {len(cells)} cell{plural}; the first line has {len(header)}"
-            problems.add(Place(str(file), line, 1), "", message)
+    for number, row in enumerate(rows):
+        if len(row.cells) != len(columns):
+            plural = "" if len(row.cells) == 1 else "s"
+            message = f"has {len(row.cells)} cell{plural}; the first line has {len(columns)}"
+            problems.add(row.place(0), "", message)
             continue
-        at = 1
-        for cell, column in zip(cells, columns, strict=True):
+        for index, (cell, column) in enumerate(zip(row.cells, columns, strict=True)):
             if column is not None and cell.strip():
-                values[column.signal.name][row] = _number(cell, column, Place(str(file), line, at), problems)
-            at += len(cell) + len(delimiter)
+                value = _number(cell)
+                if isinstance(value, str):
+                    problems.add(row.place(index), column.signal.name, value)
+                else:
+                    values[column.signal.name][number] = value * column.factor
     return values
 
 
-def _number(cell: str, column: _Column, place: Place, problems: ProblemList) -> float:
+def _number(cell: str) -> float | str:
+    """Return the number in a cell, or what is wrong with it."""
     try:
         value = float(cell)  # the usual case, fast
     except ValueError:
         value = np.nan
-    if np.isfinite(value) and "_" not in cell:
-        return value * column.factor
+    if np.isfinite(value) and cell.isascii() and "_" not in cell:
+        return value
     try:
         number, unit = split_number(cell, "1")
-        message = f"'{shorten(cell)}' has a unit; the column has one in its name" if unit else ""
     except NumberError as error:
-        number, message = Fraction(0), str(error)
-    if message:
-        problems.add(place, column.signal.name, message)
-    return float(number) * column.factor
+        return str(error)
+    return f"'{shorten(cell)}' has a unit; the column has one in its name" if unit else float(number)
 
 
-def _check_time(file: Path, rows: list[tuple[int, list[str]]], time: np.ndarray, problems: ProblemList) -> None:
+def _check_time(rows: list[_Row], column: int, time: np.ndarray, problems: ProblemList) -> None:
     """Report times that are missing or do not ascend."""
-    for row in np.flatnonzero(np.isnan(time))[:5]:
-        problems.add(Place(str(file), rows[row][0]), TIME.name, "is missing in this row")
-    for row in np.flatnonzero(np.diff(time) <= 0.0)[:5]:
-        message = f"{time[row + 1]:.6g} s comes after {time[row]:.6g} s; times must ascend"
-        problems.add(Place(str(file), rows[row + 1][0]), TIME.name, message)
+    for number in np.flatnonzero(np.isnan(time))[:5]:
+        problems.add(rows[number].place(column), TIME.name, "is missing in this row")
+    for number in np.flatnonzero(np.diff(time) <= 0.0)[:5]:
+        message = f"{time[number + 1]:.6g} s comes after {time[number]:.6g} s; times must ascend"
+        problems.add(rows[number + 1].place(column), TIME.name, message)

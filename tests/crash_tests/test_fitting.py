@@ -163,6 +163,40 @@ def test_signals_that_contradict_an_impact_are_refused() -> None:
         pulse_of(history(velocity=np.full(91, np.nan)))
 
 
+@pytest.mark.parametrize(
+    ("signal", "values", "message"),
+    [
+        ("displacement", np.zeros(91), r"pulse.csv: the displacement does not change; it must show how the wall stops"),
+        ("displacement", np.full(91, 0.005), "the displacement does not change"),
+        ("velocity", np.full(91, 13.4), "the velocity does not change"),
+        ("acceleration", np.zeros(91), "the acceleration does not change"),
+        (
+            "displacement",
+            np.linspace(0.0, -0.9, 91),
+            "displacement is negative at first; it counts as positive towards the wall",
+        ),
+        ("velocity", np.linspace(-13.0, 2.0, 91), "the velocity is negative at first"),
+        ("displacement", np.linspace(0.0, 1e200, 91), r"reaches 1e\+200 m, which is not that of an impact; check the"),
+        ("acceleration", np.linspace(-1e308, -9e307, 91), r"reaches 9.89e\+307 m/s\^2, which is not that of an impact"),
+        ("deceleration", np.linspace(1e-200, 2e-200, 91), r"reaches 2e-200 m/s\^2, which is not that of an impact"),
+    ],
+)
+def test_signals_without_the_motion_of_an_impact_are_refused(signal: str, values: np.ndarray, message: str) -> None:
+    with pytest.raises(FitError, match=message):
+        pulse_of(history(**{signal: values}))
+
+
+def test_rebound_and_noise_are_not_taken_for_motion_against_the_drive() -> None:
+    for name, end in (("displacement", 0.2), ("displacement", 1.5), ("velocity", 0.2), ("velocity", 1.5)):
+        for seed in range(10):
+            made = pulse(PAPER, [name], 0.05, seed, end)
+            taken = pulse_of(TimeHistory(Path("pulse.csv"), made.time_s, made.signals))
+            assert np.array_equal(taken.signals[name], made.signals[name])
+            against = {name: -made.signals[name]}
+            with pytest.raises(FitError, match=f"the {name} is negative at first"):
+                pulse_of(TimeHistory(Path("pulse.csv"), made.time_s, against))
+
+
 def test_the_example_of_the_documentation(tmp_path: Path) -> None:
     """It says what a fit has to find; the fit finds it within its standard errors."""
     (tmp_path / "pulse.csv").write_text(example_pulse(), encoding="utf-8")

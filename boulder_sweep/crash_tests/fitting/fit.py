@@ -70,8 +70,7 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
     if not math.isfinite(solved.cost):
         raise FitError(f"{pulse.name}: no vehicle comes near this pulse")
     misfits = {name: misfit_of(values, problem.range(name)) for name, values in residuals.items()}
-    errors = problem.standard_errors(unknowns, scales, {name: misfit.correlation for name, misfit in misfits.items()})
-    spring_error, damper_error, speed_error = errors
+    spring_error, damper_error, speed_error = problem.standard_errors(unknowns, scales)
     return VehicleFit(
         pulse=pulse,
         wall=wall,

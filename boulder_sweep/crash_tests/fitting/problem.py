@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from boulder_sweep.crash_tests.fitting.pulse import RESPONSES, Pulse
+from boulder_sweep.crash_tests.fitting.scatter import scatter_of, summed
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
 
 RATIO_BOUNDS = (2e-3, 2e2)
@@ -74,11 +75,11 @@ class Problem:
         high = [math.log(2000.0 / last), math.log(RATIO_BOUNDS[1]), 1e4]
         return np.array(low[: len(start)]), np.array(high[: len(start)])
 
-    def covariance(self, unknowns: np.ndarray, scales: dict[str, float], correlations: dict[str, float]) -> np.ndarray:
-        """Covariance of the unknowns, by the sandwich of the signals' scatter.
+    def covariance(self, unknowns: np.ndarray, scales: dict[str, float]) -> np.ndarray:
+        """Covariance of the unknowns, shape (p, p).
 
-        A residual that is correlated r with its neighbour carries (1 - r)/(1 + r) of the information of an independent
-        one, so each signal's part of the middle of the sandwich counts (1 + r)/(1 - r) times.
+        The sandwich of least squares, (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, with the covariance Σ of the residuals of all signals as
+        `boulder_sweep.crash_tests.fitting.scatter` finds it from them.
         """
         n = len(unknowns)
         steps = 1e-6 * np.maximum(np.abs(unknowns), 1.0)
@@ -87,21 +88,20 @@ class Problem:
             ahead, behind = (unknowns + sign * steps * (np.arange(n) == k) for sign in (1.0, -1.0))
             up, down = self.by_signal(ahead), self.by_signal(behind)
             columns.append({name: (up[name] - down[name]) / (2.0 * steps[k]) / scales[name] for name in up})
-        bread, middle = np.zeros((n, n)), np.zeros((n, n))
-        total = sum(int(known.sum()) for known in self.known.values())
-        for name in self.pulse.signals:
+        bread, scatters = np.zeros((n, n)), []
+        for name, residuals in self.by_signal(unknowns).items():
             jacobian = np.stack([column[name] for column in columns], axis=1)
-            r = min(max(correlations[name], 0.0), 1.0 - 2.0 / len(jacobian))
             bread += jacobian.T @ jacobian
-            middle += (1.0 + r) / (1.0 - r) * (jacobian.T @ jacobian)
+            times = self.pulse.time_s[self.known[name]]
+            scatters.append(scatter_of(name, times, residuals / scales[name], jacobian))
+        masks = list(self.known.values())
+        middle = summed(scatters, together=all(np.array_equal(mask, masks[0]) for mask in masks))
         inverse = np.linalg.pinv(bread, rcond=self.least_share, hermitian=True)
-        return inverse @ middle @ inverse * (total / max(total - n, 1))
+        return np.asarray(inverse @ middle @ inverse)
 
-    def standard_errors(
-        self, unknowns: np.ndarray, scales: dict[str, float], correlations: dict[str, float]
-    ) -> tuple[float, float, float]:
+    def standard_errors(self, unknowns: np.ndarray, scales: dict[str, float]) -> tuple[float, float, float]:
         """Standard errors of spring [N/m], damper [N s/m] and speed [m/s]."""
-        n, covariance, wall = len(unknowns), self.covariance(unknowns, scales, correlations), self.wall(unknowns)
+        n, covariance, wall = len(unknowns), self.covariance(unknowns, scales), self.wall(unknowns)
         # k = m exp(2 u_0), c = m exp(u_0 + u_1)
         of_spring = np.eye(n)[0] * 2.0 * wall.spring_N_m
         of_damper = (np.eye(n)[0] + np.eye(n)[1]) * wall.damper_N_s_m

@@ -20,6 +20,8 @@ RESPONSES: dict[str, Callable[[RigidWall, np.ndarray], np.ndarray]] = {
 """What a Maxwell element answers to each signal."""
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 FEWEST_SAMPLES = 8
+SIZES = (1e-9, 1e9)
+"""Least and greatest peak of a signal that is accepted, in its unit: far beyond any impact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,8 @@ def pulse_of(history: TimeHistory) -> Pulse:
     Raises
     ------
     FitError
-        Fewer than 8 samples are left, or the vehicle seems to be accelerated by the wall.
+        Fewer than 8 samples are left, the vehicle seems to be accelerated by the wall or to move away from it, or a
+        signal does not change or has a size that no impact has.
     """
     signals = dict(history.signals)
     if "deceleration" in signals:
@@ -73,9 +76,23 @@ def pulse_of(history: TimeHistory) -> Pulse:
     for name, values in signals.items():
         if np.isfinite(values).sum() < FEWEST_SAMPLES:
             raise FitError(f"{history.path}: {name} has fewer than {FEWEST_SAMPLES} values from first touch (t = 0) on")
+        _check_size(f"{history.path}: the {name}", values, name)
     if "acceleration" in signals and np.nanmean(signals["acceleration"]) > 0.0:
         raise FitError(
             f"{history.path}: the acceleration is positive, as if the wall pushed the vehicle on; "
             f"if it counts slowing down as positive, name the column deceleration"
         )
+    for name, values in signals.items():
+        # The first that noise does not explain: the rebound, which is negative, comes later.
+        if name != "acceleration" and values[np.abs(values) >= 0.25 * np.nanmax(np.abs(values))][0] < 0.0:
+            raise FitError(f"{history.path}: the {name} is negative at first; it counts as positive towards the wall")
     return Pulse(str(history.path), time, signals)
+
+
+def _check_size(label: str, values: np.ndarray, name: str) -> None:
+    """Refuse a signal without motion, or of a size that no impact has; a constant deceleration stops a vehicle too."""
+    size, unit = float(np.nanmax(np.abs(values))), UNITS[name]
+    if size == 0.0 or (name != "acceleration" and np.nanmin(values) == np.nanmax(values)):
+        raise FitError(f"{label} does not change; it must show how the wall stops the vehicle")
+    if not SIZES[0] <= size <= SIZES[1]:
+        raise FitError(f"{label} reaches {size:.3g} {unit}, which is not that of an impact; check the column's unit")

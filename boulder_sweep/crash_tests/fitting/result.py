@@ -46,8 +46,8 @@ class VehicleFit:
     wall : RigidWall
         The fitted vehicle: mass, speed, spring, damper.
     spring_error_N_m, damper_error_N_s_m : float
-        Standard errors. They allow for the scatter of every signal and for the correlation of neighbouring residuals;
-        they say nothing about whether a Maxwell element is right at all.
+        Standard errors. They allow for noise that is correlated in time, by a filter or because it was integrated from
+        an accelerometer, and between the signals; they say nothing about whether a Maxwell element is right at all.
     speed_error_m_s : float or None
         Standard error of the speed; None where the speed was given.
     misfits : dict of str to SignalMisfit

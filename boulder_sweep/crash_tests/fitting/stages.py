@@ -95,9 +95,8 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
     misfits = {name: misfit_of(values, problem.range(name)) for name, values in residuals.items()}
     if wall.stage is None or _gain(one, misfits, residuals) <= 0.0:
         raise _no_second(one)
-    correlations = {name: misfit.correlation for name, misfit in misfits.items()}
-    n, covariance = len(unknowns), problem.covariance(unknowns, scales, correlations)
-    spring, damper, speed = problem.standard_errors(unknowns, scales, correlations)
+    n, covariance = len(unknowns), problem.covariance(unknowns, scales)
+    spring, damper, speed = problem.standard_errors(unknowns, scales)
     of_second = np.zeros(n)  # k_2 = m exp(2 u_0 + u_-2)
     of_second[0], of_second[-2] = 2.0, 1.0
     second_error = wall.second_spring_N_m * math.sqrt(max(float(of_second @ covariance @ of_second), 0.0))
