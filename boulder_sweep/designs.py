@@ -40,7 +40,11 @@ class Column:
 
     def to_numpy(self) -> np.ndarray:
         """Return one float64 per row."""
-        return self.values if self.codes is None else self.values[self.codes]
+        if self.codes is None:
+            return self.values
+        if len(self.values) == 1:
+            return np.full(len(self.codes), self.values[0])
+        return self.values.take(self.codes.astype(np.intp))  # faster than by codes of 32 bits
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -46,6 +46,12 @@ class ComparisonError(BoulderSweepError):
     """Measurement and simulation cannot be compared."""
 
 
+class ComputationError(BoulderSweepError):
+    """So many designs could not be computed that something must be wrong with all of them."""
+
+    exit_code = EXIT_INTERNAL
+
+
 class ExistingFileError(BoulderSweepError):
     """A file that would be written is there already."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 _LONGEST_LINE = 200
@@ -26,6 +27,19 @@ def duration_text(seconds: float) -> str:
     if minutes < 60:
         return f"{minutes} min {rest:02d} s"
     return f"{minutes // 60:,} h {minutes % 60:02d} min"
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun: ``1 design``, ``2,736 designs``."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def chance_text(chance: float) -> str:
+    """Format a probability: three decimals, or enough for two digits of it and of its complement: ``0.0012``."""
+    rarer = min(chance, 1.0 - chance)
+    if rarer < 1e-12:
+        return f"{chance:.0f}"
+    return f"{chance:.{max(3, 1 - math.floor(math.log10(rarer)))}f}"
 
 
 def printable(text: str) -> str:

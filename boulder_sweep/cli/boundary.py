@@ -1,4 +1,4 @@
-"""``sweep boundary``: the map of a grid from a few per cent of its designs."""
+"""``sweep boundary``: the map of a grid from a part of its designs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import click
 
 from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
-from boulder_sweep.cli.options import jobs_option, json_option, set_option, units_option
+from boulder_sweep.cli.options import OUTPUT, jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
@@ -17,11 +17,11 @@ Examples:
 """
 
 
-@click.command("boundary", short_help="A map from a few per cent of a grid.", epilog=EXAMPLES)
+@click.command("boundary", short_help="A map from a part of a grid.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
 @jobs_option
-@click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all designs.")
-@click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Map (.png, .svg or .pdf).")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all designs.")
+@click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Map (.png, .svg or .pdf).")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
 @units_option
 @set_option
@@ -42,6 +42,7 @@ def boundary(
     along the longest axis; `sweep run` assumes nothing.
     """
     from boulder_sweep.answers.boundary import boundary as find
+    from boulder_sweep.cli.console import counted
     from boulder_sweep.cli.progress import kernels_for, working
 
     sweep = load_sweep(grid, overrides, quiet)
@@ -55,10 +56,11 @@ def boundary(
     else:
         for verdict, count in counts.items():
             show(f"  {verdict:<10}{count:>13,}{count / sweep.n_designs:>8.1%}")
-        show(
-            f"{found.simulations:,} simulations for {sweep.n_designs:,} designs: {found.share:.1%}, "
-            f"{1.0 - found.share:.1%} saved"
-        )
+        done = f"{counted(found.simulations, 'simulation')} for {counted(sweep.n_designs, 'design')}"
+        if found.share < 1.0:
+            show(f"{done}: {found.share:.1%}, {1.0 - found.share:.1%} saved")
+        else:
+            show(f"{done}: nothing saved; 'sweep run' simulates each design once")
     if out is not None:
         found.write(out)
     if picture is not None:

@@ -6,8 +6,10 @@ import json
 
 import click
 
+from boulder_sweep.cli.loading import refuse_units_of_json
 from boulder_sweep.cli.options import json_option, units_option
 from boulder_sweep.cli.output import show
+from boulder_sweep.text import counted
 
 EXAMPLES = """\b
 Examples:
@@ -31,10 +33,10 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
     Shows what differs in settings and versions, how many verdicts changed and how, and the least mass and depth that
     pass. Lists the designs whose rotation changed most.
     """
-    from boulder_sweep.cli.console import counted
     from boulder_sweep.report.comparison import compare as match
     from boulder_sweep.settings.shown_units import shown_unit
 
+    refuse_units_of_json(units, as_json)
     found = match(before, after)
     if as_json:
         show(json.dumps(found.to_dict()))

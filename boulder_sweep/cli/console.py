@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS
-from boulder_sweep.text import duration_text, size_text
+from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:
     from boulder_sweep.places import Place
@@ -30,10 +30,13 @@ def grid_lines(sweep: Sweep) -> list[str]:
     for axis in sweep.axes:
         unit = BY_NAME[axis.name].unit if axis.name in BY_NAME else "1"
         if axis.labels:
-            lines.append(f"  {axis.name:<26}{len(axis):>9,} sets    {', '.join(axis.labels)}")
+            noun = "set" if len(axis) == 1 else "sets"
+            lines.append(f"  {axis.name:<26}{len(axis):>9,} {noun:<8}{', '.join(axis.labels)}")
             continue
-        ends = f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis) > 1 else f"{axis.values[0]:g}"
-        lines.append(f"  {axis.name:<26}{len(axis):>9,} values  {ends}{'' if unit == '1' else ' ' + unit}")
+        least, largest = min(axis.values), max(axis.values)
+        ends = f"{least:g} to {largest:g}" if len(axis) > 1 else f"{least:g}"
+        noun = "value" if len(axis) == 1 else "values"
+        lines.append(f"  {axis.name:<26}{len(axis):>9,} {noun:<8}{ends}{'' if unit == '1' else ' ' + unit}")
     return [*lines, *_uncertain_lines(sweep), *ground]
 
 
@@ -145,7 +148,7 @@ def status_lines(status: RunStatus) -> list[str]:
     """Return how far a run got, what is missing or damaged, and how to resume it."""
     state = "finished" if status.complete else ("running" if status.running else "not finished")
     lines = [
-        f"{status.out}: {state}, {status.rows_done:,} of {status.rows:,} designs "
+        f"{status.out}: {state}, {status.rows_done:,} of {counted(status.rows, 'design')} "
         f"({status.rows_done / max(status.rows, 1):.1%}), {size_text(status.bytes)}",
         *verdict_lines(status.verdicts, status.rows_done),
     ]
@@ -170,11 +173,6 @@ def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:
         else:
             lines.append(f"{indent}{name:<{width}}{_shown(value)}".rstrip())
     return lines
-
-
-def counted(count: int, noun: str) -> str:
-    """Return a number with its noun: ``1 design``, ``2,736 designs``."""
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
 def _shown(value: Any) -> str:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import json_option, units_option
+from boulder_sweep.cli.loading import refuse_unwritable_history
+from boulder_sweep.cli.options import OUTPUT, json_option, units_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -25,8 +26,8 @@ Examples:
 @click.command("explain", short_help="Recompute one row of a result over time.", epilog=EXAMPLES)
 @click.argument("out", type=click.Path())
 @click.argument("design_id", type=click.IntRange(min=0))
-@click.option("--plot", type=click.Path(), metavar="F.png", help="Draw rotation, displacements and forces over time.")
-@click.option("--trajectory", type=click.Path(), metavar="F.parquet", help="Write the time history.")
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw rotation, displacements and forces over time.")
+@click.option("--trajectory", type=OUTPUT, metavar="F.parquet", help="Write the time history.")
 @units_option
 @json_option
 def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, units: str, as_json: bool) -> int:
@@ -40,6 +41,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     from boulder_sweep.impact.explanation import explain as compute_again
     from boulder_sweep.settings.shown_units import shown_values
 
+    refuse_unwritable_history(plot, trajectory)
     try:
         with working(as_json, "design"):
             found = compute_again(out, design_id)
@@ -53,7 +55,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     elif plot is not None or trajectory is not None:
         say("note: the design cannot be computed; there is no time history")
     if as_json:
-        show(json.dumps(found.as_dict()))
+        show(json.dumps(found.as_dict(units)))
         return 0
     values = {"design": shown_values(found.inputs, units), "outcome": shown_values(found.stored, units)}
     show(*value_lines(values), *why_lines(found))

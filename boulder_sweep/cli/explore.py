@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_missing
+from boulder_sweep.cli.options import OUTPUT, set_option, units_option
 from boulder_sweep.cli.output import say, show
 
 EXAMPLES = """\b
@@ -23,7 +23,7 @@ Examples:
 @click.command("explore", short_help="Open one design in the browser and change it there.", epilog=EXAMPLES)
 @click.argument("case", type=click.Path(), required=False)
 @click.option("--design", type=click.IntRange(min=0), default=0, metavar="N", help="Number of the design [default: 0].")
-@click.option("-o", "--output", "page", type=click.Path(), metavar="F.html", help="The page [default: NAME.html].")
+@click.option("-o", "--output", "page", type=OUTPUT, metavar="F.html", help="The page [default: NAME.html].")
 @click.option("--no-open", is_flag=True, help="Write the page and do not open it.")
 @units_option
 @set_option
@@ -42,8 +42,7 @@ def explore(
     if case is None and overrides:
         raise click.UsageError("--set changes entries of a file: name one")
     sweep = example() if case is None else load_sweep(case, overrides, quiet=False)
-    if design >= sweep.n_designs:
-        raise click.UsageError(f"{case} holds {sweep.n_designs:,} designs, numbered from 0; there is no {design}")
+    refuse_missing(sweep, case or sweep.name, design)
     target = Path(page or f"{sweep.name.replace('/', '-').replace(' ', '-')}.html")
     written = write_explorer(sweep, design, target, units=units, command=shlex.join(["sweep", *sys.argv[1:]]))
     show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")

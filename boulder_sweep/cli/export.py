@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import click
 
-from boulder_sweep.cli.options import units_option
+from boulder_sweep.cli.options import OUTPUT, units_option
 from boulder_sweep.cli.output import show
+from boulder_sweep.text import counted
 
 EXAMPLES = """\b
 Examples:
@@ -16,9 +17,7 @@ Examples:
 
 @click.command("export", short_help="Write a result as .xlsx, .csv or .parquet.", epilog=EXAMPLES)
 @click.argument("out", type=click.Path())
-@click.option(
-    "-o", "--output", "file", type=click.Path(), required=True, metavar="F.xlsx|.csv|.parquet", help="The table."
-)
+@click.option("-o", "--output", "file", type=OUTPUT, required=True, metavar="F.xlsx|.csv|.parquet", help="The table.")
 @units_option
 def export(out: str, file: str, units: str) -> int:
     """Write the result in OUT as one table for colleagues, in SI or US customary units.
@@ -29,5 +28,5 @@ def export(out: str, file: str, units: str) -> int:
     from boulder_sweep.report.export import export as write
 
     rows = write(out, file, units=units)
-    show(f"{file}: {rows:,} rows")
+    show(f"{file}: {counted(rows, 'row')}")
     return 0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import json_option
+from boulder_sweep.cli.options import OUTPUT, json_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ where it is not, name the column deceleration. Empty cells are gaps.
 @click.option("--mass", required=True, metavar="'6800 kg'", help="Mass of the vehicle, with its unit.")
 @click.option("--speed", metavar="'30 mph'", help="Speed of impact, with its unit [default: fitted too].")
 @click.option("--stages", type=click.IntRange(1, 2), default=1, help="Springs of the front [default: 1].")
-@click.option("--plot", type=click.Path(), metavar="F.png", help="Draw pulse, fit and residuals.")
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw pulse, fit and residuals.")
 @json_option
 def fit_vehicle(pulse: str, mass: str, speed: str | None, stages: int, plot: str | None, as_json: bool) -> int:
     """Fit spring and damper of a Maxwell element to PULSE, a vehicle's crash against a rigid wall.

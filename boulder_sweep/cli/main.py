@@ -22,7 +22,7 @@ from boulder_sweep.cli.fit_vehicle import fit_vehicle
 from boulder_sweep.cli.need import need
 from boulder_sweep.cli.new import new
 from boulder_sweep.cli.options import GROUP_EPILOG, OrderedGroup, version_option
-from boulder_sweep.cli.output import say
+from boulder_sweep.cli.output import ready_streams, say
 from boulder_sweep.cli.plot import plot
 from boulder_sweep.cli.report import report
 from boulder_sweep.cli.run import run
@@ -80,6 +80,7 @@ cli.add_command(need, "frontier")  # the same by its other name, which `sweep --
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and end the process with its exit code."""
     start_light()
+    ready_streams()
     sys.exit(execute(arguments))
 
 
@@ -119,7 +120,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
     except Interrupted as stop:
         say(str(stop))
         return stop.exit_code
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, click.exceptions.Abort):  # a prompt ends with Abort, at Ctrl-C and at Ctrl-D
         say("interrupted")
         return EXIT_INTERRUPTED
     except Exception as error:

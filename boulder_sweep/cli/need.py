@@ -6,9 +6,10 @@ import json
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
-from boulder_sweep.cli.options import cluster_options, jobs_option, json_option, set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_units_of_json, refuse_unwritable
+from boulder_sweep.cli.options import OUTPUT, cluster_options, jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.text import counted
 
 EXAMPLES = """\b
 Examples:
@@ -35,8 +36,8 @@ Examples:
 @click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
 @click.option("--own-readings", is_flag=True, help="Omit the answers for the other readings of the paper.")
 @jobs_option
-@click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all answers.")
-@click.option("--plot", "picture", type=click.Path(), metavar="F.png", help="Design chart (.png, .svg or .pdf).")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
+@click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Design chart (.png, .svg or .pdf).")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
 @cluster_options
 @units_option
@@ -70,10 +71,10 @@ def need(
     """
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.printing import need_lines
-    from boulder_sweep.cli.console import counted
     from boulder_sweep.cli.progress import kernels_for, working
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
+    refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out, picture)
     with working(quiet, kernels_for(sweep)) as told:
@@ -103,5 +104,4 @@ def need(
         found.write(out)
     if picture is not None:
         found.plot(picture, units=units)
-    errors = found.arrow["verdict"].to_pylist().count("error")
-    return EXIT_SOME_ROWS_FAILED if errors else EXIT_DONE
+    return EXIT_SOME_ROWS_FAILED if found.errors else EXIT_DONE

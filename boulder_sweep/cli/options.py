@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable
 from typing import Any
 
 import click
 
-from boulder_sweep.runner.backends import BACKENDS
+from boulder_sweep.runner.backends import BACKENDS, MOST_JOBS
 
 Command = Callable[..., Any]
+JOBS = click.IntRange(1, MOST_JOBS)
 
 # "\b" tells click to keep the lines of a paragraph as they are.
 GROUP_EPILOG = """\b
@@ -21,10 +23,12 @@ Start with:
 
 \b
 Exit codes:
-  0 done (also when designs fail)         1 internal error
-  2 wrong use or invalid file             3 some designs could not be computed
-  4 the output exists already, or is      130, 143 interrupted; the run can
-    of another version                      be resumed
+  0 done (also when designs fail)
+  1 internal error, or a result that is damaged or cannot be read or written
+  2 wrong use or invalid file
+  3 some designs could not be computed
+  4 the output exists already, or is of another version
+  130, 143 interrupted; the run can be resumed
 """
 
 RUN_EXAMPLES = """\b
@@ -51,6 +55,19 @@ STATUS_EXAMPLES = """\b
 Example:
   sweep status m30-sizing.sweep --verify
 """
+
+
+class OutputPath(click.Path):
+    """Name of a file or folder to write; an empty one, as of a shell variable that is not set, names nothing."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse an empty name."""
+        if os.fspath(value) == "":
+            self.fail("the name is empty", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+OUTPUT = OutputPath()
 
 
 class OrderedGroup(click.Group):
@@ -95,7 +112,7 @@ def set_option(function: Command) -> Command:
 
 def jobs_option(function: Command) -> Command:
     """Add ``--jobs``, a number of threads."""
-    return click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: all cores].")(function)
+    return click.option("--jobs", type=JOBS, help="Threads [default: all cores].")(function)
 
 
 def json_option(function: Command) -> Command:
@@ -118,7 +135,7 @@ def talk_options(function: Command) -> Command:
     @functools.wraps(function)
     def command(*args: Any, quiet: bool, verbose: bool, **options: Any) -> Any:
         if quiet and verbose:
-            raise click.UsageError("--quiet and --verbose exclude each other")
+            raise click.UsageError("--quiet and --verbose cannot be used together")
         return function(*args, quiet=quiet, verbose=verbose, **options)
 
     return command
@@ -145,12 +162,11 @@ def cluster_options(function: Command) -> Command:
 
 
 def run_options(function: Command) -> Command:
-    """Add what is particular to ``sweep run``."""
-    path = click.Path()
+    """Add the options that only ``sweep run`` has."""
     for option in reversed(
         (
-            click.option("-o", "--output", "out", type=path, help="Folder for the table [default: NAME.sweep]."),
-            click.option("--jobs", type=click.IntRange(min=1), help="Workers [default: all cores]."),
+            click.option("-o", "--output", "out", type=OUTPUT, help="Folder for the table [default: NAME.sweep]."),
+            click.option("--jobs", type=JOBS, help="Workers [default: all cores]."),
             click.option(
                 "--dashboard",
                 metavar="ADDRESS",

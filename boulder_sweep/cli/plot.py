@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 
-from boulder_sweep.cli.options import units_option
+from boulder_sweep.cli.options import OUTPUT, units_option
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.places import beside, place_of
 
@@ -24,7 +25,7 @@ COLUMN = "COLUMN"
 
 @click.command("plot", short_help="Draw which designs of a result pass.", epilog=EXAMPLES)
 @click.argument("out", type=click.Path())
-@click.option("-o", "--output", "picture", type=click.Path(), metavar="F.png", help="Picture [default: OUT.png].")
+@click.option("-o", "--output", "picture", type=OUTPUT, metavar="F.png", help="Picture [default: OUT.png].")
 @click.option("--across", metavar=COLUMN, help="Input on the horizontal axis [default: embedment].")
 @click.option("--up", metavar=COLUMN, help="Input on the vertical axis [default: boulder height].")
 @click.option("--columns", metavar=COLUMN, help="Input over the columns of maps [default: subgrade reaction].")
@@ -42,7 +43,11 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     OUT is the folder of a run, perhaps in progress, of which finished designs are drawn, or a file of `sweep boundary`.
     COLUMN is the name of an input column of the table, embedment_ratio, or soil or vehicle where these have names.
     """
-    given = dict(_given(text) for text in at)
+    given: dict[str, str] = {}
+    for name, text in map(_given, at):
+        if name in given:
+            raise click.UsageError(f"--at {name} is given twice; give each column one value")
+        given[name] = text
     from boulder_sweep.errors import PictureError
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
     from boulder_sweep.views.verdict_map import draw_verdict_map
@@ -105,7 +110,7 @@ def _given(text: str) -> tuple[str, str]:
     """Read ``COLUMN=VALUE``."""
     name, equals, value = text.partition("=")
     if not equals:
-        raise click.UsageError(f"--at {text}: no = found; write COLUMN=VALUE")
+        raise click.UsageError(f"--at {text}: missing =; write COLUMN=VALUE")
     return name.strip(), value.strip()
 
 
@@ -116,8 +121,9 @@ def _held(name: str, text: str, sets: Mapping[str, Sequence[str]]) -> float:
             return float(sets[name].index(text))
         raise click.UsageError(f"--at {name}={text}: there are {', '.join(sets[name])}")
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
-        raise click.UsageError(
-            f"--at {name}={text}: must be COLUMN=VALUE, with a number in the unit of the column"
-        ) from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise click.UsageError(f"--at {name}={text}: must be COLUMN=VALUE, with a finite number in the column's unit")
+    return value

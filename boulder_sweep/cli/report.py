@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import shlex
 import sys
-from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.options import units_option
+from boulder_sweep.cli.options import OUTPUT, units_option
 from boulder_sweep.cli.output import show
 from boulder_sweep.places import beside, place_of
 
@@ -23,7 +22,7 @@ Examples:
 
 @click.command("report", short_help="Write a result as one page with the simulator inside.", epilog=EXAMPLES)
 @click.argument("out", type=click.Path())
-@click.option("-o", "--output", "page", type=click.Path(), metavar="F.html", help="The page [default: OUT.html].")
+@click.option("-o", "--output", "page", type=OUTPUT, metavar="F.html", help="The page [default: OUT.html].")
 @click.option(
     "--design",
     "designs",
@@ -41,10 +40,10 @@ def report(out: str, page: str | None, designs: tuple[int, ...], units: str) -> 
     The file needs no network and no server: it opens from disk in any browser, and whoever gets it can change a
     design and see the impact simulated anew.
     """
-    from boulder_sweep.report import write_report
+    from boulder_sweep.report import checked_page, write_report
 
     folder = place_of(out)
-    target = Path(page) if page else beside(place_of(out.removesuffix(".parquet")), ".html")
+    target = checked_page(page) if page else beside(place_of(out.removesuffix(".parquet")), ".html")
     command = shlex.join(["sweep", *sys.argv[1:]])
     written = write_report(folder, target, designs=designs, units=units, command=command)
     show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")

@@ -14,6 +14,7 @@ from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import RUN_EXAMPLES, cluster_options, json_option, run_options, set_option, talk_options
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.places import Place, place_of
+from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -42,9 +43,9 @@ def run(
     from boulder_sweep.cli.progress import Notes, kernels_for, progress
 
     if options["resume"] and options["overwrite"]:
-        raise click.UsageError("--resume and --overwrite exclude each other")
+        raise click.UsageError("--resume and --overwrite cannot be used together")
     if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
-        raise click.UsageError("--dashboard needs --backend dask, and no --scheduler: that one has its own")
+        raise click.UsageError("--dashboard needs --backend dask, without --scheduler, which has its own dashboard")
     sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
     target = place_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
@@ -52,7 +53,7 @@ def run(
     if verbose:
         say("\n".join(console.value_lines(sweep.resolved())))
     if not quiet:
-        say(f"{sweep.name}: {console.counted(sweep.n_designs, 'design')} into {target}")
+        say(f"{sweep.name}: {counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.runner.sweeper import run as run_sweep
 
     notes = Notes()

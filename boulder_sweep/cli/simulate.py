@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import SIMULATE_EXAMPLES, json_option, set_option, talk_options, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_missing, refuse_unwritable_history
+from boulder_sweep.cli.options import OUTPUT, SIMULATE_EXAMPLES, json_option, set_option, talk_options, units_option
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 
@@ -16,15 +16,15 @@ from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 @click.command(short_help="Simulate one design with its time history.", epilog=SIMULATE_EXAMPLES)
 @click.argument("case", type=click.Path())
 @click.option("--design", type=click.IntRange(min=0), metavar="N", help="Number of the design [default: 0].")
-@click.option("--plot", type=click.Path(), metavar="F.png", help="Draw the time history.")
-@click.option("--trajectory", type=click.Path(), metavar="F.parquet", help="Write the time history.")
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw the time history.")
+@click.option("--trajectory", type=OUTPUT, metavar="F.parquet", help="Write the time history.")
 @click.option(
     "--energy",
-    type=click.Path(),
+    type=OUTPUT,
     metavar="F.png",
     help="Draw where the energy goes, and add its columns to the time history.",
 )
-@click.option("--animate", type=click.Path(), metavar="F.gif|.mp4|.html", help="Animate the side view.")
+@click.option("--animate", type=OUTPUT, metavar="F.gif|.mp4|.html", help="Animate the side view.")
 @units_option
 @set_option
 @json_option
@@ -48,9 +48,8 @@ def simulate(
 
     sweep = load_sweep(case, overrides, quiet)
     number = design or 0
-    if number >= sweep.n_designs:
-        held = console.counted(sweep.n_designs, "design")
-        raise click.UsageError(f"{case} holds {held}, numbered from 0; there is no {number}")
+    refuse_missing(sweep, case, number)
+    refuse_unwritable_history(plot, trajectory, energy, animate)
     if design is None and sweep.n_designs > 1 and not quiet:
         say(f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)")
     reason = sweep.block(number, number + 1).reasons[0]

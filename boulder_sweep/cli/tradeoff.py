@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import cluster_options, json_option, set_option
+from boulder_sweep.cli.options import OUTPUT, cluster_options, json_option, set_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ Examples:
 
 @click.command("tradeoff", short_help="Measure speed against accuracy on a grid.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
-@click.option("-o", "--output", "out", type=click.Path(), metavar="DIR", help="Folder for table and picture.")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for table and picture.")
 @click.option(
     "--designs",
     type=click.IntRange(min=1),
@@ -160,5 +160,5 @@ def _table(found: Tradeoff, *, whole: bool) -> RichTable:
 
 def _short(method: Method) -> str:
     """Steps of a method in a narrow column [ms]."""
-    steps = f"{method.step_ms:g}+{0.5 * method.step_ms:g}" if method.error_estimate else f"{method.step_ms:g}"
+    steps = f"{method.step_ms:g}+{method.finer_step_ms:g}" if method.error_estimate else f"{method.step_ms:g}"
     return f"{steps} y" if method.locate_yield else steps

@@ -7,9 +7,10 @@ from dataclasses import asdict
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
-from boulder_sweep.cli.options import cluster_options, jobs_option, json_option, set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_missing, refuse_units_of_json, refuse_unwritable
+from boulder_sweep.cli.options import OUTPUT, cluster_options, jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.text import counted
 
 EXAMPLES = """\b
 Examples:
@@ -21,17 +22,8 @@ Examples:
 """
 
 
-def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
-    if wanted:
-        from boulder_sweep.answers.published import PUBLISHED
-
-        for own in PUBLISHED:
-            show(f"{own.input:<24}{own.cov:<14}{own.of}\n{'':<38}{own.source}")
-        ctx.exit()
-
-
 @click.command("uncertainty", short_help="The probability of passing with uncertain inputs.", epilog=EXAMPLES)
-@click.argument("grid", type=click.Path())
+@click.argument("grid", type=click.Path(), required=False)
 @click.option("--half-width", default="0.01", metavar="P", help="Largest half-width of the interval [0.01].")
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
@@ -41,28 +33,19 @@ def _show_published(ctx: click.Context, _: click.Parameter, wanted: bool) -> Non
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
 @jobs_option
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; indices and samples next to it.")
+@click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
 @click.option(
-    "-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table; indices and samples next to it."
+    "--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot and --doubts [0]."
 )
-@click.option(
-    "--plot", "picture", type=click.Path(), metavar="F.png", help="Picture (.png, .svg or .pdf) of one design."
-)
-@click.option("--design", default=0, metavar="ID", help="The design of --plot and --doubts [0].")
-@click.option(
-    "--published",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_show_published,
-    help="List published spreads with their sources.",
-)
+@click.option("--published", is_flag=True, help="List published spreads with their sources; takes no GRID.")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
 @cluster_options
 @units_option
 @set_option
 @json_option
 def uncertainty(
-    grid: str,
+    grid: str | None,
     half_width: str,
     confidence: str,
     margin: str,
@@ -75,6 +58,7 @@ def uncertainty(
     out: str | None,
     picture: str | None,
     design: int,
+    published: bool,
     units: str,
     quiet: bool,
     overrides: tuple[str, ...],
@@ -85,12 +69,17 @@ def uncertainty(
     An input takes a distribution instead of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Sampling continues
     until the interval is narrow enough.
     """
+    if published:
+        return _show_published(grid, units, as_json)
+    if grid is None:
+        raise click.MissingParameter(param_hint="'GRID'", param_type="argument")
     from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
-    from boulder_sweep.cli.console import counted
     from boulder_sweep.cli.progress import kernels_for, working
 
+    refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet)
+    refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     with working(quiet, kernels_for(sweep)) as told:
         found = estimate(
@@ -122,4 +111,19 @@ def uncertainty(
             say(f"written  {file}")
     if picture is not None:
         found.plot(picture, design, units=units)
+    return 0
+
+
+def _show_published(grid: str | None, units: str, as_json: bool) -> int:
+    """List published spreads with their sources."""
+    if grid is not None or units != "si":
+        other = "GRID" if grid is not None else f"--units {units}"
+        raise click.UsageError(f"--published lists spreads as their sources state them; leave out {other}")
+    from boulder_sweep.answers.published import PUBLISHED
+
+    if as_json:
+        show(json.dumps({"published": [own._asdict() for own in PUBLISHED]}))
+        return 0
+    for own in PUBLISHED:
+        show(f"{own.input:<24}{own.cov:<14}{own.of}", f"{'':<38}{own.source}")
     return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.options import json_option
+from boulder_sweep.cli.options import OUTPUT, json_option
 from boulder_sweep.cli.output import show
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ Empty cells are gaps in a track.
 
 
 @click.command("validate", short_help="The paper's crash tests against what the paper states.", epilog=EXAMPLES)
-@click.option("-o", "--output", "out", type=click.Path(), metavar="DIR", help="Folder for pictures and Parquet files.")
-@click.option("--measured", type=click.Path(), metavar="FILE.csv", help="Your own test data, to lay over it.")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for pictures and Parquet files.")
+@click.option("--measured", type=click.Path(), metavar="FILE.csv", help="Your own test data, drawn over the result.")
 @click.option("--case", metavar="CASE", help="The test they belong to: abg, rwg, or a settings file with one design.")
 @json_option
 def validate(out: str | None, measured: str | None, case: str | None, as_json: bool) -> int:

@@ -6,8 +6,8 @@ import json
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep, refuse_unwritable
-from boulder_sweep.cli.options import jobs_option, json_option, set_option, units_option
+from boulder_sweep.cli.loading import load_sweep, refuse_units_of_json, refuse_unwritable
+from boulder_sweep.cli.options import OUTPUT, jobs_option, json_option, set_option, units_option
 from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
@@ -20,7 +20,7 @@ Examples:
 @click.command("which", short_help="Which truck and soil every design withstands.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
 @jobs_option
-@click.option("-o", "--output", "out", type=click.Path(), metavar="F.parquet", help="Table of all designs.")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all designs.")
 @click.option("-q", "--quiet", is_flag=True, help="No notes.")
 @units_option
 @set_option
@@ -36,7 +36,9 @@ def which(
     from boulder_sweep.answers.printing import reserve_lines
     from boulder_sweep.answers.reserves import reserves
     from boulder_sweep.cli.progress import kernels_for, working
+    from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
+    refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out)
     with working(quiet, kernels_for(sweep)) as told:
@@ -44,4 +46,5 @@ def which(
     show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found, units=units)))
     if out is not None:
         found.write(out)
-    return 0
+    errors = found.arrow["verdict"].to_pylist().count("error")
+    return EXIT_SOME_ROWS_FAILED if errors else EXIT_DONE

@@ -24,6 +24,8 @@ NAMED_SETS = ("soil", "vehicle")
 """Blocks that may be a list of named sets."""
 NAME = re.compile(r"\w[\w .+-]{0,79}")
 """Names of sweeps and of named sets."""
+NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
+"""The same in words."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table")
 
 

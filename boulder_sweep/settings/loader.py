@@ -13,7 +13,7 @@ import numpy as np
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
-from boulder_sweep.settings.entries import NAME, Entries
+from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
 from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
 from boulder_sweep.settings.problems import ProblemList
@@ -79,7 +79,7 @@ def _read_name(entries: Entries) -> str:
         return default
     if isinstance(node, Scalar) and NAME.fullmatch(node.text):
         return node.text
-    entries.problems.add(node.place, "name", "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing")
+    entries.problems.add(node.place, "name", NAME_RULE)
     return default
 
 

@@ -45,7 +45,7 @@ def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
             yield _note(places[axis.name], BY_NAME[axis.name].path, "contains a value more than once")
     if "embedment_depth_m" in values:
         depth, height = _pairs(values, groups, "embedment_depth_m", "boulder_height_m")
-        ratio = np.minimum(depth / height, 1.0)
+        ratio = depth / height
         off = _without_partner(_outside(ratio, BY_NAME["embedment_ratio"]))
         if off.any():
             message = _unusual("embedment_ratio", ratio[off])
@@ -100,7 +100,16 @@ def _unusual(name: str, values: np.ndarray) -> str:
     low, high = float(values.min()), float(values.max())
     found = describe(low, unit) if low == high else f"{low:.6g} to {describe(high, unit)}"
     ends = f"{usual.low:g} to {describe(usual.high, unit)}"
-    return f"{found} is outside the usual range of {ends} ({usual.remark}); computed as given"
+    return f"{found} is outside the usual range of {ends} ({usual.remark}); {_outcome(name, low, high)}"
+
+
+def _outcome(name: str, low: float, high: float) -> str:
+    """Return what becomes of designs with unusual values."""
+    if name != "embedment_ratio" or high < 1.0:
+        return "computed as given"
+    if low < 1.0:
+        return "designs of 1 or more cannot be computed, since the depth must be less than the boulder's height"
+    return "cannot be computed, since the depth must be less than the boulder's height"
 
 
 def off_families(angle: np.ndarray, reaction: np.ndarray) -> np.ndarray:
@@ -111,7 +120,13 @@ def off_families(angle: np.ndarray, reaction: np.ndarray) -> np.ndarray:
     angle, reaction : ndarray
         Friction angles [deg] and constants of horizontal subgrade reaction [MN/m^3].
     """
-    return (reaction > FAMILY_FACTOR * api_curve(angle)) | (reaction < terzaghi_curve(angle) / FAMILY_FACTOR)
+    least, most = family_bounds(angle)
+    return (reaction < least) | (reaction > most)
+
+
+def family_bounds(angle: np.ndarray) -> np.ndarray:
+    """Return least and largest constant of subgrade reaction [MN/m^3] that go with friction angles [deg], (2, n)."""
+    return np.stack([terzaghi_curve(angle) / FAMILY_FACTOR, FAMILY_FACTOR * api_curve(angle)])
 
 
 def _off_families(angle: np.ndarray, reaction: np.ndarray) -> str:

@@ -15,7 +15,7 @@ _ALTERNATIVES = {
     "solver.accuracy": "step",
     "solver.step": "accuracy",
 }
-"""Setting one removes the other, since a file holds only one of them."""
+"""Setting one removes the other from the file, which holds only one of them; two options contradict each other."""
 
 OPTIONS = {"--accuracy": "solver.accuracy"}
 """Options that set an entry: a mistake is reported for the option, not for ``--set``."""
@@ -102,8 +102,8 @@ def _put(root: Mapping, path: list[str], value: Node, place: Place) -> None:
             inner = opened
         block = inner
     other = _ALTERNATIVES.get(".".join(path))
-    if other is not None:
-        block.entries.pop(other, None)
+    if other in block.entries and block.entries[other].place.file not in ("--set", *OPTIONS):
+        del block.entries[other]
     _store(block, path[-1], value, place)
 
 

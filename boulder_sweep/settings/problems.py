@@ -23,6 +23,13 @@ class Place:
         return ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
 
 
+def cell_place(file: str, line: int, text: str, delimiter: str, index: int) -> Place:
+    """Return where a cell begins in a line of delimited text; with quotation marks in it, only the line is certain."""
+    if '"' in text:
+        return Place(file, line)
+    return Place(file, line, sum(len(cell) + 1 for cell in text.split(delimiter)[:index]) + 1)
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """One mistake in a settings file, or one note on it.

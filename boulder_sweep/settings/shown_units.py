@@ -44,6 +44,18 @@ class Shown(NamedTuple):
     meaning: str
 
 
+def check_system(system: str) -> None:
+    """Refuse units that are neither ``si`` nor ``us``.
+
+    Raises
+    ------
+    ValueError
+        They are neither.
+    """
+    if system not in SYSTEMS:
+        raise ValueError(f"units must be {' or '.join(SYSTEMS)}, not {system!r}")
+
+
 def shown_unit(unit: str, system: str) -> ShownUnit:
     """Return the unit in which values of a unit of the table are shown.
 
@@ -59,6 +71,7 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
     ShownUnit
         A value of the table divided by ``size`` is in ``unit``. A unit that both systems share stays as it is.
     """
+    check_system(system)
     place = SYSTEMS.index(system)
     if unit in _FORCES:
         us_size = KILOJOULES_PER_FOOT_KIP if unit == "J" else KILONEWTONS_PER_KIP

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import Literal, NamedTuple
 
 from boulder_sweep.settings.defaults import default_text
 from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, Field, fields_of
+from boulder_sweep.text import printable
 
 UNITS = ("si", "us")
 
@@ -84,7 +86,8 @@ def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", 
     file : str
         Name of the file, for its first lines.
     """
-    lines = [*_HEAD.format(name=name, file=file).splitlines(), f"name: {name}"]
+    quoted = printable(shlex.quote(file))
+    lines = [*_HEAD.format(name=name, file=quoted).splitlines(), f"name: {name}"]
     for section, words in SECTIONS.items():
         lines += ["", f"{section}:".ljust(60) + f"# {words}"]
         for field in fields_of(section):

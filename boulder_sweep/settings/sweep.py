@@ -166,7 +166,8 @@ class Sweep:
         SettingsError
             An input has a distribution.
         """
-        message = "has a distribution, which only 'sweep uncertainty' takes; give a value, a list or a range"
+        takers = "'sweep uncertainty' and 'sweep need --probability'"
+        message = f"has a distribution, which only {takers} take; give a value, a list or a range"
         if self.distributions:
             places = ((name, spread.place) for name, spread in self.distributions.items())
             raise SettingsError(Problem(p.file, p.line, p.column, BY_NAME[name].path, message) for name, p in places)

@@ -59,7 +59,8 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
     suffix = path.suffix.lower()
     reader = _READERS.get(suffix)
     if reader is None:
-        problems.add(node.place, "table", f"'{shorten(node.text)}' is none of these: {', '.join(_READERS)}")
+        kinds = ", ".join(_READERS)
+        problems.add(node.place, "table", f"'{shorten(node.text)}' has an unsupported type; use one of {kinds}")
         return None
     try:
         check_regular_file(path, MAX_TABLE_BYTES, "Split it into several sweeps")

@@ -17,7 +17,7 @@ from boulder_sweep.places import source_of
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.leaf import outside
 from boulder_sweep.settings.numbers import NumberError, split_number
-from boulder_sweep.settings.problems import Place, ProblemList, shorten
+from boulder_sweep.settings.problems import Place, ProblemList, cell_place, shorten
 from boulder_sweep.settings.source import refuse
 from boulder_sweep.settings.sweep import DesignList
 from boulder_sweep.settings.table_header import TableColumn, check_count, check_numbers, read_header
@@ -153,7 +153,7 @@ class _Rows:
 
     def convert(self, cells: list[str], index: int, column: TableColumn) -> np.ndarray:
         """Return cells as numbers, NaN for those that are none (they are reported)."""
-        if not any("_" in cell or "n" in cell.lower() for cell in cells):
+        if all(cell.isascii() and "_" not in cell and "n" not in cell.lower() for cell in cells):
             try:
                 return np.array([float(cell) for cell in cells])  # the usual case, fast
             except ValueError:
@@ -236,7 +236,7 @@ def _read_lines(source: _Lines, path: FilePlace, problems: ProblemList) -> Desig
         raise refuse(label, "is empty; the first line must hold the column names")
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
     hint = " (numbers need a decimal point, and text with a comma needs quotation marks)" if delimiter == "," else ""
-    rows = _Rows(path, problems, lambda origin, index: _place(label, origin[0], origin[1].split(delimiter), index))
+    rows = _Rows(path, problems, lambda origin, index: cell_place(label, *origin, delimiter, index))
     try:
         names = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]
         rows.header(names, (source.number, header))
@@ -246,13 +246,6 @@ def _read_lines(source: _Lines, path: FilePlace, problems: ProblemList) -> Desig
     except csv.Error as error:
         raise refuse(label, f"cannot be read as CSV ({error})", source.number, 1) from None
     return rows.finish()
-
-
-def _place(label: str, line: int, cells: list[str], index: int) -> Place:
-    """Return where a cell begins; with quotation marks in the line, only the line is certain."""
-    if any('"' in cell for cell in cells):
-        return Place(label, line)
-    return Place(label, line, sum(len(cell) + 1 for cell in cells[:index]) + 1)
 
 
 def read_xlsx(path: FilePlace, problems: ProblemList) -> DesignList:

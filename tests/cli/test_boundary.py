@@ -17,3 +17,11 @@ def test_counts_and_share(sweep, tmp_path):
     found = json.loads(sweep("boundary", CONFIG, *HEIGHTS, "--json")[1])
     assert found["designs"] == 122 == sum(found["verdicts"].values())
     assert found["simulations"] < 40
+
+
+def test_a_grid_too_small_to_save_anything(sweep):
+    changes = ("--set", "boulder.height=[2.8, 3.4] m", "--set", "soil.friction_angle=40 deg")
+    code, out, _ = sweep("boundary", CONFIG, *changes)
+    assert code == 0
+    last = out.splitlines()[-1]
+    assert last == "6 simulations for 2 designs: nothing saved; 'sweep run' simulates each design once"

@@ -15,6 +15,15 @@ def test_a_valid_file(sweep, grid):
     assert "1.6 to 3.5 m" in lines[2]
 
 
+def test_an_axis_is_shown_from_its_least_to_its_largest_value(sweep, grid):
+    grid.write_text(grid.read_text().replace("43.2 deg", "[40, 36, 43] deg").replace("[60, 95] MN/m^3", "[60] MN/m^3"))
+    code, out, _ = sweep("check", grid)
+    assert code == 0
+    lines = [line.split(maxsplit=1) for line in out.splitlines()]
+    assert ["friction_angle_deg", "3 values  36 to 43 deg"] in lines
+    assert ["subgrade_reaction_MN_m3", "1 value   60 MN/m^3"] in lines
+
+
 def test_remarks_go_to_stderr(sweep, grid):
     code, out, err = sweep("check", grid, "--set", "vehicle.speed=30")
     assert code == 0
@@ -48,7 +57,7 @@ def test_uncertain_inputs_are_listed(sweep, grid):
     assert "subgrade_reaction_MN_m3 uncertain lognormal, cov 30 %" in words
     code, out, err = sweep("run", grid, "--dry-run")
     assert (code, out) == (2, "")
-    assert "which only 'sweep uncertainty' takes" in err.splitlines()[-1]
+    assert "which only 'sweep uncertainty' and 'sweep need --probability' take;" in err.splitlines()[-1]
 
 
 def test_named_soils_are_listed(sweep, grid):
@@ -59,6 +68,10 @@ def test_named_soils_are_listed(sweep, grid):
     code, out, _ = sweep("check", grid)
     assert code == 0
     assert [line.split(maxsplit=3) for line in out.splitlines()][-1] == ["soil", "2", "sets", "A, B 2"]
+    second = "  - {name: B 2, density: 1860, friction_angle: 42, subgrade_reaction: 90}\n"
+    grid.write_text(grid.read_text().replace(second, ""))
+    _, out, _ = sweep("check", grid)
+    assert out.splitlines()[-1].split() == ["soil", "1", "set", "A"]
 
 
 def test_a_table_and_its_text_columns(sweep, grid):

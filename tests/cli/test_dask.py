@@ -34,7 +34,8 @@ def test_a_run_with_a_cluster_of_its_own(sweep, possible_grid):
 
 
 def test_a_run_on_a_cluster_that_is_there(sweep, possible_grid, scheduler):
-    assert_is_the_table_of_threads(sweep, possible_grid, ["--scheduler", scheduler])
+    assert_is_the_table_of_threads(sweep, possible_grid, ["--jobs", "1", "--scheduler", scheduler])
+    assert status("dask").sessions[-1].jobs == 2
 
 
 def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, scheduler, monkeypatch):

@@ -1,5 +1,6 @@
 """Help for newcomers, at once, and nothing heavy loaded for it."""
 
+import platform
 import re
 import subprocess
 import sys
@@ -84,6 +85,32 @@ def test_no_threads_are_started_for_linear_algebra():
     alone = "any(len(os.listdir('/proc/self/task')) == 1 or time.sleep(0.1) for _ in range(100))"
     words = ["check", str(ROOT / "configs" / "rwg.yaml")]
     assert in_a_process_of_the_command(words, f"({alone}, 'numpy' in sys.modules)") == "(True, True)"
+
+
+FREED = """
+import resource, threading
+from boulder_sweep.cli.starting import start_light
+start_light()
+import numpy as np
+
+def blocks():
+    for _ in range(50):
+        [np.ones(1 << 18) for _ in range(6)]
+
+threads = [threading.Thread(target=blocks) for _ in range(2)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other allocators have other settings")
+def test_freed_arrays_are_used_again():
+    """Two threads that make and free six arrays of 2 MB fifty times touch little more memory than holds them once."""
+    done = subprocess.run([sys.executable, "-c", FREED], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 14_000  # 512 pages an array; up to 97,000 where the system gets them back
 
 
 def test_only_the_command_keeps_scipy_from_numba():

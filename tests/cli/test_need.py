@@ -79,11 +79,28 @@ def test_rows_that_cannot_be_computed_give_exit_code_3(sweep):
 
 
 @pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--between", "3.5 m", "4 m"], "embedment depth is not less than the boulder's height"),
+        (["--between", "2 m", "2.2 m", "--set", "site.impact_height=1.1 m"], "impact height is above the top"),
+    ],
+)
+def test_rows_that_are_blocked_give_exit_code_0(sweep, words, reason):
+    options = ["--set", "boulder.height=3 m", "--set", "soil.friction_angle=40 deg", "--own-readings"]
+    code, out, _ = sweep("need", CONFIG, *options, *words, "--json")
+    row = json.loads(out)["rows"][0]
+    assert (row["found"], row["verdict"]) == ("blocked_by_overlap", "error")
+    assert row["reason"].startswith(reason)
+    assert code == 0
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         (["--least", "depth"], "did you mean embedment_depth?"),
         (["-o", "depths.csv"], "must end in .parquet"),
         (["--plot", "chart.bmp"], "must end in"),
+        (["--json", "--units", "us"], "--json is in SI units for this command"),
     ],
 )
 def test_mistakes_are_said_before_anything_is_computed(sweep, words, message):

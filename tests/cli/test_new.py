@@ -79,7 +79,8 @@ def test_it_writes_once(sweep, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, err = sweep("new", "a b.yaml", "--yes")
     assert (code, err) == (0, "")
-    assert re.fullmatch(r"a b.yaml: \d+ designs. Edit it, then: sweep need a b.yaml\n", out)
+    assert re.fullmatch(r"a b.yaml: \d+ designs. Edit it, then: sweep need 'a b.yaml'\n", out)
+    assert "#   sweep check 'a b.yaml' " in (tmp_path / "a b.yaml").read_text()
     assert load("a b.yaml").name == "a-b"
     before = (tmp_path / "a b.yaml").read_bytes()
     assert sweep("new", "a b.yaml", "--yes") == (4, "", "error: a b.yaml exists already; name another file\n")
@@ -102,6 +103,40 @@ def test_it_asks_three_questions_on_a_terminal(sweep, tmp_path, monkeypatch):
     made = load("h.yaml")
     assert (made.name, made.constants["impact_speed_m_s"]) == ("harbour", pytest.approx(22.352))
     assert "162 pcf" in (tmp_path / "h.yaml").read_text()
+
+
+@pytest.mark.parametrize("file", ["+x.yaml", "two\nlines.yaml", "x\udcff.yaml", "--.yaml"])
+def test_any_name_of_a_file_gives_a_valid_file(sweep, tmp_path, file):
+    path = tmp_path / file
+    code, _, err = sweep("new", path, "--yes")
+    assert (code, err) == (0, "")
+    assert load(path).n_designs > 100
+
+
+def test_it_asks_again_for_a_name_that_settings_refuse(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answers = iter(["a/b", "a: b # c", "null", "M50", "si"])
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("click.termui.visible_prompt_func", lambda *_: next(answers))
+    code, _, err = sweep("new", "h.yaml")
+    assert code == 0
+    assert err.count("the name must be at most 80 letters, digits, spaces and - _ . +") == 2
+    assert load("h.yaml").name == "null"
+
+
+@pytest.mark.parametrize("end", [EOFError, KeyboardInterrupt])
+def test_the_end_of_input_interrupts_it(sweep, tmp_path, monkeypatch, end):
+    monkeypatch.chdir(tmp_path)
+
+    def prompt(*_):
+        raise end
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("click.termui.visible_prompt_func", prompt)
+    code, out, err = sweep("new", "h.yaml")
+    assert (code, out) == (130, "")
+    assert err.splitlines()[-1].endswith("interrupted")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_it_says_what_to_fill_in_for_a_vehicle_without_published_values(sweep, tmp_path, monkeypatch):

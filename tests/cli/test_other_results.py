@@ -79,6 +79,23 @@ def test_what_is_no_result(sweep, grid, command, place, words):
     assert not err.startswith("internal")
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["export", RESULT, "-o", f"{RESULT}/all.parquet"],
+        ["need", "grid.yaml", "-q", "-o", f"{RESULT}/need.parquet"],
+        ["plot", RESULT, "-o", f"{RESULT}/map.png"],
+        ["simulate", "grid.yaml", "-q", "--trajectory", f"{RESULT}/history.parquet"],
+    ],
+)
+def test_no_command_writes_a_file_into_a_result(sweep, result, words):
+    before = {path.name: path.read_bytes() for path in result.iterdir()}
+    code, _, err = sweep(*words)
+    assert code == 2
+    assert err == f"error: {words[-1]}: the folder {result} holds the result of a run; name a file outside it\n"
+    assert {path.name: path.read_bytes() for path in result.iterdir()} == before
+
+
 def test_a_file_of_a_result_in_place_of_its_folder(sweep, result):
     (part,) = result.glob("rows-*.parquet")
     for words in (["status", part], ["explain", part, "3"], ["plot", part]):

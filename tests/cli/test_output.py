@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -105,3 +108,40 @@ def test_a_folder_with_a_hostile_name_is_shown_escaped(sweep, possible_grid):
     code, out, _ = sweep("status", name)
     assert code == 0
     assert out.startswith("out\\x1b[31m\\nnext: finished")
+
+
+COMMAND = [sys.executable, "-m", "boulder_sweep"]
+
+
+def _with_streams(redirection, *words, **environment):
+    """Run a command with redirected streams; return the exit code and what came out."""
+    script = f'exec "$@" {redirection}'
+    done = subprocess.run(
+        ["sh", "-c", script, "sh", *COMMAND, *words],
+        env={**os.environ, **environment},
+        capture_output=True,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("redirection", [">&-", "2>&-", ">&- 2>&-", "2>/dev/full"])
+def test_closed_and_full_streams_change_no_exit_code(grid, redirection):
+    assert _with_streams(redirection, "run", "grid.yaml", "-o", "out.sweep")[0] == 3
+    assert Path("out.sweep/_manifest.parquet").exists()
+    code, _, err = _with_streams(redirection, "export", "out.sweep", "-o", "rows.csv")
+    assert (code, err) == (0, b"")
+    assert len(Path("rows.csv").read_text().splitlines()) == 19
+    assert _with_streams(redirection, "check", "nothere.yaml")[0] == 2
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+def test_what_the_encoding_of_stdout_lacks_is_replaced(possible_grid, encoding):
+    text = possible_grid.read_text().replace("[1.6, 2.6, 3.5] m", "2.6 m").replace("[60, 95]", "60")
+    possible_grid.write_text(text.replace("[0.8, 1.2, 1.5] m", "1.5 m"))
+    words = ("need", "grid.yaml", "--least", "friction_angle", "-q")
+    code, out, err = _with_streams("", *words, PYTHONIOENCODING=encoding)
+    assert (code, err) == (0, b"")
+    code, whole, _ = _with_streams("", *words, PYTHONIOENCODING="utf-8")
+    assert out.decode(encoding) == whole.decode().encode(encoding, "replace").decode(encoding)
+    assert "?" in out.decode(encoding)

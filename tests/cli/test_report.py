@@ -33,6 +33,39 @@ def test_a_design_that_does_not_exist_is_refused(sweep, grid):
     assert not Path("small-grid.html").exists()
 
 
+def test_a_page_under_any_other_ending_is_refused(sweep, possible_grid, opened, monkeypatch):
+    sweep("run", possible_grid, "-q")
+    text = possible_grid.read_bytes()
+    monkeypatch.setattr("boulder_sweep.report.writing.read_rows", None)  # refused before anything is read
+    for name in ("grid.yaml", "small-grid.sweep", "page", "page.html.txt"):
+        refused = (2, "", f"error: {name}: the name of a page must end in .html or .htm\n")
+        assert sweep("report", "small-grid.sweep", "-o", name) == refused
+        assert sweep("explore", "grid.yaml", "--design", 3, "-o", name) == refused
+    assert possible_grid.read_bytes() == text
+    assert sorted(path.name for path in Path().iterdir()) == ["grid.yaml", "small-grid.sweep"]
+    assert opened == []
+
+
+def test_a_page_may_have_the_short_ending(sweep, possible_grid):
+    assert sweep("explore", possible_grid, "--design", 3, "--no-open", "-o", "PAGE.HTM")[0] == 0
+    assert Path("PAGE.HTM").exists()
+
+
+def test_a_page_that_has_no_place_is_refused(sweep, possible_grid):
+    sweep("run", possible_grid, "-q")
+    Path("folder.html").mkdir()
+    here = Path.cwd()
+    for name, why in {
+        "none/page.html": f"none/page.html: the folder {here}/none does not exist",
+        "folder.html": "folder.html cannot be written: Is a directory",
+        "small-grid.sweep/page.html": f"small-grid.sweep/page.html: the folder {here}/small-grid.sweep holds the "
+        "result of a run; name a file outside it",
+    }.items():
+        assert sweep("report", "small-grid.sweep", "-o", name) == (2, "", f"error: {why}\n")
+        assert sweep("explore", "grid.yaml", "--design", 3, "-o", name) == (2, "", f"error: {why}\n")
+    assert "there is no none/gone.sweep" in sweep("report", "none/gone.sweep")[2]
+
+
 def test_what_is_no_result_is_refused(sweep, grid):
     code, _, err = sweep("report", ".")
     assert code == 2
@@ -60,6 +93,9 @@ def test_wrong_use_is_told(sweep, grid, opened):
     code, _, err = sweep("explore", grid, "--design", 2)
     assert (code, opened) == (2, [])
     assert "design 2 cannot be computed: embedment depth" in err
+    code, _, err = sweep("explore", "--design", 5)
+    assert (code, opened) == (2, [])
+    assert err.endswith("Error: rwg holds 1 design, numbered from 0; there is no 5\n")
 
 
 def test_a_machine_without_a_browser_says_so(sweep, possible_grid, monkeypatch):
@@ -77,6 +113,16 @@ def test_without_the_extra_it_says_what_to_install(sweep, grid, monkeypatch):
     monkeypatch.setitem(sys.modules, "jinja2", None)
     code, _, err = sweep("report", "small-grid.sweep")
     assert (code, err) == (2, "error: reports need jinja2: pip install 'boulder-sweep[report]'\n")
+
+
+def test_one_design_is_no_plural(sweep, possible_grid):
+    text = possible_grid.read_text().replace("[1.6, 2.6, 3.5] m", "2.6 m").replace("[60, 95]", "60")
+    possible_grid.write_text(text.replace("[0.8, 1.2, 1.5] m", "1.5 m"))
+    sweep("run", possible_grid, "-q")
+    assert sweep("export", "small-grid.sweep", "-o", "one.csv") == (0, "one.csv: 1 row\n", "")
+    code, _, err = sweep("report", "small-grid.sweep", "--design", 1)
+    assert (code, err) == (2, "error: small-grid.sweep has 1 design, numbered from 0; there is no 1\n")
+    assert ": finished, 1 of 1 design (100.0%), " in sweep("status", "small-grid.sweep")[1]
 
 
 def test_a_result_is_exported_and_compared(sweep, possible_grid):

@@ -27,6 +27,13 @@ def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
     assert found["max_displacement_m"] == pytest.approx(displacement, abs=5e-4)
 
 
+def test_the_ground_is_named_unless_quiet_is_asked_for(sweep):
+    case = (CONFIGS / "rwg.yaml", "--set", "soil.slope=10 deg", "--json")
+    _, out, err = sweep("simulate", *case)
+    assert "note: ground falling" in err
+    assert sweep("simulate", *case, "-q") == (0, out, "")
+
+
 def test_what_stands_beside_a_pass(sweep):
     case = CONFIGS / "rwg.yaml"
     _, out, _ = sweep("simulate", case, "--set", "vehicle.speed=12.5 m/s")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 CONFIG = Path(__file__).parents[2] / "configs" / "uncertain_site.yaml"
 
 
@@ -36,7 +38,13 @@ def test_need_with_a_probability(sweep):
     assert "P(pass)" in out.splitlines()[0]
     code, _, err = sweep("need", CONFIG)
     assert code == 2
-    assert "distribution" in err
+    assert "'sweep need --probability'" in err
+
+
+def test_an_object_in_us_units_is_refused(sweep):
+    code, out, err = sweep("uncertainty", CONFIG, "--json", "--units", "us")
+    assert (code, out) == (2, "")
+    assert "leave out --units us or --json" in err
 
 
 def test_published_spreads_have_sources(sweep):
@@ -44,6 +52,26 @@ def test_published_spreads_have_sources(sweep):
     assert code == 0
     assert "JCSS" in out
     assert out.count("as quoted by others") == 4
+    assert "\\n" not in out
+    code, out, _ = sweep("uncertainty", "--published", "--json")
+    assert code == 0
+    assert json.loads(out)["published"][0]["input"] == "soil.friction_angle"
+
+
+@pytest.mark.parametrize("words", [("--published", "--units", "us"), (CONFIG, "--published"), ()])
+def test_what_does_not_go_with_published_spreads_is_refused(sweep, words):
+    code, out, err = sweep("uncertainty", *words)
+    assert (code, out) == (2, "")
+    assert ("--published lists spreads as their sources state them" if words else "Missing argument 'GRID'") in err
+
+
+@pytest.mark.parametrize("command", ["need", "uncertainty"])
+@pytest.mark.parametrize("margin", ["25", "200%", "-0.5", "1"])
+def test_a_margin_that_no_design_has_is_refused(sweep, command, margin):
+    chance = ("--probability", "0.9") if command == "need" else ()
+    code, out, err = sweep(command, CONFIG, f"--margin={margin}", *chance)
+    assert (code, out) == (2, "")
+    assert f"--margin {margin}: must be 0 or more and less than 100 %" in err
 
 
 def test_doubts(sweep, monkeypatch):
@@ -53,3 +81,14 @@ def test_doubts(sweep, monkeypatch):
     assert "readings of the paper" in out
     assert all(len(line) <= 80 for line in out.splitlines())
     assert len(json.loads(sweep("uncertainty", CONFIG, "--doubts", "--json", "-q")[1])["doubts"]) == 4
+
+
+@pytest.mark.parametrize("more", [(), ("--doubts",)])
+@pytest.mark.parametrize(
+    ("design", "words"), [("1", "holds 1 design, numbered from 0; there is no 1"), ("-1", "is not in the range x>=0")]
+)
+def test_a_design_that_the_file_does_not_hold_is_refused_at_once(sweep, monkeypatch, design, words, more):
+    monkeypatch.setattr("boulder_sweep.answers.uncertainty.uncertainty", lambda *_, **__: pytest.fail("sampled"))
+    code, out, err = sweep("uncertainty", CONFIG, "--design", design, *more)
+    assert (code, out) == (2, "")
+    assert words in err

@@ -22,3 +22,15 @@ def test_lines_json_and_parquet(sweep, tmp_path):
     speeds = frame.withstands_speed_m_s.astype(object).where(frame.withstands_speed_m_s.notna(), None)
     assert [row["withstands_speed_m_s"] for row in rows] == speeds.tolist()
     assert frame.attrs["units"]["withstands_speed_m_s"] == "m/s"
+
+
+def test_rows_that_cannot_be_computed_give_exit_code_3(sweep, grid):
+    code, out, _ = sweep("which", grid, "--json")
+    assert code == 3
+    assert [row["verdict"] for row in json.loads(out)["rows"]].count("error") == 6
+
+
+def test_an_object_in_us_units_is_refused(sweep, grid):
+    code, out, err = sweep("which", grid, "--json", "--units", "us")
+    assert (code, out) == (2, "")
+    assert "leave out --units us or --json" in err

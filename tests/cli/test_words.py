@@ -148,3 +148,12 @@ def test_values_are_shown_in_us_units_where_asked(sweep, possible_grid):
     assert us["verdict"] == metric["verdict"]
     sweep("run", possible_grid, "-q")
     assert "  impact_speed_mph" in sweep("explain", "small-grid.sweep", 0, "--units", "us")[1]
+    metric = json.loads(sweep("explain", "small-grid.sweep", 0, "--json")[1])
+    us = json.loads(sweep("explain", "small-grid.sweep", 0, "--json", "--units", "us")[1])
+    assert us["inputs"]["impact_speed_mph"] == pytest.approx(30.0)
+    assert us["outcomes"]["max_displacement_ft"] == metric["outcomes"]["max_displacement_m"] / 0.3048
+    assert "max_displacement_m" not in us["outcomes"]
+    sweep("run", possible_grid, "-o", "again.sweep", "-q")
+    code, out, err = sweep("compare", "small-grid.sweep", "again.sweep", "--json", "--units", "us")
+    assert (code, out) == (2, "")
+    assert "--json is in SI units" in err

@@ -32,7 +32,7 @@ _REMEMBERING, _MEMORY, _UNLOADING = (
 )
 
 MUTATIONS = (
-    Mutation((1,), _DESIGN, "return 0.25 * math.pi + 0.5 * phi", "return 0.25 * math.pi - 0.5 * phi"),
+    Mutation((1,), _DESIGN, "return (1.0 + half) / (1.0 - half)", "return (1.0 - half) / (1.0 + half)"),
     Mutation((2,), _DESIGN, "* (design.d - element_depth(", "* (design.d + element_depth("),
     Mutation((3,), _DESIGN, "(soil.mass * design.L + m_b * 0.5 * design.L)", "(soil.mass * design.L + m_b * design.L)"),
     Mutation((4,), _DESIGN, "(soil.first + m_b * 0.5 * design.H)", "(soil.first - m_b * 0.5 * design.H)"),
@@ -61,7 +61,7 @@ MUTATIONS = (
     Mutation((22,), _SOIL, "x_b - c.l_n * versin + c.z_0 * sin", "x_b + c.l_n * versin + c.z_0 * sin"),
     Mutation((24,), _DESIGN, "return 1e6 * design.beta * design.W", "return 1e6 * design.beta"),
     Mutation((24,), _DESIGN, "return (n - 0.5) * d / elements", "return n * d / elements"),
-    Mutation((25,), _DESIGN, "return d / math.tan(phi)", "return d * math.tan(phi)"),
+    Mutation((25,), _DESIGN, "return d * (1.0 - half * half)", "return d * (1.0 + half * half)"),
     Mutation((27,), _DESIGN, "passive_pressure_coefficient(phi) ** 2", "passive_pressure_coefficient(phi)"),
     Mutation((28,), _DESIGN, "design.rho_s, design.K_epsilon) * design.W", "design.rho_s, 1.0) * design.W"),
     Mutation((34, 36), _SOIL, "velocity * abs(velocity)", "velocity * velocity"),

@@ -118,7 +118,10 @@ def test_mistakes(problems_of, minimal, text, words):
 
 def test_one_outcome_per_design_needs_values(load_it, minimal):
     sweep = load_it(minimal.replace("43.2", "{mean: 38 deg, sd: 3 deg}"))
-    with pytest.raises(SettingsError, match=r"grid.yaml:10:19: soil.friction_angle: .* 'sweep uncertainty'"):
+    with pytest.raises(
+        SettingsError,
+        match=r"grid.yaml:10:19: soil.friction_angle: .* 'sweep uncertainty' and 'sweep need --probability'",
+    ):
         simulate(sweep)
 
 

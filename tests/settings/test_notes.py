@@ -34,6 +34,13 @@ def test_usual_values_have_no_remarks(load_with, load_it, minimal):
         ("site.embedment_ratio=0.9", "usual embedments"),
         ("site.embedment_depth=3.2 m", "depth over height: 0.930233 is outside the usual range of 0.35 to 0.75"),
         ("site.embedment_depth=[1, 2] m", "depth over height: 0.290698 is outside"),
+        ("site.embedment_depth=4 m", "depth over height: 1.16279 is outside the usual range of 0.35 to 0.75"),
+        ("site.embedment_depth=4 m", "(usual embedments); cannot be computed, since the depth must be less than the"),
+        ("site.embedment_depth=3.44 m", "depth over height: 1 is outside"),
+        ("site.embedment_depth=[3.2, 4] m", "0.930233 to 1.16279 is outside the usual range of 0.35 to 0.75"),
+        ("site.embedment_depth=[3.2, 4] m", "designs of 1 or more cannot be computed, since the depth must be less"),
+        ("site.embedment_depth=3.2 m", "(usual embedments); computed as given"),
+        ("site.embedment_ratio=1", "cannot be computed, since the depth must be less than the boulder's height"),
         ("boulder.width=[1, 1.5, 1]", "a value more than once"),
     ],
 )
@@ -76,3 +83,8 @@ def test_soil_constants_off_both_families(load_with, angle, reaction, words):
     notes = _notes(load_with(f"soil.friction_angle={angle}", f"soil.subgrade_reaction={reaction}"))
     found = [note for note in notes if "does not go with" in note]
     assert (words in found[0]) if words else not found
+
+
+@pytest.mark.parametrize("override", ["site.embedment_depth=4 m", "site.embedment_ratio=1"])
+def test_what_cannot_be_computed_is_not_called_computed(load_with, override):
+    assert not any("computed as given" in note for note in _notes(load_with(override)))

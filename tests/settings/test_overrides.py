@@ -38,8 +38,26 @@ def test_one_way_of_embedment_takes_the_place_of_the_other(load_with, load_it, e
 def test_step_and_accuracy_take_the_place_of_each_other(load_it, example):
     solver = load_it(example, "solver.step=2 ms").solver
     assert (solver.accuracy, solver.step_s) == (None, 0.002)
-    solver = load_it(example, "solver.step=2 ms", "solver.accuracy=fast").solver
-    assert (solver.accuracy, solver.step_s) == ("fast", None)
+    text = example.replace("accuracy: balanced", "step: 2 ms")
+    for fast in ("solver.accuracy=fast", "--accuracy=fast"):
+        solver = load_it(text, fast).solver
+        assert (solver.accuracy, solver.step_s) == ("fast", None)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (("solver.step=2 ms", "solver.accuracy=fast"), "give accuracy or step, not both"),
+        (("solver.accuracy=fast", "solver.step=2 ms"), "give accuracy or step, not both"),
+        (("solver.step=2 ms", "--accuracy=fast"), "give accuracy or step, not both"),
+        (("solver={step: 2 ms}", "--accuracy=fast"), "give accuracy or step, not both"),
+        (("site.embedment_ratio=0.5", "site.embedment_depth=1 m"), "give embedment_ratio or embedment_depth, not both"),
+    ],
+)
+def test_two_options_that_contradict_each_other_are_refused(problems_of, minimal, example, overrides, message):
+    for text in (minimal, example):
+        (problem,) = problems_of(text, *overrides)
+        assert (problem.file, problem.message) == ("--set", message)
 
 
 def test_single_readings_on_top_of_a_preset(load_it, minimal, load_with):

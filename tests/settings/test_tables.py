@@ -94,6 +94,14 @@ def test_impossible_rows_stay_with_their_reason(load_table):
     assert [reasons[row] for row in range(3)] == ["", *["embedment depth is not less than the boulder's height"] * 2]
 
 
+def test_digits_of_other_scripts_are_no_numbers_as_in_the_file(messages_of):
+    messages = messages_of(HEADER + "\u0661.\u0662,1,2.2,1.2\n1,1,\uff12,1\n")
+    assert messages == [
+        "designs.csv:2:1: boulder_length_m: '\u0661.\u0662' is not a number; a length is needed, such as 1.65 m",
+        "designs.csv:3:5: boulder_height_m: '\uff12' is not a number; a length is needed, such as 1.65 m",
+    ]
+
+
 def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
     text = HEADER + '0.762,x,2.2,1.2\n1.65,1.68,nan,\n1.65,-1,3.44,2.03\n1,2\n1.65 m,1,"3,44",1\n1_0,1,1,010\n'
     messages = messages_of(text)
@@ -239,7 +247,7 @@ def test_files_that_are_no_tables(messages_of, content, words):
 def test_other_formats(messages_of, name):
     (message,) = messages_of(HEADER + ROWS, name)
     assert message.startswith("grid.yaml:1:8: table: ")
-    assert "is none of these: .csv, .xlsx, .parquet" in message
+    assert "has an unsupported type; use one of .csv, .xlsx, .parquet" in message
 
 
 def test_missing_table(messages_of):
@@ -416,7 +424,7 @@ def test_a_table_may_be_named_by_a_url(load_table, tmp_path, suffix):
     [
         ("memory://tables/none.csv", "memory://tables/none.csv: there is no such file"),
         ("s3://KEY:SECRET@bucket/designs.csv", "s3://bucket/designs.csv: the URL was given with a user name"),
-        ("memory://tables/designs.doc", "is none of these"),
+        ("memory://tables/designs.doc", "has an unsupported type"),
     ],
 )
 def test_a_url_that_gives_no_table_is_told_without_its_secrets(messages_of, url, words):
