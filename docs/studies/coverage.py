@@ -11,7 +11,7 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps, finer_step_s
 from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.settings import load
 from docs.studies.random_designs import random_designs
@@ -22,7 +22,7 @@ HORIZON_S = 1.0
 REFERENCE_STEP_S = 5e-5
 ROUNDING_RAD, ROUNDING_M = 1e-11, 1e-11
 """Errors below these are rounding, of the reference as well."""
-NUMBERS = tuple(steps for steps in LADDER if steps.step_s in (0.012, 0.006, 0.001, 0.00025))
+NUMBERS = tuple(steps for steps in LADDER if finer_step_s(steps.step_s) in (0.006, 0.003, 0.0005, 0.000125))
 """Some of those that an accuracy given as a number may come to."""
 
 
@@ -117,7 +117,7 @@ def coverage_table(found: list[Coverage]) -> Table:
             c.designs,
             c.readings,
             c.accuracy,
-            f"{1e3 * c.steps.step_s:g} + {0.5e3 * c.steps.step_s:g}{' *' if c.steps.locate_yield else ''}",
+            f"{1e3 * c.steps.step_s:g} + {1e3 * finer_step_s(c.steps.step_s):g}{' *' if c.steps.locate_yield else ''}",
             f"{c.rotation:.1%} of {c.standing}",
             f"{c.largest_miss_deg:.0e}" if c.largest_miss_deg else "none",
             f"{c.displacement:.1%}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import cache
 
 import numpy as np
 
@@ -66,6 +67,7 @@ def box_designs(count: int, seed: int) -> Designs:
     return designs_of(block_of({name: values[kept] for name, values in given.items()}))
 
 
+@cache
 def box_shares_table(count: int = 4000, seed: int = 1) -> Table:
     """Return how designs from the whole admitted box end, by the steps of `balanced` and by finer ones."""
     designs = box_designs(count, seed)

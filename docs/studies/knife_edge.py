@@ -19,6 +19,7 @@ from boulder_kernels import (
     simulate_design,
     simulate_table,
 )
+from boulder_kernels.impact import STEP_RATIO
 from boulder_sweep.views.figures import BLUE, GREY, ORANGE, figure
 from docs.studies.coverage import HORIZON_S, LIMIT, random_table
 
@@ -43,7 +44,7 @@ EXAMPLE = Design(
 SPAN = 0.02
 """Speeds around that of the example that are looked at, as a share of it."""
 STEP_S = 2.5e-4
-STEPS_MS = (8.0, 4.0, 2.0)
+STEPS_MS = (12.0, 6.0, 3.0)
 """Longer steps of the error estimates that are looked at."""
 COUNT, SEED = 20_000, 3
 NEARBY = 1e-3
@@ -123,7 +124,7 @@ def knife_edge_words() -> str:
     found = knife_edge()
     steady = knife_edge(readings=as_printed()._replace(restoring_gravity=True))
     standing, near, grazed = how_often()
-    marked = "; ".join(f"{count} by steps of {step:g} + {0.5 * step:g} ms" for step, count in grazed.items())
+    marked = "; ".join(f"{count} by steps of {step:g} + {step / STEP_RATIO:g} ms" for step, count in grazed.items())
     change = float(np.abs(np.diff(steady.rotations_deg)).max())
     return "\n".join(
         (
