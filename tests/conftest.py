@@ -55,11 +55,11 @@ NOT_QUICK = ("settings/test_fuzz.py",)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the quick layer; what is slow in it stays out."""
+    """Mark the quick layer; what is nightly in it stays out."""
     folder = Path(__file__).parent
     for item in items:
         place = item.path.relative_to(folder).as_posix()
-        if place.startswith(QUICK) and not place.startswith(NOT_QUICK) and "slow" not in item.keywords:
+        if place.startswith(QUICK) and not place.startswith(NOT_QUICK) and "nightly" not in item.keywords:
             item.add_marker("quick")
 
 

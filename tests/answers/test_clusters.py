@@ -21,14 +21,14 @@ def test_need_on_a_cluster():
     assert need(sweep, **DASK).arrow.equals(need(sweep).arrow)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("asked", [{"least": "mass"}, {"probability": 0.95}])
 def test_need_of_other_kinds_on_a_cluster(asked):
     sweep = load(CONFIGS / ("uncertain_site.yaml" if "probability" in asked else "site.yaml"))
     assert need(sweep, **asked, **DASK).arrow.equals(need(sweep, **asked).arrow)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_uncertainty_on_a_cluster():
     sweep = load(CONFIGS / "uncertain_site.yaml")
     here, there = uncertainty(sweep, half_width=0.05), uncertainty(sweep, half_width=0.05, **DASK)
@@ -36,7 +36,7 @@ def test_uncertainty_on_a_cluster():
     assert there.indices.equals(here.indices)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_tradeoff_measured_by_a_worker():
     sweep = load(CONFIGS / "m30_sizing.yaml")
     here, there = (measure(sweep, designs=64, seconds=math.inf, backend=backend) for backend in ("threading", "dask"))

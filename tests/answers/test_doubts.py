@@ -35,7 +35,7 @@ def test_every_reading_once() -> None:
     assert len(readings) == 32
 
 
-@pytest.mark.parametrize("drawn", [128, pytest.param(512, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("drawn", [128, pytest.param(512, marks=pytest.mark.nightly)])
 def test_readings_outweigh_the_numerical_error(drawn: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("boulder_sweep.answers.doubts.DRAWN", drawn)
     parts = {own.cause: own for own in doubts(site(**UNCERTAIN))}
@@ -46,7 +46,7 @@ def test_readings_outweigh_the_numerical_error(drawn: int, monkeypatch: pytest.M
     assert all(own.alone <= own.total + 1e-12 for own in parts.values())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_open_readings_need_another_depth() -> None:
     sweep = site(**UNCERTAIN)
     closed = need(sweep, probability=0.9).frame.iloc[0]

@@ -33,7 +33,7 @@ def test_observed_order_is_the_slope() -> None:
     assert observed_order(points, 8.0, 1.0) == pytest.approx(3.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("readings", [bk.corrected(), bk.as_printed()])
 def test_switches_inside_approach_the_same_motion(readings: bk.Readings) -> None:
     """Slowly, with small steps: two codes for one model, the one with located events and the one without."""

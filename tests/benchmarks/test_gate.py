@@ -246,13 +246,13 @@ def test_the_gain_of_two_threads_is_that_over_work_that_shares_nothing(
     assert together.gain_over(work, share_nothing, rounds=9) == pytest.approx(gain)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_work_that_sleeps_is_told_from_work_that_computes() -> None:
     assert together.idle_share(lambda: time.sleep(0.05), rounds=3) > 0.8
     assert together.idle_share(compute, rounds=3) < 0.2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_threads_that_wait_for_each_other_gain_nothing() -> None:
     lock = threading.Lock()
 

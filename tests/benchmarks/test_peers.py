@@ -7,7 +7,7 @@ from benchmarks.peers import c_solver
 from benchmarks.peers.problem import problem_of
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.compiled
 def test_plain_c_turns_every_design_as_far_as_the_kernels_do():
     problem = problem_of(sample(60))  # not a multiple of the lanes

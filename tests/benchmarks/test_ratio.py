@@ -29,7 +29,7 @@ def test_each_setting_is_simulated_by_the_steps_of_its_accuracy(
     assert [readings for readings, _ in seen] == [*[bk.corrected()] * 3, bk.as_printed()]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_checkout_takes_as_long_as_itself(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

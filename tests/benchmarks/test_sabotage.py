@@ -17,7 +17,7 @@ import pytest
 import boulder_kernels as bk
 from benchmarks import counts, gate
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 ROOT = Path(__file__).parents[2]
 TRIALS = 20

@@ -14,7 +14,7 @@ from benchmarks.single_precision import load_single_precision, simulated, single
 from boulder_kernels import lanes as double_lanes
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.compiled
 def test_same_outcomes_up_to_rounding_and_nothing_left_in_double() -> None:
     designs = sample(200)

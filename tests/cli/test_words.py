@@ -114,7 +114,7 @@ def test_kernels_are_named_by_what_the_file_asks_for(overrides, kernels):
     assert (progress.kernels_for(sweep), progress.kernels_for(sweep, "design")) == kernels
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "override", ["model.soil={elements: 50}", SPRING, "soil.cohesion=5 kPa", "model.unloading=plastic"]
 )

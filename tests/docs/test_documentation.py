@@ -28,7 +28,7 @@ def page(name: str) -> str:
     return (DOCS / name).read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", CONTENTS)
 def test_no_number_has_drifted(name: str) -> None:
     """Write it anew with ``python -m docs.studies --write NAME``."""
@@ -36,7 +36,7 @@ def test_no_number_has_drifted(name: str) -> None:
     assert drift(written, compute(ROOT, [name])[name]) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.compiled
 @pytest.mark.parametrize("sample", [(), (4000, 2)], ids=["documented", "another"])
 def test_few_designs_of_the_box_stay_open(sample: tuple[int, ...]) -> None:
@@ -63,7 +63,7 @@ def test_numbers_in_prose_are_those_of_the_studies() -> None:
     assert f"{NOISE_MM:g} mm and {NOISE_G:g} g" in page("vehicle.md")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_conclusions_in_prose_hold() -> None:
     study = readings_of_grid(ROOT)
     assert all(row.abg_verdict == "fail, overturns" for row in study.rows)
@@ -150,7 +150,7 @@ def test_command_needs_the_repository(tmp_path: Path, monkeypatch: pytest.Monkey
     assert stop.value.code == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_pictures_are_drawn_by_the_command(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     drawn = draw_all(tmp_path)

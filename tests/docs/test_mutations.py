@@ -44,7 +44,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("mutation", MUTATIONS, ids=name_of)
 def test_a_broken_equation_turns_its_tests_red(copy: Path, mutation: Mutation) -> None:
     tests = sorted({test for number in mutation.equations for test in REGISTER[number].tests})
@@ -58,7 +58,7 @@ def test_a_broken_equation_turns_its_tests_red(copy: Path, mutation: Mutation) -
     assert done.returncode == TESTS_FAILED, done.stdout[-2000:] + done.stderr[-1000:]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("compiled", [False, True], ids=["kernels", "others"])
 def test_what_is_sound_stays_green(copy: Path, compiled: bool) -> None:
     """Every test beside the kernels that it meets broken code with."""

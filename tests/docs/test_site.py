@@ -50,7 +50,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_link_leads_somewhere_and_nothing_is_fetched(site: Path) -> None:
     pages = {file: Page(file) for file in site.rglob("*.html")}
     assert len(pages) > 20
@@ -67,7 +67,7 @@ def test_every_link_leads_somewhere_and_nothing_is_fetched(site: Path) -> None:
                 assert unquote(parts.fragment) in anchors | {"__codelineno"} or "__code" in parts.fragment, target
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
     words = {
         "quick_start.html": "Which boulder, buried how deep",
@@ -81,7 +81,7 @@ def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
         assert expected in (site / name).read_text(encoding="utf-8"), name
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_search_works_from_disk(site: Path, chromium: Any) -> None:
     errors: list[str] = []
     asked: list[str] = []

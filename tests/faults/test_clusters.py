@@ -35,7 +35,7 @@ pytestmark = pytest.mark.faults
 WORKER_KILLS, SCHEDULER_KILLS = 20, 10
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_many_kills_lose_no_row_and_double_none(tmp_path):
     seed = int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
     kills = (str(WORKER_KILLS), str(SCHEDULER_KILLS))
@@ -130,7 +130,7 @@ def test_a_result_that_does_not_come_is_asked_for_again(tmp_path, monkeypatch):
     assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_scheduler_that_hangs_is_noticed(tmp_path, monkeypatch):
     monkeypatch.setattr(backend, "CONNECT_S", 3.0)
     out = tmp_path / "out"
@@ -143,7 +143,7 @@ def test_a_scheduler_that_hangs_is_noticed(tmp_path, monkeypatch):
     assert status(out, verify=True).damaged == {}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypatch):
     out, rows = tmp_path / "out", 8
     run(grid_of(rows), tmp_path / "whole", simulate=plausible)
@@ -174,7 +174,7 @@ def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypa
     assert same_bits(table.take(others), whole.take(others))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_adaptive_cluster_starts_workers_for_a_run(tmp_path):
     """From none: work that waits is what makes it start them."""
     rows, how = 4000, {"rows_per_part": 500, "simulate": slowly}

@@ -15,7 +15,7 @@ import pytest
 
 from tests.faults.processes import ROOT
 
-pytestmark = [pytest.mark.faults, pytest.mark.slow, pytest.mark.compiled]
+pytestmark = [pytest.mark.faults, pytest.mark.nightly, pytest.mark.compiled]
 
 TRIES = 20
 LAST = 40

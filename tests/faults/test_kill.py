@@ -15,7 +15,7 @@ from tests.faults.processes import ROOT
 pytestmark = pytest.mark.faults
 
 
-@pytest.mark.parametrize("kills", [5, pytest.param(55, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [5, pytest.param(55, marks=pytest.mark.nightly)])
 def test_many_kills_lose_no_row_and_double_none(tmp_path, kills):
     seed = int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
     command = [sys.executable, "-m", "tests.faults.kills", str(tmp_path), str(kills), str(seed)]

@@ -16,7 +16,7 @@ from tests.faults.processes import ROOT
 from tests.faults.s3_server import BUCKET, SECRET, S3Server
 from tests.runner.grids import same_bits
 
-pytestmark = [pytest.mark.faults, pytest.mark.slow]
+pytestmark = [pytest.mark.faults, pytest.mark.nightly]
 
 WORKER_DIES_AT, SCHEDULER_DIES_AT = 0.25, 0.55
 """Shares of the rows."""

@@ -64,7 +64,7 @@ def test_an_interrupted_run_goes_on_to_the_same_table(tmp_path):
     assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
 
 
-@pytest.mark.parametrize("backend", ["threading", pytest.param("dask", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("backend", ["threading", pytest.param("dask", marks=pytest.mark.nightly)])
 def test_the_second_signal_ends_it_at_once(tmp_path, backend):
     driver = Driver(tmp_path / "out", *SLOW, "--backend", backend)
     driver.wait_for_rows()

@@ -66,7 +66,7 @@ IMPLICIT = (422, 312, 571, 1344, 1719, 2093, 2646, 3275, 3575, 75, 2141, 2751, 3
 """Rows of the box that the usual steps refuse, of each cause; the implicit integrator needs seconds for each."""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.compiled
 def test_the_same_as_an_implicit_integrator() -> None:
     designs = box_designs(4000, 1).table

@@ -139,7 +139,7 @@ def test_slopes_of_the_energy_are_the_forces() -> None:
             assert pytest.approx(-p.V_A, rel=1e-12) == soil_reaction(k, c).F
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_whole_impacts() -> None:
     """In one layer as in the uniform soil; in layers as the oracle has it, and settled or at the limit as it should."""
     design = design_of(LAYERED)

@@ -67,7 +67,7 @@ def run(script: str, environment: dict[str, str]) -> str:
 
 
 @pytest.mark.compiled
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     """It finds all machine code in the cache: no miss, no new file, none written again; and the same bits come out."""
     environment = {_jit.CACHE_VARIABLE: str(tmp_path)}

@@ -44,7 +44,7 @@ def by_oracle(design: bk.Design, second: SecondSpring, readings: bk.Readings = C
     return oracle.simulate(inputs, oracle_readings(readings), rotation_limit=LIMIT)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("preset", READINGS)
 @pytest.mark.parametrize(("factor", "s_2"), [(3.0, 0.5), (1.3, 0.65), (10.0, 0.05), (1.0, 0.5), (3.0, 5.0)])
 def test_whole_impact_is_that_of_the_oracle(preset: str, factor: float, s_2: float) -> None:
@@ -54,7 +54,7 @@ def test_whole_impact_is_that_of_the_oracle(preset: str, factor: float, s_2: flo
     assert differences(by_kernels(RWG, second, READINGS[preset]), known) == {}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_random_impacts_are_those_of_the_oracle() -> None:
     rng = np.random.default_rng(161)
     stiffened = 0
@@ -66,7 +66,7 @@ def test_random_impacts_are_those_of_the_oracle() -> None:
     assert stiffened >= 4
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_second_spring_like_the_first_or_never_reached_changes_nothing() -> None:
     alone = bk.simulate_design(RWG, CORRECTED, FINE, bk.no_record())
     unreached = by_kernels(RWG, SecondSpring(3.0 * RWG.k_v, 5.0))
@@ -106,7 +106,7 @@ def test_energy_spent_at_the_kink() -> None:
     assert spent_energy(0.0, c.k_v, c.k_v) == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("s_2", [0.5, 0.8])
 def test_a_located_kink_costs_no_order(s_2: float) -> None:
     """Order five across the kink, where soil and weight are smooth: errors against a far finer step."""
@@ -134,7 +134,7 @@ def test_a_located_kink_costs_no_order(s_2: float) -> None:
     assert 4.5 < order < 6.5
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_error_estimate_covers_the_kink() -> None:
     designs = random_designs(40, seed=163)
     springs = SecondSprings(np.array([3.0 * design.k_v for design in designs]), np.full(len(designs), 0.5))
@@ -146,7 +146,7 @@ def test_error_estimate_covers_the_kink() -> None:
     assert right.all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_rows_are_the_single_impacts() -> None:
     designs = random_designs(5, seed=164)
     seconds = [SecondSpring(2.0 * design.k_v, 0.1 * (row + 1)) for row, design in enumerate(designs)]
@@ -170,12 +170,12 @@ def test_a_second_spring_that_cannot_be_is_refused(factor: float, s_2: float) ->
     assert not is_second_spring(constants_of(RWG, CORRECTED, 0), second)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_such_a_vehicle_is_not_simulated() -> None:
     assert by_kernels(RWG, SecondSpring(0.99 * RWG.k_v, 0.5)).status == Status.INVALID
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_steps_follow_the_stiffer_spring() -> None:
     c = constants_of(RWG, CORRECTED, 0)
     second = SecondSpring(1e4 * RWG.k_v, 0.5)

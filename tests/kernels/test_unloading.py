@@ -156,7 +156,7 @@ def test_work_is_stored_or_taken_by_the_sliders(gap: bool) -> None:
         assert pytest.approx(2.5) == stored.V
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("unloading", LAWS)
 @pytest.mark.parametrize("inputs", [oracle.RWG, replace(oracle.RWG, beta=25.0, d=1.7)], ids=["rwg", "softer"])
 def test_whole_impacts_and_what_is_left_are_those_of_the_oracle(unloading: str, inputs: oracle.Inputs) -> None:
@@ -175,7 +175,7 @@ def test_whole_impacts_and_what_is_left_are_those_of_the_oracle(unloading: str, 
     assert found.swing_back == pytest.approx(swing, abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_a_soil_that_never_yields_is_the_elastic_one(law: int) -> None:
     design = design_of(replace(oracle.RWG, K_epsilon=1e6))
@@ -188,7 +188,7 @@ def test_a_soil_that_never_yields_is_the_elastic_one(law: int) -> None:
         assert found.outcome.maxima == pytest.approx(known.maxima, rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_steps_converge_faster_than_by_the_second_order(law: int) -> None:
     designs = [design_of(oracle.RWG), *slow_trucks(24, 3)]
@@ -200,7 +200,7 @@ def test_steps_converge_faster_than_by_the_second_order(law: int) -> None:
     assert 2.0 < math.log(coarse / fine) / math.log(8.0) < 3.5
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_estimated_errors_cover_the_true_ones(law: int) -> None:
     designs = slow_trucks(60, 11)
@@ -225,7 +225,7 @@ def test_the_weight_is_lifted_to_where_the_boulder_rests(monkeypatch: pytest.Mon
         assert plain(unloading.resting_energy)(theta, c) == pytest.approx(known, abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_place_of_rest_is_where_forces_balance() -> None:
     """Held without motion where the sliders were left, the boulder has neither net force nor net moment."""
     found = simulate_plastic(design_of(oracle.RWG), bk.corrected(), control(0.004, bk.PLASTIC), bk.no_record())
@@ -241,7 +241,7 @@ def test_the_place_of_rest_is_where_forces_balance() -> None:
     assert pytest.approx(weight, rel=1e-4) == reaction(x_b).M
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_what_is_proved_holds_for_ten_times_as_long(law: int) -> None:
     """A design that is decided below its limit never reaches it, and stays within the doubt of its rest."""
@@ -262,7 +262,7 @@ def test_what_is_proved_holds_for_ten_times_as_long(law: int) -> None:
         assert again.theta == later.theta_rest
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_the_compiler_it_is_the_same() -> None:
     code = (
         "import numpy as np; from math import radians; import boulder_kernels as bk\n"

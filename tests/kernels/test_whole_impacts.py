@@ -81,7 +81,7 @@ def compare(design: bk.Design, readings: bk.Readings, limit: float) -> bool:
     return True
 
 
-@pytest.mark.parametrize("case", [pytest.param("ABG", marks=pytest.mark.slow), "RWG"])
+@pytest.mark.parametrize("case", [pytest.param("ABG", marks=pytest.mark.nightly), "RWG"])
 @pytest.mark.parametrize("name", single_switches())
 def test_crash_tests_in_every_single_reading(name: str, case: str) -> None:
     """To half a turn: ABG tips over in all of them, and is followed all the way."""
@@ -100,14 +100,14 @@ def test_random_designs_in_mixed_readings() -> None:
     assert excused <= 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(71, 80))
 def test_many_random_designs_in_mixed_readings(seed: int) -> None:
     excused = sum(compare(design, readings, LIMIT) for design, readings in mixed(64, seed))
     assert excused <= 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("readings", [bk.as_printed(), bk.corrected()], ids=["as_printed", "corrected"])
 def test_many_random_designs_in_the_presets(readings: bk.Readings) -> None:
     excused = sum(compare(design, readings, np.radians(20.0)) for design in random_designs(200, seed=81))

@@ -43,7 +43,7 @@ def test_notebook_is_shipped_with_its_output(path: Path) -> None:
     assert path.stat().st_size < 500_000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs_and_says_the_same(path: Path) -> None:
     shipped = code_cells(nbformat.read(path, as_version=4))

@@ -79,8 +79,8 @@ def test_one_reading_from_corrected(switch: str) -> None:
     [
         (None, 7.6940),
         (2000, 7.6997),
-        pytest.param(5000, 7.6963, marks=pytest.mark.slow),
-        pytest.param(20000, 7.6946, marks=pytest.mark.slow),
+        pytest.param(5000, 7.6963, marks=pytest.mark.nightly),
+        pytest.param(20000, 7.6946, marks=pytest.mark.nightly),
     ],
 )
 def test_element_sums_of_the_printed_readings(elements: int | None, theta: float) -> None:
@@ -88,7 +88,7 @@ def test_element_sums_of_the_printed_readings(elements: int | None, theta: float
     assert np.degrees(found.max_rotation.value) == pytest.approx(theta, abs=6e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("switch", ["inertia", "contact", "separation"])
 def test_one_reading_from_printed_by_element_sums(switch: str) -> None:
     """Those where the half element shows in the figures."""

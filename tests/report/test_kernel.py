@@ -16,7 +16,7 @@ def test_a_kernel_without_a_stamp_is_of_no_sources():
     assert stamp_of(b"\0asm\1\0\0\0") == ""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_built_anew_it_is_the_same_to_the_byte(tmp_path):
     again = tmp_path / "kernel.wasm"
     subprocess.run([sys.executable, "-m", "boulder_sweep.report.build", str(again)], check=True)

@@ -13,7 +13,7 @@ from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.views.wording import LAW_WORDS
 from tests.report.conftest import GRID, SETS
 
-pytestmark = pytest.mark.slow  # these need Chromium, which not every machine has
+pytestmark = pytest.mark.nightly  # these need Chromium, which not every machine has
 
 DESIGNS = 200
 SLIDERS = {

@@ -7,7 +7,7 @@ from boulder_sweep.report import write_report
 from boulder_sweep.settings import load_text
 from tests.report.conftest import LIST
 
-pytestmark = pytest.mark.slow  # these need Chromium, which not every machine has
+pytestmark = pytest.mark.nightly  # these need Chromium, which not every machine has
 
 SITE = """\
 name: site

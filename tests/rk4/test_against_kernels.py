@@ -52,7 +52,7 @@ def test_the_same_motion(preset: str) -> None:
     assert crushed.max() < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.compiled
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_same_motion_of_many(preset: str) -> None:
@@ -99,7 +99,7 @@ def test_what_is_proved_stays_below_the_limit() -> None:
     assert check_proved(random_table(400, 35)) > 20
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.compiled
 def test_what_is_proved_stays_below_the_limit_in_wild_families() -> None:
     counts = {name: check_proved(table) for name, table in wild_tables().items()}

@@ -270,7 +270,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_memory_does_not_grow_with_the_rows():
     def peak(rows: int) -> int:
         command = [sys.executable, "-c", _MEMORY, str(rows)]

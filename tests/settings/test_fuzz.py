@@ -217,14 +217,14 @@ def test_any_table(tmp_path_factory: pytest.TempPathFactory, columns, count, cha
     loads_or_says_why(text, f"table={path}")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(LONG)
 @given(text=mutated())
 def test_mutated_files_at_length(text: str) -> None:
     loads_or_says_why(text)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(LONG)
 @given(
     data=st.one_of(st.binary(max_size=400), st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass")))
@@ -233,7 +233,7 @@ def test_any_bytes_at_length(data: bytes) -> None:
     _any_bytes(data)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(LONG)
 @given(parts=st.lists(st.sampled_from([*SCRAPS, "boulder", "height", "site", "soil", "a"]), max_size=40))
 def test_scraps_in_any_order_at_length(parts: list[str]) -> None:

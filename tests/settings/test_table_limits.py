@@ -104,7 +104,7 @@ def test_a_thousand_wrong_files_are_refused_in_words(tmp_path, seed):
     fuzz(tmp_path, 1000, seed)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_many_wrong_files_are_refused_in_words(tmp_path, seed):
     fuzz(tmp_path, 100_000, seed + 1)
 
@@ -178,7 +178,7 @@ def large(folder: Path) -> dict[str, Path]:
     return {name: folder / name for name in made}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_large_files_are_answered_in_seconds_and_two_gigabytes(tmp_path):
     """20 million designs may be read; everything else is refused."""
     for name, path in large(tmp_path).items():

@@ -158,7 +158,7 @@ def test_a_run_that_was_thought_dead_cannot_change_the_table(only_new, monkeypat
 
 
 @pytest.mark.parametrize("only_new", [True, False])
-@pytest.mark.parametrize(("seeds", "least"), [(1, 1), pytest.param(12, 50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seeds", "least"), [(1, 1), pytest.param(12, 50, marks=pytest.mark.nightly)])
 def test_no_row_is_lost_or_double_whatever_fails(only_new, seeds, least, monkeypatch):
     """Puts that fail, whose answer is lost, or that arrive late; lists that are stale: many times each."""
     monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)  # a lock that arrives late is that of a dead run

@@ -81,7 +81,7 @@ def test_errors_are_ordered_and_fall_with_the_step(found: Tradeoff) -> None:
     assert [p.rotation_rms_deg for p in sums] == sorted((p.rotation_rms_deg for p in sums), reverse=True)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_errors_depend_on_the_sweep_alone() -> None:
     one, other = (measure(grid(), designs=40, seconds=math.inf) for _ in range(2))
     for a, b in zip(one.points, other.points, strict=True):
