@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import functools
 import importlib
 import inspect
 import re
@@ -78,11 +80,11 @@ def _of_entry(entry: Entry, root: Path) -> list[str]:
         found.append(f"{' and '.join(entry.functions)} do not mention it")
     for test in entry.tests:
         file, _, function_name = test.partition("::")
-        path = root / file
-        if not path.exists() or not re.search(
-            rf"^def {function_name}\(", path.read_text(encoding="utf-8"), re.MULTILINE
-        ):
+        text = (root / file).read_text(encoding="utf-8") if (root / file).exists() else ""
+        if not re.search(rf"^def {function_name}\(", text, re.MULTILINE):
             found.append(f"there is no test {test}")
+        elif is_nightly(text, function_name):
+            found.append(f"test {test} is nightly")
     found += [f"unknown reading {word}" for word in _CODE.findall(entry.reading) if word not in SWITCHES]
     return found
 
@@ -108,6 +110,49 @@ def _documentation(name: str, function: Any) -> str:
     module: ModuleType | None = inspect.getmodule(plain)
     assert module is not None, name
     return "\n".join((inspect.getdoc(plain) or "", inspect.getsource(plain), inspect.getsource(module)))
+
+
+def is_nightly(text: str, test: str) -> bool:
+    """Whether plain ``pytest`` leaves out a test of a file: it, its module or all its parameters are marked nightly.
+
+    Parameters are looked at where the decorator lists them; a list that has a name or is computed counts as kept.
+    """
+    for node in _syntax_tree(text).body:
+        if isinstance(node, ast.FunctionDef) and node.name == test:
+            if any(_is_mark(decorator) or _has_nightly_parameters(decorator) for decorator in node.decorator_list):
+                return True
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if "pytestmark" in map(ast.unparse, targets) and node.value is not None and _marks(node.value):
+                return True
+    return False
+
+
+@functools.cache
+def _syntax_tree(text: str) -> ast.Module:
+    return ast.parse(text)
+
+
+def _is_mark(node: ast.expr) -> bool:
+    """Whether this is the mark, with or without a reason in parentheses."""
+    node = node.func if isinstance(node, ast.Call) else node
+    return isinstance(node, ast.Attribute) and node.attr == "nightly"
+
+
+def _marks(node: ast.expr) -> bool:
+    """Whether the mark is here or somewhere in a list."""
+    return any(_is_mark(part) for part in ast.walk(node) if isinstance(part, ast.expr))
+
+
+def _has_nightly_parameters(decorator: ast.expr) -> bool:
+    """Whether this lists parameters and every one of them has the mark."""
+    if not isinstance(decorator, ast.Call) or not ast.unparse(decorator.func).endswith("mark.parametrize"):
+        return False
+    named = {keyword.arg: keyword.value for keyword in decorator.keywords}
+    values = decorator.args[1] if len(decorator.args) > 1 else named.get("argvalues")
+    if not isinstance(values, ast.List | ast.Tuple):
+        return False
+    return bool(values.elts) and all(map(_marks, values.elts))
 
 
 def mentioned(text: str) -> set[int]:

@@ -18,7 +18,6 @@ def code(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.nightly
 def test_the_job_script_is_the_one_on_the_page(capsys):
     (source,), (shown,) = code("slurm.md", "python"), code("slurm.md", "bash")
     there: dict = {}
@@ -31,7 +30,6 @@ def test_the_job_script_is_the_one_on_the_page(capsys):
         there["cluster"].close()
 
 
-@pytest.mark.nightly
 def test_the_manifest_has_what_the_page_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (source,) = code("kubernetes.md", "python")
