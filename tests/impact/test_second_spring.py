@@ -16,7 +16,6 @@ from boulder_sweep.settings import Sweep, load
 from tests import oracle
 from tests.kernels.samples import inputs_of
 
-pytestmark = pytest.mark.nightly  # compiles kernels of its own
 CONFIG = Path(__file__).parents[2] / "configs" / "rwg.yaml"
 STAGES = "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: [0.4 m, 0.6 m], stiffness: 9 MN/m}]"
 

