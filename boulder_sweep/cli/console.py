@@ -160,6 +160,8 @@ def status_lines(status: RunStatus) -> list[str]:
         lines.append("every part was read and is intact")
     if status.resume_command and not status.running:
         lines.append(f"resume   {status.resume_command}")
+        if status.settings_missing:
+            lines.append(f"note     there is no {status.settings_missing}; name the settings file where it is now")
     return lines
 
 

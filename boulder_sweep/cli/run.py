@@ -13,6 +13,7 @@ import click
 from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import RUN_EXAMPLES, cluster_options, json_option, run_options, set_option, talk_options
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.errors import Interrupted
 from boulder_sweep.places import Place, place_of
 from boulder_sweep.text import counted
 
@@ -54,18 +55,25 @@ def run(
         say("\n".join(console.value_lines(sweep.resolved())))
     if not quiet:
         say(f"{sweep.name}: {counted(sweep.n_designs, 'design')} into {target}")
+    from boulder_sweep.runner.interruption import noted_signals
     from boulder_sweep.runner.sweeper import run as run_sweep
 
     notes = Notes()
-    with progress(quiet, notes, kernels_for(sweep)) as shown:
-        summary = run_sweep(
-            sweep,
-            target,
-            progress=shown,
-            command=shlex.join(["sweep", *sys.argv[1:]]),
-            resume_command=_resume_command(grid, target, overrides, accuracy, options),
-            **options,
-        )
+    # Who waits for this command does not act on a signal before it has told how to go on.
+    with noted_signals() as signals, signals.deferred(), progress(quiet, notes, kernels_for(sweep)) as shown:
+        try:
+            summary = run_sweep(
+                sweep,
+                target,
+                progress=shown,
+                command=shlex.join(["sweep", *sys.argv[1:]]),
+                resume_command=_resume_command(grid, target, overrides, accuracy, options),
+                **options,
+            )
+        except Interrupted as stop:
+            say(str(stop))  # before the bar closes: another signal meanwhile ends the process
+            signals.answered = True
+            return stop.exit_code
     for note in notes.new(summary.notes):
         say(f"note: {note}")
     if as_json:

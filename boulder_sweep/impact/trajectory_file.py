@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -63,10 +64,12 @@ def checked_history(path: str | Path) -> Path:
     Raises
     ------
     HistoryFileError
-        The name has another ending, or its folder does not exist or holds the result of a run.
+        The name has another ending, its folder does not exist or holds the result of a run, or it cannot be written.
     """
     target = Path(path)
     if target.suffix.lower() != ".parquet":
         raise HistoryFileError(f"{path}: a time history is a Parquet file; its name must end in .parquet")
     check_target(target, HistoryFileError)
+    if target.exists() and not os.access(target, os.W_OK):  # not replaced, but written anew
+        raise HistoryFileError(f"{path} cannot be written: {os.strerror(errno.EACCES)}")
     return target

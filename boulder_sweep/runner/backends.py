@@ -9,6 +9,13 @@ BACKENDS = (THREADING, DASK)
 """Threads of this process: the kernels run without the interpreter's lock. Or a Dask cluster."""
 MOST_JOBS = 4096
 """Most workers that may be asked for, more than a machine has cores; starting a million would exhaust it."""
+FETCH_S = 2.0
+"""How long to wait for a result that a worker of a cluster has finished; twice as long after each time that this was
+too short [s].
+
+If a worker dies between finishing a task and handing over the result, the scheduler may try to reach it for 30 s,
+Dask's limit for a connection. Asked again, it gives the result of the worker that has computed the task anew.
+"""
 
 
 def available_cores() -> int:

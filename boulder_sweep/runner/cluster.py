@@ -16,6 +16,7 @@ from typing import Any
 from uuid import uuid4
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
+from boulder_sweep.runner.backends import FETCH_S
 from boulder_sweep.runner.computing import Computation, failed_rows
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
 from boulder_sweep.runner.remote import Done, Work, compute, fingerprint, other_versions_text, parts_of, received
@@ -24,7 +25,9 @@ from boulder_sweep.store.writer import OutputFolder, StagedPart
 from boulder_sweep.text import one_line
 
 CONNECT_S = 10.0
-"""How long to wait for a scheduler to answer, and for a first worker [s]."""
+"""How long to wait for a scheduler to answer [s]."""
+FIRST_WORKER_S = 10.0
+"""How long to wait for a first worker [s]."""
 NO_WORKER_S = 15.0
 """How long a run waits for a worker after the last one was lost [s]."""
 _LOOK_EVERY_S = 1.0
@@ -32,12 +35,6 @@ _QUIET_S = 10.0
 """Time without any result after which the user is told [s]."""
 _TASKS_PER_THREAD = 2
 _TRIES = 3
-_FETCH_S = 2.0
-"""How long to wait for a result that a worker has finished; twice as long after each time that this was too short [s].
-
-If a worker dies between finishing a task and handing over the result, the scheduler may try to reach it for 30 s,
-Dask's limit for a connection. Asked again, it gives the result of the worker that has computed the task anew.
-"""
 _LOOPBACK = "127.0.0.1:0"
 
 
@@ -191,7 +188,7 @@ class ClusterWorkers(threading.Thread):
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._lost: list[Any] = []
         """Futures in flight whose result was lost with its worker before it was received."""
-        self._fetch_s = _FETCH_S
+        self._fetch_s = FETCH_S
         self._stopped = threading.Event()
         self._workers: dict[str, int] = {}
         self._without_worker_since: float | None = None
@@ -363,7 +360,7 @@ def _wait_for_a_worker(client: Any, address: str) -> None:
     """
     work = client.submit(int, pure=False)
     try:
-        client.wait_for_workers(1, timeout=CONNECT_S)
+        client.wait_for_workers(1, timeout=FIRST_WORKER_S)
         work.release()
     except TimeoutError:
         raise BackendError(_no_worker_text(address)) from None

@@ -31,10 +31,13 @@ class Signals:
     ----------
     caught : int or None
         The first signal that arrived.
+    answered : bool
+        Whether the user was told what it ended, so that nobody else need act on it.
     """
 
     def __init__(self) -> None:
         self.caught: int | None = None
+        self.answered = False
         self._deferred = 0
         self._abandoned: list[threading.Thread] = []
 
@@ -66,7 +69,8 @@ class Signals:
         thread.start()
         while thread.is_alive():
             thread.join(_LOOK_EVERY_S)
-            if self.caught is not None and self._deferred <= depth and thread.is_alive():
+            waits = self.answered or self._deferred > depth
+            if self.caught is not None and not waits and thread.is_alive():
                 self._abandoned.append(thread)
                 raise Interrupted(self.caught)
         if problem:

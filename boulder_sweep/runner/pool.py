@@ -8,7 +8,15 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
-from boulder_sweep.runner.backends import DASK, THREADING, available_cores, check_backend, check_jobs, start_failure
+from boulder_sweep.runner.backends import (
+    DASK,
+    FETCH_S,
+    THREADING,
+    available_cores,
+    check_backend,
+    check_jobs,
+    start_failure,
+)
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
@@ -42,6 +50,7 @@ class Pool:
     def __init__(self, jobs: int | None, cluster: Cluster | None = None):
         check_jobs(jobs)
         self._jobs, self._cluster = jobs, cluster
+        self._fetch_s = FETCH_S
 
     def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
         """Make the calls.
@@ -84,14 +93,21 @@ class Pool:
 
     def _result(self, cluster: Cluster, future: Any) -> Any:
         """Wait for a result; a worker that dies is replaced by another as long as there is one."""
+        without_s = 0.0
         while True:
+            finished, patience_s = future.done(), self._fetch_s
             try:
-                return future.result(timeout=_LOOK_EVERY_S)
+                return future.result(timeout=patience_s)
             except TimeoutError as late:
                 if future.status == "error":  # the call itself ran out of time
                     raise BackendError(f"the workers cannot answer this: {one_line(late)}") from late
-                if not cluster.threads():
-                    raise ClusterLostError(f"{cluster.lost_text()}: no worker is left") from None
+                if finished:
+                    self._fetch_s *= 2.0
+                without_s += patience_s
+                if without_s >= _LOOK_EVERY_S:
+                    without_s = 0.0
+                    if not cluster.threads():
+                        raise ClusterLostError(f"{cluster.lost_text()}: no worker is left") from None
             except BoulderSweepError:
                 raise
             except Exception as problem:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import queue
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.assembly import Assembly
-from boulder_sweep.runner.backends import DASK
+from boulder_sweep.runner.backends import DASK, start_failure
 from boulder_sweep.runner.cluster import Cluster, ClusterWorkers
 from boulder_sweep.runner.commands import repeat_command
 from boulder_sweep.runner.committer import Committer
@@ -101,8 +103,8 @@ class Run:
         if progress is not None and self._cluster is not None and self._cluster.dashboard:
             self.notes.append(f"dashboard of the cluster: {self._cluster.dashboard}")
         committer = Committer(self._folder, computation, admission, tuple if workers is None else workers.flush)
-        committer.start()
         try:
+            committer.start()
             if workers is None:
                 committer.finish()
             else:
@@ -112,13 +114,16 @@ class Run:
             patience = _PATIENCE_S if isinstance(stop, KeyboardInterrupt) else _PATIENCE_AFTER_PROBLEM_S
             if workers is not None:
                 workers.stop()
-                workers.join(patience / 3)
+                _join(workers, patience / 3)
                 while not workers.messages.empty():  # parts written meanwhile
                     message = workers.messages.get()
                     if isinstance(message, StagedPart):
                         committer.put(message)
             committer.stop()
-            committer.join(patience)
+            _join(committer, patience)
+            without_workers = isinstance(stop, BackendError) and not isinstance(stop, ClusterLostError)
+            if without_workers or start_failure(stop, self.jobs):
+                self._folder.discard()  # unless something was written, there is nothing to resume
             raise
 
     def end(self, how: str) -> int:
@@ -205,3 +210,9 @@ class Run:
             committer.finish()
             return True
         return False
+
+
+def _join(thread: threading.Thread, patience_s: float) -> None:
+    """Wait for a thread, which may not have been started."""
+    if thread.ident is not None:
+        thread.join(patience_s)

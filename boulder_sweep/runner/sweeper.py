@@ -11,13 +11,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.errors import ClusterLostError, ComputationError, Interrupted
+from boulder_sweep.errors import BoulderSweepError, ClusterLostError, ComputationError, Interrupted
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
-from boulder_sweep.runner.backends import available_cores, check_backend, check_count, check_jobs
+from boulder_sweep.runner.backends import available_cores, check_backend, check_count, check_jobs, start_failure
 from boulder_sweep.runner.commands import repeat_command
 from boulder_sweep.runner.commands import resume_command as default_resume_command
 from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample
@@ -150,6 +150,8 @@ def run(
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
         except BaseException as problem:
             ended(f"stopped by {type(problem).__name__}: {problem}")
+            if not isinstance(problem, BoulderSweepError) and (failure := start_failure(problem, jobs)):
+                raise failure from problem
             raise
         whole.end("finished")
     return summary_of(

@@ -44,6 +44,8 @@ class RunStatus:
         Settings, versions and hashes that all rows share.
     resume_command
         The command that resumes the run in this folder, which may have been moved; None if it is complete.
+    settings_missing
+        The settings file that `resume_command` names, if there is none of this name.
     """
 
     out: str
@@ -59,6 +61,7 @@ class RunStatus:
     resume_command: str | None
     sessions: list[Session] = field(repr=False)
     identity: dict[str, Any] = field(repr=False)
+    settings_missing: str | None = None
 
     @property
     def complete(self) -> bool:
@@ -102,6 +105,9 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         else:
             missing.append((start, stop))
     done = manifest.rows_done
+    command, settings_missing = None, None
+    if done != manifest.rows:
+        command, settings_missing = _into(out, manifest.resume_command)
     return RunStatus(
         out=str(folder),
         rows=manifest.rows,
@@ -113,17 +119,43 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         missing=missing,
         verdicts=manifest.verdicts,
         bytes=sum(part.bytes for part in manifest.parts.values()),
-        resume_command=None if done == manifest.rows else _into(out, manifest.resume_command),
+        resume_command=command,
+        settings_missing=settings_missing,
         sessions=manifest.sessions,
         identity=manifest.identity,
     )
 
 
-def _into(out: str | Path, command: str) -> str:
-    """Return the command that resumes a run, into the folder as it is named now."""
-    if not command.startswith("sweep run "):
-        return command
-    words = shlex.split(command)
-    if words[3:4] != ["-o"]:
-        return command
-    return shlex.join([*words[:4], str(out), *words[5:]])
+def _into(out: str | Path, command: str) -> tuple[str, str | None]:
+    """Return the command that resumes a run, as things are named now, and its settings file if there is none."""
+    if command.startswith("boulder_sweep.run(sweep, "):
+        return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)", None
+    words = shlex.split(command) if command.startswith("sweep run ") else []
+    if len(words) < 5 or words[3] != "-o":
+        return command, None
+    settings = _moved_with(out, words[2], words[4])
+    here = shlex.join([*words[:2], settings, "-o", str(out), *words[5:]])
+    return here, None if _exists(Path(settings)) else settings
+
+
+def _moved_with(out: str | Path, settings: str, recorded_out: str) -> str:
+    """Return the path of a settings file, by its place relative to the folder if there is one now."""
+    now, then = place_of(out), place_of(recorded_out)
+    if not isinstance(now, Path) or not isinstance(then, Path) or then.is_absolute() or Path(settings).is_absolute():
+        return settings
+    levels, folders, whole = len(then.parts), then.parts[:-1], now.resolve()
+    above = whole.parent.parts
+    if ".." in then.parts or above[len(above) - len(folders) :] != folders:
+        return settings
+    # The directory that the run was started in, by its present name.
+    parts = now.parts if ".." not in now.parts and len(now.parts) >= levels else whole.parts
+    start = Path(*parts[: len(parts) - levels])
+    return str(start / settings) if _exists(start / settings) else settings
+
+
+def _exists(file: Path) -> bool:
+    """Whether there is a file of this name; none where nobody may look."""
+    try:
+        return file.exists()
+    except OSError:
+        return False

@@ -25,7 +25,7 @@ def check_target(target: Place, refusal: type[BoulderSweepError]) -> None:
     Raises
     ------
     BoulderSweepError
-        Its folder does not exist or holds the result of a run, or a folder has its name.
+        Its folder does not exist, cannot be written or holds the result of a run, or a folder has its name.
     """
     if not isinstance(target, Path):
         with suppress(OSError):  # a store that does not answer, or lets nobody read: writing will tell
@@ -37,6 +37,8 @@ def check_target(target: Place, refusal: type[BoulderSweepError]) -> None:
     _check_no_result(target, folder, refusal)
     if target.is_dir():
         raise refusal(f"{target} cannot be written: {os.strerror(errno.EISDIR)}")
+    if not target.exists() and not os.access(folder, os.W_OK | os.X_OK):
+        raise refusal(f"{target} cannot be written: {os.strerror(errno.EACCES)}")
 
 
 def _check_no_result(target: Place, folder: Place, refusal: type[BoulderSweepError]) -> None:

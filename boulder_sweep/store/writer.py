@@ -214,6 +214,7 @@ class OutputFolder:
             self.close("refused")
             return
         self._open = False
+        self._remove_staged()
         with suppress(OSError):
             self._storage.discard_manifest()
         self._lock.release()

@@ -1,6 +1,8 @@
 """``sweep simulate`` and ``sweep status`` from the command line."""
 
 import json
+import os
+import shlex
 from pathlib import Path
 
 import pytest
@@ -102,6 +104,46 @@ def test_a_time_history_is_not_written_under_the_name_of_another_format(sweep, g
     assert not (grid.parent / "history.csv").exists()
 
 
+@pytest.fixture
+def nothing_simulated(monkeypatch):
+    monkeypatch.setattr("boulder_sweep.impact.simulation.simulate", lambda *_, **__: pytest.fail("simulated"))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("history.csv",), "history.csv: a time history is a Parquet file; its name must end in .parquet"),
+        (("no/history.parquet",), "no/history.parquet: the folder {here}/no does not exist"),
+        (("folder.parquet",), "folder.parquet cannot be written: Is a directory"),
+        (("./history.parquet", "--plot", "history.parquet"), "./history.parquet is named twice; give each output a"),
+    ],
+)
+def test_a_wrong_name_of_a_time_history_is_refused_before_simulating(sweep, grid, nothing_simulated, words, message):
+    Path("folder.parquet").mkdir()
+    code, out, err = sweep("simulate", grid, "-q", "--trajectory", *words)
+    assert (code, out) == (2, "")
+    assert message.format(here=Path.cwd()) in err
+    assert sorted(path.name for path in Path().iterdir()) == ["folder.parquet", "grid.yaml"]
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_time_history_that_may_not_be_written_is_refused_before_simulating(
+    sweep, grid, nothing_simulated, monkeypatch, there
+):
+    history = Path("history.parquet")
+    if there:
+        history.write_text("of somebody else")
+    barred, access = {history if there else Path.cwd()}, os.access
+
+    def barred_to_write(path, mode):
+        return not (mode & os.W_OK and Path(path) in barred) and access(path, mode)
+
+    monkeypatch.setattr(os, "access", barred_to_write)
+    refused = (2, "", "error: history.parquet cannot be written: Permission denied\n")
+    assert sweep("simulate", grid, "-q", "--trajectory", history) == refused
+    assert history.exists() == there
+
+
 def test_status_of_a_finished_run(sweep, possible_grid):
     assert sweep("run", possible_grid, "-q")[0] == 0
     code, out, err = sweep("status", "small-grid.sweep", "--verify")
@@ -125,6 +167,72 @@ def test_status_finds_damage(sweep, possible_grid):
     assert code == 1
     assert f"damaged  {part.name}" in out
     assert "resume   sweep run grid.yaml -o small-grid.sweep --resume" in out
+
+
+def unfinished(folder):
+    """Let a finished run lack its rows."""
+    (part,) = [path for path in folder.glob("*.parquet") if not path.name.startswith("_")]
+    part.unlink()
+
+
+def resumed_by(sweep, *words):
+    """Return the command that `sweep status` gives, and what it says of it."""
+    code, out, _ = sweep("status", *words)
+    assert code == 1
+    (at, command) = next((at, line) for at, line in enumerate(out.splitlines()) if line.startswith("resume   "))
+    return command.removeprefix("resume   "), out.splitlines()[at + 1 :]
+
+
+@pytest.mark.parametrize("out", ["small-grid.sweep", "runs/first/my out.sweep"])
+def test_status_of_a_folder_moved_with_its_settings_file(sweep, possible_grid, monkeypatch, out):
+    Path("project/runs/first").mkdir(parents=True)
+    possible_grid.rename("project/grid.yaml")
+    top = Path.cwd()
+    monkeypatch.chdir("project")
+    assert sweep("run", "grid.yaml", "-q", "-o", out)[0] == 0
+    unfinished(Path(out))
+    expected = ["sweep", "run", "grid.yaml", "-o", out, "--resume"]
+    assert resumed_by(sweep, out) == (shlex.join(expected), [])
+    monkeypatch.chdir(top)
+    (top / "project").rename("elsewhere")
+    (top / "grid.yaml").write_text("of another sweep")
+    command, more = resumed_by(sweep, f"elsewhere/{out}")
+    assert shlex.split(command) == ["sweep", "run", "elsewhere/grid.yaml", "-o", f"elsewhere/{out}", "--resume"]
+    assert more == []
+    assert sweep(*shlex.split(command)[1:], "-q")[0] == 0
+    assert sweep("status", f"elsewhere/{out}")[0] == 0
+    monkeypatch.chdir(top / "elsewhere" / out)
+    unfinished(Path())
+    command, more = resumed_by(sweep, ".")
+    assert shlex.split(command)[2:5] == [str(top / "elsewhere" / "grid.yaml"), "-o", "."]
+    assert more == []
+
+
+def test_status_of_a_folder_moved_from_its_settings_file(sweep, possible_grid, monkeypatch):
+    sweep("run", possible_grid, "-q")
+    unfinished(Path("small-grid.sweep"))
+    Path("archive").mkdir()
+    Path("small-grid.sweep").rename("archive/old.sweep")
+    assert resumed_by(sweep, "archive/old.sweep") == ("sweep run grid.yaml -o archive/old.sweep --resume", [])
+    monkeypatch.chdir("archive")
+    missing = ["note     there is no grid.yaml; name the settings file where it is now"]
+    assert resumed_by(sweep, "old.sweep") == ("sweep run grid.yaml -o old.sweep --resume", missing)
+    found = json.loads(sweep("status", "old.sweep", "--json")[1])
+    assert found["settings_missing"] == "grid.yaml"
+    Path("../grid.yaml").replace("grid.yaml")
+    assert resumed_by(sweep, "old.sweep") == ("sweep run grid.yaml -o old.sweep --resume", [])
+
+
+def test_status_of_a_moved_folder_whose_settings_file_was_named_by_its_whole_path(sweep, possible_grid):
+    whole = possible_grid.resolve()
+    sweep("run", whole, "-q", "-o", whole.parent / "old.sweep")
+    unfinished(Path("old.sweep"))
+    Path("old.sweep").rename("new.sweep")
+    command = f"sweep run {whole} -o new.sweep --resume"
+    assert resumed_by(sweep, "new.sweep") == (command, [])
+    whole.rename("other.yaml")
+    missing = [f"note     there is no {whole}; name the settings file where it is now"]
+    assert resumed_by(sweep, "new.sweep") == (command, missing)
 
 
 @pytest.mark.parametrize("name", ["no.sweep", "."])

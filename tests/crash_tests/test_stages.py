@@ -73,9 +73,7 @@ def test_without_reaching_the_second_spring_it_is_the_first_alone() -> None:
     assert truck.peak_force == truck.first.peak_force
 
 
-@pytest.mark.parametrize(
-    "signals", [["velocity"], *(pytest.param(names, marks=pytest.mark.nightly) for names in (["acceleration"], NAMES))]
-)
+@pytest.mark.parametrize("signals", [["velocity"], ["acceleration"], NAMES])
 def test_a_pulse_of_the_law_gives_both_springs_back(signals: list[str]) -> None:
     known = literal(TRUCK, TIMES)
     fit = fit_stages(noisy({name: known[name] for name in signals}, 0.0), TRUCK.mass_kg)
@@ -83,7 +81,6 @@ def test_a_pulse_of_the_law_gives_both_springs_back(signals: list[str]) -> None:
     assert all(fit.misfits[name].rms < 0.01 * fit.one.misfits[name].rms for name in signals)
 
 
-@pytest.mark.nightly
 def test_with_noise_they_lie_within_their_standard_errors() -> None:
     fit = fit_stages(noisy(literal(TRUCK, TIMES), 0.01, seed=3), TRUCK.mass_kg, speed_m_s=13.4)
     assert fit.speed_error_m_s is None
@@ -94,7 +91,7 @@ def test_with_noise_they_lie_within_their_standard_errors() -> None:
     assert fit.from_error_m < 0.02
 
 
-@pytest.mark.parametrize("noise", [0.0, pytest.param(0.02, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
 @pytest.mark.parametrize("beyond", [0.9, 5.0])
 def test_a_pulse_without_a_second_stage_is_refused(noise: float, beyond: float) -> None:
     truck = StiffeningWall(6800.0, 13.4, 3103.3e3, 138.91e3, 9e6, beyond)

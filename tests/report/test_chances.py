@@ -17,6 +17,7 @@ from boulder_sweep.report.chances import ChanceFile
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from tests.answers.designs import DEFAULTS, SITE, site
+from tests.conftest import Command
 
 UNCERTAIN = {"friction": "{mean: [36, 40] deg, cov: 5 %}", "height": "[3.0, 3.6] m", "site": "embedment_depth: 2.2 m"}
 
@@ -105,13 +106,17 @@ def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
 )
 @pytest.mark.parametrize("kind", ["grid", "list"])
 def test_a_file_with_rows_removed_or_moved_is_refused(
-    kind: str, chances: Path, of_a_list: Path, tmp_path: Path, kept: Any
+    kind: str, chances: Path, of_a_list: Path, tmp_path: Path, kept: Any, sweep: Command
 ) -> None:
     table = pq.read_table({"grid": chances, "list": of_a_list}[kind])
     assert len(table) > 1
     pq.write_table(kept(table), tmp_path / "other.parquet")
     with pytest.raises(ReportError, match=rf"does not hold the rows of its {len(table)} designs in"):
         write_report(tmp_path / "other.parquet", tmp_path / "page.html")
+    code, out, err = sweep("report", tmp_path / "other.parquet")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: {tmp_path / 'other.parquet'} does not hold the rows of its {len(table)} designs in")
+    assert not list(tmp_path.glob("*.html"))
 
 
 def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> None:

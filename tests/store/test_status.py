@@ -89,7 +89,7 @@ def test_no_result(tmp_path):
     [
         ("sweep run 'my grid.yaml' -o out --jobs 2 --resume", "sweep run 'my grid.yaml' -o '{}' --jobs 2 --resume"),
         ("sweep run x.yaml --resume", "sweep run x.yaml --resume"),
-        ("boulder_sweep.run(sweep, 'out', resume=True)", "boulder_sweep.run(sweep, 'out', resume=True)"),
+        ("boulder_sweep.run(sweep, 'out', resume=True)", "boulder_sweep.run(sweep, '{}', resume=True)"),
     ],
 )
 def test_a_moved_folder_is_resumed_where_it_is_now(tmp_path, command, expected):
