@@ -46,7 +46,6 @@ def test_the_same_seed_gives_the_same() -> None:
     assert one.estimate[0] == two.estimate[0] != other.estimate[0]
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("edge", [0.4, 2.0])
 def test_stated_intervals_hold_at_their_rate(edge: float) -> None:
     held = 0
@@ -170,7 +169,6 @@ def test_what_always_happens_is_certain() -> None:
     assert subset_simulation(lambda row, z: -np.ones(len(z)), 1, 2, seed=0, points=100).estimate[0] == 1.0
 
 
-@pytest.mark.nightly
 def test_intervals_of_small_probabilities_hold_at_their_rate() -> None:
     held, found = 0, []
     for seed in range(200):

@@ -21,14 +21,12 @@ def test_need_on_a_cluster():
     assert need(sweep, **DASK).arrow.equals(need(sweep).arrow)
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("asked", [{"least": "mass"}, {"probability": 0.95}])
+@pytest.mark.parametrize("asked", [{"least": "mass"}, pytest.param({"probability": 0.95}, marks=pytest.mark.nightly)])
 def test_need_of_other_kinds_on_a_cluster(asked):
     sweep = load(CONFIGS / ("uncertain_site.yaml" if "probability" in asked else "site.yaml"))
     assert need(sweep, **asked, **DASK).arrow.equals(need(sweep, **asked).arrow)
 
 
-@pytest.mark.nightly
 def test_uncertainty_on_a_cluster():
     sweep = load(CONFIGS / "uncertain_site.yaml")
     here, there = uncertainty(sweep, half_width=0.05), uncertainty(sweep, half_width=0.05, **DASK)

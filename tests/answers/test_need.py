@@ -263,7 +263,6 @@ def random_bounds(rng: np.random.Generator) -> tuple[dict[str, tuple[float, floa
     return bounds, changes | {"friction": f"{rng.uniform(34, 44):.1f} deg"}
 
 
-@pytest.mark.nightly
 def test_no_boulder_among_many_is_lighter_than_the_lightest() -> None:
     rng = np.random.default_rng(4)
     for _ in range(8):

@@ -53,7 +53,6 @@ def test_shallow_boulders_that_slide_are_found_as_well() -> None:
     assert fewer < every
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("between", [None, SHALLOW])
 @pytest.mark.parametrize("readings", ["corrected", "as_printed"])
 def test_the_same_for_many_designs_and_both_readings(readings: str, between: Ends) -> None:

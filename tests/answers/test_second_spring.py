@@ -6,11 +6,9 @@ from boulder_sweep import load, need, uncertainty
 from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.errors import QuestionError
 
-nightly = pytest.mark.nightly  # compiles kernels of its own
 STAGES = "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.5 m, stiffness: %s}]"
 
 
-@nightly
 def test_the_least_depth_depends_on_it() -> None:
     alone = need(load("configs/rwg.yaml"))
     stiff = need(load("configs/rwg.yaml", [STAGES % "9 MN/m"]))
@@ -18,7 +16,6 @@ def test_the_least_depth_depends_on_it() -> None:
     assert stiff.frame.vehicle_second_spring_N_m[0] == 9e6
 
 
-@nightly
 def test_it_may_be_uncertain_and_what_decides() -> None:
     spread = ["vehicle.second_spring={distribution: uniform, low: 3.2 MN/m, high: 30 MN/m}", "vehicle.speed=14.9 m/s"]
     found = uncertainty(load("configs/rwg.yaml", [STAGES % "9 MN/m", "site.embedment_depth=1.75 m", *spread]))
@@ -29,7 +26,6 @@ def test_it_may_be_uncertain_and_what_decides() -> None:
     assert uncertainty(fixed).frame.vehicle_second_spring_N_m[0] == 9e6
 
 
-@nightly
 def test_it_is_shown_where_it_varies() -> None:
     front = ["vehicle.second_spring=[4000 kN/m, 20000 kN/m]", "vehicle.second_spring_from=[0.2, 0.3] m"]
     lines = need_lines(need(load("configs/rwg.yaml", front), both_readings=False))
@@ -38,7 +34,6 @@ def test_it_is_shown_where_it_varies() -> None:
     assert shown == [["4e+06", "0.2"], ["4e+06", "0.3"], ["2e+07", "0.2"], ["2e+07", "0.3"]]
 
 
-@nightly
 @pytest.mark.parametrize(
     ("question", "low", "high"),
     [

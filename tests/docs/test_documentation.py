@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep import load
-from docs.studies import stamps
 from docs.studies.__main__ import PULSE, main
-from docs.studies.contents import CONTENTS, EVERY, GRID, compute, readings_of_grid
+from docs.studies.contents import CONTENTS, EVERY, GRID, readings_of_grid
 from docs.studies.documents import blocks, pages
-from docs.studies.drift import drift
 from docs.studies.energy import AUDIT_DESIGNS
 from docs.studies.example_pulse import NOISE_G, NOISE_MM, example_pulse
 from docs.studies.extremes import box_shares_table, is_left_open
@@ -27,25 +25,6 @@ MOST_BYTES = 200_000
 
 def page(name: str) -> str:
     return (DOCS / name).read_text(encoding="utf-8")
-
-
-def drift_of(name: str) -> list[str]:
-    """Compute a block; write it anew with ``python -m docs.studies --write NAME``."""
-    (written,) = [block.text for block in blocks(ROOT) if block.name == name]
-    return drift(written, compute(ROOT, [name])[name])
-
-
-@pytest.mark.parametrize("name", CONTENTS)
-def test_a_number_has_not_drifted_where_its_sources_changed(name: str) -> None:
-    """A block whose sources are those that it was last checked with is not computed again."""
-    if stamps.read(ROOT).get(name) != stamps.stamp(ROOT, CONTENTS[name]):
-        assert drift_of(name) == []
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", CONTENTS)
-def test_no_number_has_drifted(name: str) -> None:
-    assert drift_of(name) == []
 
 
 @pytest.mark.nightly
@@ -146,7 +125,7 @@ def test_command_prints_blocks(capsys: pytest.CaptureFixture[str], monkeypatch: 
 
 
 def test_command_writes_single_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shutil.copytree(DOCS, tmp_path / "docs", ignore=shutil.ignore_patterns("images", "studies", "__pycache__"))
+    shutil.copytree(DOCS, tmp_path / "docs", ignore=shutil.ignore_patterns("images", "__pycache__"))
     monkeypatch.chdir(tmp_path)
     file = tmp_path / "docs" / "validation.md"
     whole = file.read_text(encoding="utf-8")

@@ -79,7 +79,6 @@ def test_slope_is_coulombs_weakest_wedge(slope_deg: float) -> None:
     assert slope_factor(np.radians([40.0]), radians(20.0))[0] == pytest.approx(0.4787, abs=1e-4)
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("law", list(LAWS))
 @pytest.mark.parametrize("ground", [Ground(slope_deg=15.0), Ground(water_table_m=0.0), Ground((), 0.0, 0.0, 8.0)])
 def test_what_is_proportional_to_depth_is_a_factor(law: str, ground: Ground) -> None:
@@ -120,7 +119,6 @@ def test_settings_become_layers() -> None:
     )
 
 
-@pytest.mark.nightly
 def test_run_simulate_and_explain_agree(tmp_path) -> None:
     """To the last bit, by layers and by elements; and the energy of the truck is all accounted for."""
     for name, more in (("layers", ()), ("elements", ("model.soil={elements: 60}",))):

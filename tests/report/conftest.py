@@ -4,6 +4,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.report import write_report
+from tests.waiting import HANG_GUARD_S, wait_until
 
 GRID = """\
 name: sizing
@@ -52,13 +53,26 @@ class Opened:
     def __init__(self, browser, file, **options):
         self.context = browser.new_context(accept_downloads=True, **options)
         self.tab = self.context.new_page()
+        self.tab.set_default_timeout(1000 * HANG_GUARD_S)  # hang guard
         self.complaints, self.requests, self.dialogs = [], [], []
         self.tab.on("console", lambda message: self._heard(message))
         self.tab.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.tab.on("request", lambda request: self.requests.append(request.url))
         self.tab.on("dialog", lambda dialog: (self.dialogs.append(dialog.message), dialog.dismiss()))
         self.tab.goto(file.resolve().as_uri())
-        self.tab.wait_for_selector("html[data-ready]", state="attached", timeout=60_000)
+        self.tab.wait_for_selector("html[data-ready]", state="attached")
+
+    def wait_until_it_is_true(self, expression):
+        """Evaluate an expression again and again; the page itself may not, by its content security policy."""
+        wait_until(lambda: self.tab.evaluate(expression), expression)
+
+    def wait_for_frames(self, number):
+        """Wait until the page was drawn so many times more."""
+        self.tab.evaluate(
+            "(number) => new Promise((done) => {"
+            " const next = () => (number-- > 0 ? requestAnimationFrame(next) : done()); next(); })",
+            number,
+        )
 
     def _heard(self, message):
         if message.type in ("error", "warning"):

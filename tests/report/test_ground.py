@@ -10,7 +10,6 @@ from boulder_sweep.report import write_explorer, write_report
 from boulder_sweep.settings.model import RESISTANCES
 from tests.judge.test_ground import IN_FILE
 
-pytestmark = pytest.mark.nightly  # compiles kernels of its own
 LAYERS, COHESION, WATER, SLOPE = IN_FILE
 SOILS = {
     "layers": (LAYERS,),

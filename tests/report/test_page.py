@@ -13,8 +13,6 @@ from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.views.wording import LAW_WORDS
 from tests.report.conftest import GRID, SETS
 
-pytestmark = pytest.mark.nightly  # these need Chromium, which not every machine has
-
 DESIGNS = 200
 SLIDERS = {
     "boulder_length_m": (0.6, 2.0),
@@ -343,6 +341,6 @@ def test_the_energy_follows_when_the_reader_pauses(explorer, opened):
     energies = "page.plots.find('live-energies').data.vehicle_kinetic[0]"
     before = page.evaluate(energies)
     assert page.evaluate(f"(() => {{ page.take({{ impact_speed_m_s: 9.0 }}); return {energies}; }})()") == before
-    page.wait_for_timeout(1000)
+    page.wait_until_it_is_true(f"{energies} !== {before}")
     assert page.evaluate(energies) == pytest.approx(page.evaluate(KINETIC) / 1000)
     assert page.evaluate("page.plots.find('live-motion').data.force.length === page.motions.live.motion.time.length")

@@ -7,8 +7,6 @@ from boulder_sweep.report import write_report
 from boulder_sweep.settings import load_text
 from tests.report.conftest import LIST
 
-pytestmark = pytest.mark.nightly  # these need Chromium, which not every machine has
-
 SITE = """\
 name: site
 boulder: {length: 1.65 m, width: 1.68 m, height: 3.4 m, density: 2600 kg/m^3}
@@ -129,21 +127,34 @@ def test_leaving_a_box_shows_what_is_simulated(report, opened):
     assert page.inner_text("#limited-boulder_height_m").startswith("limited to 0.03281 to 65.62\u00a0ft: ")
 
 
+OWN_CLOCK = """(() => {
+    const draw = window.requestAnimationFrame.bind(window);
+    window.milliseconds = 0;
+    performance.now = () => window.milliseconds;
+    window.requestAnimationFrame = (next) => draw(() => next(window.milliseconds));
+})()"""
+
+
 def test_one_player_that_pauses(report, opened):
     page = opened(report)
+    page.evaluate(OWN_CLOCK)
     play, time = "#live-play", "page.players.live"
     page.click(play)
     assert page.inner_text(play) == "Pause"
-    page.wait_for_timeout(300)
+    page.evaluate("window.milliseconds = 300")
+    page.wait_until_it_is_true(f"{time}.slider.value > 0")
     page.click(play)
     assert page.inner_text(play) == "Play"
     paused = int(page.input_value("#live-time"))
-    assert paused > 0
-    page.wait_for_timeout(200)
+    assert 0 < paused < int(page.get_attribute("#live-time", "max"))
+    page.evaluate("window.milliseconds = 500")
+    page.wait_for_frames(3)
     assert int(page.input_value("#live-time")) == paused
     page.click(play)
-    page.wait_for_timeout(100)
-    assert int(page.input_value("#live-time")) >= paused  # it goes on from there
+    page.wait_for_frames(3)
+    assert int(page.input_value("#live-time")) == paused  # it goes on from there
+    page.evaluate("window.milliseconds = 600")
+    page.wait_until_it_is_true(f"{time}.slider.value > {paused}")
     page.focus("#live-time")
     page.keyboard.press("Home")
     assert page.inner_text(play) == "Play"
@@ -154,7 +165,8 @@ def test_one_player_that_pauses(report, opened):
     assert page.inner_text(play) == "Play"
     page.evaluate(f"{time}.slider.value = {time}.slider.max - 2, {time}.left = true")
     page.click(play)
-    page.wait_for_function(f"{time}.frame === 0")
+    page.evaluate("window.milliseconds += 100_000")
+    page.wait_until_it_is_true(f"{time}.frame === 0")
     assert page.input_value("#live-time") == page.get_attribute("#live-time", "max")
     assert page.complaints == []
 
@@ -170,7 +182,8 @@ def test_the_colours_of_legends_are_printed(report, opened):
 @pytest.mark.parametrize(("width", "below"), [(390, True), (1280, False)])
 def test_on_a_phone_legends_are_below_their_figures(report, opened, width, below):
     page = opened(report, viewport={"width": width, "height": 844})
-    page.wait_for_timeout(300)
+    page.wait_until_it_is_true("Bokeh.documents.every((one) => one.is_idle)")
+    page.wait_for_frames(10)
     frame = page.evaluate(
         "(() => { const plot = Bokeh.index.find_one_by_id(page.plots.find('live-energy').id);"
         " return [plot.frame.bbox.width, plot.frame.bbox.height]; })()"

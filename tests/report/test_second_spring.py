@@ -6,7 +6,6 @@ import pytest
 import boulder_sweep
 from boulder_sweep.report import write_explorer, write_report
 
-pytestmark = pytest.mark.nightly  # compiles kernels of its own
 STAGES = "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.4 m, stiffness: 9 MN/m}]"
 
 
