@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from boulder_sweep.judge.judged import Judged
@@ -29,15 +29,23 @@ class Assembly:
         Ranges of missing rows [start, stop), none across two parts.
     commit_every_s
         See `COMMIT_EVERY_S`.
+    clock
+        Gives the time [s].
     """
 
-    def __init__(self, ranges: Iterator[tuple[int, int]], commit_every_s: float = COMMIT_EVERY_S):
+    def __init__(
+        self,
+        ranges: Iterator[tuple[int, int]],
+        commit_every_s: float = COMMIT_EVERY_S,
+        clock: Callable[[], float] = time.monotonic,
+    ):
         self._ranges = ranges
+        self._clock = clock
         self._commit_every_s = commit_every_s
         self._lock = threading.Lock()
         self._waiting: dict[int, Judged] = {}
         self._pieces: list[Judged] = []
-        self._issued_at = time.monotonic()
+        self._issued_at = clock()
         self._from_row = self._to_row = self._last_row = -1
         self._open_next()
 
@@ -52,7 +60,7 @@ class Assembly:
                 if self._to_row == self._last_row:
                     ready += self._issue()
                     self._open_next()
-            if time.monotonic() - self._issued_at > self._commit_every_s:
+            if self._clock() - self._issued_at > self._commit_every_s:
                 ready += self._issue()
             return ready
 
@@ -66,7 +74,7 @@ class Assembly:
         if not self._pieces:
             return []
         part = ReadyPart(self._from_row, self._pieces)
-        self._issued_at = time.monotonic()
+        self._issued_at = self._clock()
         self._pieces = []
         self._from_row = self._to_row
         return [part]

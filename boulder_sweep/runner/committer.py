@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -32,6 +33,8 @@ class Committer(threading.Thread):
         Is told which rows are staged, and so no longer in memory.
     flush
         Stages the rows that are ready when the run is stopped.
+    clock, work_clock
+        Give the time, and the processor time of the calling thread [s].
     """
 
     def __init__(
@@ -40,6 +43,8 @@ class Committer(threading.Thread):
         computation: Computation,
         admission: Admission,
         flush: Callable[[], Iterable[StagedPart]],
+        clock: Callable[[], float] = time.monotonic,
+        work_clock: Callable[[], float] = time.thread_time,
     ):
         super().__init__(name="committer", daemon=True)
         self.problem: BaseException | None = None
@@ -47,13 +52,15 @@ class Committer(threading.Thread):
         self._computation = computation
         self._admission = admission
         self._flush = flush
+        self._clock = clock
+        self._work_clock = work_clock
         self._arrived: queue.SimpleQueue[StagedPart | None] = queue.SimpleQueue()
         self._waiting: dict[int, StagedPart] = {}
         self._missing = folder.manifest.missing()
         self._next = self._end = -1
         self._open_next()
         self._stopped = threading.Event()
-        self._rest_until = 0.0
+        self._rest_until = -math.inf
 
     def put(self, staged: StagedPart) -> None:
         """Hand over a staged part; never waits."""
@@ -89,13 +96,13 @@ class Committer(threading.Thread):
         next manifest.
         """
         while True:
-            due = self._rest_until - time.monotonic()
+            due = self._rest_until - self._clock()
             try:
                 return self._arrived.get(timeout=max(due, 0.0) if self._next in self._waiting else None)
             except queue.Empty:
-                begun = time.thread_time()
+                begun = self._work_clock()
                 self._commit()
-                self._rest_until = time.monotonic() + (time.thread_time() - begun) / COMMIT_SHARE
+                self._rest_until = self._clock() + (self._work_clock() - begun) / COMMIT_SHARE
 
     def _commit(self) -> None:
         """Commit the parts that continue the table."""

@@ -122,6 +122,7 @@ def take_sample(
     make_block: Callable[[int, int], DesignBlock],
     rows: int,
     metadata: Mapping[bytes, bytes],
+    work_clock: Callable[[], float] = time.thread_time,
 ) -> Sample:
     """Compute a few rows spread over the table and measure the time; the kernels must be warm.
 
@@ -137,6 +138,8 @@ def take_sample(
         Rows of the whole table.
     metadata
         For the metadata of a part.
+    work_clock
+        Gives the processor time of the calling thread [s].
     """
     import pyarrow as pa  # heavy, and only runs need it
 
@@ -147,13 +150,13 @@ def take_sample(
     def computed(place: float, size: int) -> tuple[float, pa.Table | None]:
         """Compute some rows at a place between 0 and 1 of the table; return the time and what would be written."""
         start = int(place * (rows - size))
-        begun = time.thread_time()
+        begun = work_clock()
         try:
             block = make_block(start, start + size)
             judged = evaluation(block)
         except Exception:  # the run itself will retry and name the rows
             return 0.0, None
-        return time.thread_time() - begun, part_table(block, judged, metadata)
+        return work_clock() - begun, part_table(block, judged, metadata)
 
     tried = 0.0
     per_row: dict[int, float] = {}

@@ -6,15 +6,19 @@ import re
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+
+from tests.waiting import HANG_GUARD_S
 
 COMMAND = [sys.executable, "-m", "boulder_sweep"]
 
 
-def _on_a_terminal(words, command=COMMAND, **environment):
-    """Run a command with a terminal as stderr; return exit code, stdout and what the terminal received."""
+def _on_a_terminal(words, command=COMMAND, watch=lambda received: None, **environment):
+    """Run a command with a terminal as stderr; return exit code, stdout and what the terminal received.
+
+    What it has received is passed to `watch` whenever there is more.
+    """
     ours, theirs = pty.openpty()
     env = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
     env |= {"TERM": "xterm-256color", "COLUMNS": "120"} | environment
@@ -29,6 +33,7 @@ def _on_a_terminal(words, command=COMMAND, **environment):
         if not data:
             break
         received += data
+        watch(received.decode(errors="replace"))
     os.close(ours)
     out, _ = process.communicate()
     return process.returncode, out, received.decode()
@@ -47,17 +52,37 @@ def test_a_terminal_gets_a_bar_with_the_time_left(possible_grid):
     assert re.search(r"\x1b\[[0-9;]*38;5", shown)
 
 
+COLD_START = """
+import sys
+from pathlib import Path
+from boulder_sweep.cli import main, progress
+from boulder_sweep.judge.evaluation import Evaluation
+from tests.waiting import wait_until
+enough = Path(sys.argv[1])
+progress.cold_start = lambda kernels: "compiling kernels, once on this machine, about 2 s"
+progress._remember = lambda *_: None
+Evaluation.warm_up = lambda self: wait_until(enough.exists, "the bar has moved")
+main.main(sys.argv[2:])
+"""
+
+
 def test_a_cold_start_shows_a_bar_with_what_it_waits_for(possible_grid, tmp_path):
     """The words stand beside a bar that moves while the kernels compile, and give way to those of the work."""
-    code = (
-        "import sys, time; from boulder_sweep.cli import main, progress; import boulder_sweep.judge.evaluation as e;"
-        "progress.cold_start = lambda kernels: 'compiling kernels, once on this machine, about 2 s';"
-        "e.Evaluation.warm_up = lambda self: time.sleep(1.0); progress._remember = lambda *_: None;"
-        "main.main(sys.argv[1:])"
+    enough = tmp_path / "enough"
+
+    def watch(shown):
+        pictures = re.findall(r"compiling kernels, once on this machine, about 2 s.*?\x1b\[2K", shown, re.S)
+        if len(set(pictures)) >= 3:
+            enough.touch()
+
+    ended, _, shown = _on_a_terminal(
+        ["run", "grid.yaml", *GRID_OF_THOUSANDS],
+        command=[sys.executable, "-c", COLD_START, str(enough)],
+        watch=watch,
+        PYTHONPATH=os.pathsep.join(sys.path),
     )
-    ended, _, shown = _on_a_terminal(["run", "grid.yaml", *GRID_OF_THOUSANDS], command=[sys.executable, "-c", code])
     assert ended == 0
-    assert len(set(re.findall(r"compiling kernels, once on this machine, about 2 s.*?\x1b\[2K", shown, re.S))) >= 3
+    assert enough.exists()
     assert "simulating" in shown
 
 
@@ -83,17 +108,23 @@ def test_a_reader_that_goes_away_is_no_error(grid, words):
     assert done.stderr == ""
 
 
+TALKATIVE = """
+import sys
+from boulder_sweep.cli import main, progress
+progress.PLAIN_EVERY_S = -1.0
+main.main(sys.argv[1:])
+"""
+
+
 @pytest.mark.faults
 @pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_signals_end_a_run_with_their_code_and_the_command_to_go_on(possible_grid, signum, code):
     words = ["run", "grid.yaml", "--set", "boulder.length={from: 1 m, to: 2 m, count: 1000000}"]
-    process = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
-    while not list(possible_grid.parent.glob("small-grid.sweep/*")) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(1.0)
+    command = [sys.executable, "-c", TALKATIVE, *words]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert any(re.search(r"[1-9][\d,]* of 18,000,000 designs", line) for line in process.stderr)
     process.send_signal(signum)
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=HANG_GUARD_S)  # hang guard
     assert process.returncode == code
     assert out == ""
     assert "Traceback" not in err

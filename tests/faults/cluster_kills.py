@@ -1,4 +1,4 @@
-"""Kill workers and schedulers of Dask clusters at random instants, and resume what ended.
+"""Kill workers and schedulers of Dask clusters after random numbers of rows, and resume what ended.
 
 Prints one JSON object: kills, tables finished, and what was wrong. Run from the root of the repository as
 ``python -m tests.faults.cluster_kills FOLDER WORKER_KILLS SCHEDULER_KILLS SEED``.
@@ -6,41 +6,42 @@ Prints one JSON object: kills, tables finished, and what was wrong. Run from the
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import random
 import sys
-import threading
-import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from boulder_sweep.errors import ClusterLostError
+from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.sweeper import Progress, run
 from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
 from tests.faults.clusters import Cluster
 from tests.faults.faulty import slowly
 from tests.runner.grids import grid_of, same_bits
+from tests.waiting import HANG_GUARD_S
 
 ROWS, ROWS_PER_PART = 40_000, 6_000
-LONGEST_STANDSTILL_S = 15.0
 
 
 class Watch:
-    """Sees how long a run stands still without a word."""
+    """Kills something once when a run has done some rows; ends this process if a run stands still without a word."""
 
-    def __init__(self) -> None:
-        self.longest_s = 0.0
-        self.under_way = threading.Event()
-        self._last = time.monotonic()
+    def __init__(self, kill: Callable[[], None], rows: int):
+        self._kill, self._rows = kill, rows
+        self._killed = False
         self._seen: tuple[int, int] = (-1, -1)
 
     def __call__(self, progress: Progress) -> None:
         seen = (progress.rows_done, len(progress.notes))
         if seen != self._seen:
-            self._seen, self._last = seen, time.monotonic()
-        self.longest_s = max(self.longest_s, time.monotonic() - self._last)
-        self.under_way.set()
+            self._seen = seen
+            faulthandler.dump_traceback_later(HANG_GUARD_S, exit=True)  # hang guard
+        if not self._killed and progress.rows_done >= self._rows:
+            self._killed = True
+            self._kill()
 
 
 def one_run(out: Path, address: str, watch: Watch, faults: list[str]) -> bool:
@@ -60,25 +61,12 @@ def one_run(out: Path, address: str, watch: Watch, faults: list[str]) -> bool:
         if "rows are safe. Resume with: " not in str(lost):
             faults.append(f"no way to go on: {lost}")
         return False
-    finally:
-        if watch.longest_s > LONGEST_STANDSTILL_S:
-            faults.append(f"stood still for {watch.longest_s:.0f} s")
     return True
 
 
-def disturbed(out: Path, cluster: Cluster, kill: Any, wait_s: float, faults: list[str]) -> bool:
-    """Resume a run and kill something a while after it got going; True if it finished."""
-    watch = Watch()
-
-    def kill_later() -> None:
-        if watch.under_way.wait(60):
-            time.sleep(wait_s)
-            kill()
-
-    killer = threading.Thread(target=kill_later)
-    killer.start()
-    finished = one_run(out, cluster.address, watch, faults)
-    killer.join()
+def disturbed(out: Path, cluster: Cluster, kill: Callable[[], None], rows: int, faults: list[str]) -> bool:
+    """Resume a run and kill something when so many rows are done; True if it finished."""
+    finished = one_run(out, cluster.address, Watch(kill, rows), faults)
     found = status(out, verify=True)
     if found.damaged:
         faults.append(f"damaged: {found.damaged}")
@@ -103,9 +91,8 @@ def main() -> None:
     chance = random.Random(seed)
     faults: list[str] = []
     whole = folder / "whole"
-    begun = time.monotonic()
+    backend.CONNECT_S = backend.FIRST_WORKER_S = HANG_GUARD_S  # hang guard
     run(grid_of(ROWS), whole, jobs=2, rows_per_part=ROWS_PER_PART, simulate=slowly)
-    length_s = time.monotonic() - begun
     done = {"worker": 0, "scheduler": 0}
     tables = 0
     with Cluster(2, folder) as cluster:
@@ -117,7 +104,7 @@ def main() -> None:
 
         while done["worker"] < worker_kills:
             out = folder / f"workers-{tables}"
-            while not disturbed(out, cluster, kill_worker, chance.uniform(0.0, 0.8 * length_s), faults):
+            while not disturbed(out, cluster, kill_worker, chance.randrange(8 * ROWS // 10), faults):
                 pass
             check(out, whole, faults)
             tables += 1
@@ -130,7 +117,7 @@ def main() -> None:
                     cluster.kill_scheduler()
                     done["scheduler"] += 1
 
-            finished = disturbed(out, cluster, kill_scheduler, chance.uniform(0.0, 0.4 * length_s), faults)
+            finished = disturbed(out, cluster, kill_scheduler, chance.randrange(ROWS), faults)
             if finished:
                 check(out, whole, faults)
                 tables += 1

@@ -8,13 +8,11 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 from typing import Self
 
 from tests.faults.processes import ROOT
-
-_START_S = 60.0
+from tests.waiting import HANG_GUARD_S
 
 
 class Cluster:
@@ -87,12 +85,16 @@ class Cluster:
 def _wait_for(process: subprocess.Popen[str], pattern: str) -> str:
     """Wait until a line of the log matches; what comes later is read and dropped."""
     assert process.stderr is not None
-    end = time.monotonic() + _START_S
-    for line in process.stderr:
-        if re.search(pattern, line):
-            threading.Thread(target=process.stderr.read, daemon=True).start()
-            return line
-        assert time.monotonic() < end, "the cluster does not start"
+    too_long = threading.Timer(HANG_GUARD_S, process.kill)  # hang guard
+    too_long.daemon = True
+    too_long.start()
+    try:
+        for line in process.stderr:
+            if re.search(pattern, line):
+                threading.Thread(target=process.stderr.read, daemon=True).start()
+                return line
+    finally:
+        too_long.cancel()
     raise AssertionError(f"{process.args} ended")
 
 

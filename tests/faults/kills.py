@@ -1,15 +1,17 @@
-"""Kill runs with SIGKILL at random instants, again and again, and resume them.
+"""Kill runs with SIGKILL, again and again, and resume them.
 
-A third of the kills comes after a random time. The others come just before or after a change of the output folder: a
-file gets its name, is removed or flushed, as in commits, merges and the cleaning up of a resumed run.
+The kills come just before or after a change of the output folder: a file gets its name, is removed or flushed, as in
+commits, merges and the cleaning up of a resumed run. Which change is drawn with a seed. A share of the kills may come
+after a random time instead: those are not the same every time.
 
 A process that has loaded everything once forks a child for every run, so that a kill costs a fraction of a
 second. Prints one JSON object: kills, tables finished, and what was wrong. Run from the root of the repository as
-``python -m tests.faults.kills FOLDER KILLS SEED``.
+``python -m tests.faults.kills FOLDER KILLS SEED SHARE``, the last one the share after a random time.
 """
 
 from __future__ import annotations
 
+import faulthandler
 import itertools
 import json
 import os
@@ -30,10 +32,11 @@ from boulder_sweep.store import status
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import read_table
 from tests.runner.grids import grid_of, same_bits
+from tests.waiting import HANG_GUARD_S
 
 ROWS, ROWS_PER_PART = 20_000, 4_000
-LONGEST_LIFE = 0.6
-"""As a share of the time an undisturbed run takes on this machine now."""
+LONGEST_LIFE_S = 0.6
+"""Before a kill after a random time [s]; a run that is quicker is done, and another one is killed in its place."""
 CHANGES = {"link": 30, "rename": 20, "unlink": 8, "fsync": 60}
 """Calls that change a folder, and about how often a run makes them."""
 
@@ -75,6 +78,7 @@ def one_run(out: Path) -> None:
 
 def in_a_child(out: Path, life: float | Aim | None) -> bool:
     """Resume the run in a child, which is killed after a while [s] or at a call; True if it was."""
+    faulthandler.dump_traceback_later(HANG_GUARD_S, exit=True)  # hang guard
     child = os.fork()
     if child == 0:
         try:
@@ -125,20 +129,18 @@ def tally(table: pa.Table, whole: pa.Table) -> dict[str, int]:
 
 def main() -> None:
     """Kill as often as asked for and print what came of it."""
-    folder, kills, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    folder, kills, seed, by_time = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4])
     chance = random.Random(seed)
     small = grid_of(10, soil="{elements: 100}")
     evaluation_of(small, accuracy_of(small)).warm_up()
     whole_out = folder / "whole"
-    begun = time.monotonic()
     in_a_child(whole_out, None)
-    longest_life_s = LONGEST_LIFE * (time.monotonic() - begun)
     done, tables, faults = 0, [], []
     outs = []
 
     def life() -> float | Aim:
-        if chance.random() < 1 / 3:
-            return chance.uniform(0.0, longest_life_s)
+        if chance.random() < by_time:
+            return chance.uniform(0.0, LONGEST_LIFE_S)
         call = chance.choice(list(CHANGES))
         return Aim(call, chance.randint(1, CHANGES[call]), chance.random() < 0.5)
 

@@ -6,10 +6,11 @@ import json
 import os
 import subprocess
 import sys
-import time
 import uuid
 from pathlib import Path
 from typing import Any
+
+from tests.waiting import HANG_GUARD_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 _MARK = "TEST_MARK"
@@ -42,24 +43,37 @@ class Driver:
         """Send a signal to the process."""
         self.process.send_signal(number)
 
-    def end(self, timeout: float = 60.0) -> tuple[int, dict[str, Any], str]:
+    def end(self) -> tuple[int, dict[str, Any], str]:
         """Wait for the end; exit code, what was told at last, and what went to stderr."""
-        told, complaints = self.process.communicate(timeout=timeout)
+        told, complaints = self.process.communicate(timeout=HANG_GUARD_S)  # hang guard
         lines = told.splitlines()
         last = json.loads(lines[-1]) if lines and lines[-1].startswith("{") else {}
         return self.process.returncode, last, complaints
 
-    def left_behind(self, patience: float = 3.0) -> list[str]:
-        """Processes with the mark that are still alive after a while."""
-        end = time.monotonic() + patience
-        while (left := _marked(self.mark)) and time.monotonic() < end:
-            time.sleep(0.05)
-        return left
+    def wait_until_caught(self, number: int) -> None:
+        """Wait until the first signal has arrived: then the process no longer catches it."""
+        wait_until(lambda: not catches(self.process, number), f"signal {number} is caught")
+
+    def leaves_nothing_behind(self) -> None:
+        """Wait until no process with the mark is alive."""
+        wait_until(lambda: not _marked(self.mark), "no process of the run is left")
 
 
 def run_driver(out: Path, *options: str, **environment: str) -> tuple[int, dict[str, Any], str]:
     """Run a process to its end."""
     return Driver(out, *options, **environment).end()
+
+
+def catches(process: subprocess.Popen[str], number: int) -> bool:
+    """Whether a process has a handler for a signal; a process that has ended has none."""
+    if process.poll() is not None:
+        return False
+    try:
+        lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()
+    except OSError:
+        return False
+    mask = next((line.split()[1] for line in lines if line.startswith("SigCgt:")), "0")
+    return bool(int(mask, 16) >> (number - 1) & 1)
 
 
 def _marked(mark: str) -> list[str]:

@@ -6,6 +6,7 @@ import pytest
 
 from boulder_sweep.errors import ClusterLostError
 from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import load
 from boulder_sweep.store import status
@@ -15,6 +16,7 @@ from tests.faults.clusters import Cluster
 from tests.faults.processes import ROOT
 from tests.faults.s3_server import BUCKET, SECRET, S3Server
 from tests.runner.grids import same_bits
+from tests.waiting import HANG_GUARD_S
 
 pytestmark = [pytest.mark.faults, pytest.mark.nightly]
 
@@ -24,6 +26,8 @@ WORKER_DIES_AT, SCHEDULER_DIES_AT = 0.25, 0.55
 
 def test_a_table_on_a_store_is_the_local_one_though_a_worker_and_the_scheduler_are_killed(tmp_path, monkeypatch):
     sweep = load(ROOT / "configs" / "m30_sizing.yaml", ["boulder.width={from: 1.2 m, to: 2.4 m, count: 80}"])
+    monkeypatch.setattr(backend, "CONNECT_S", HANG_GUARD_S)  # hang guard
+    monkeypatch.setattr(backend, "FIRST_WORKER_S", HANG_GUARD_S)  # hang guard
     rows, out, kills = sweep.n_designs, f"s3://{BUCKET}/runs/m30.sweep", []
     run(sweep, tmp_path / "whole")
     with S3Server() as server:

@@ -12,6 +12,7 @@ import pytest
 
 import boulder_kernels
 from boulder_kernels import _jit
+from tests.waiting import HANG_GUARD_S
 
 SOURCES = sorted(Path(boulder_kernels.__file__).parent.glob("*.py"))
 ALLOWED = {"numpy", "numba", "llvmlite"}  # llvmlite is a part of Numba
@@ -231,22 +232,34 @@ def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
 
 
 SAVED = """
-import sys, time
+import fcntl, sys, time
 from pathlib import Path
 from numba.core.caching import IndexDataCacheFile
 from boulder_kernels import _jit
 
+def meet(*, word, other_words):
+    Path(sys.argv[1] + word).touch()
+    for _ in range(60_000):  # hang guard
+        if any(Path(sys.argv[2] + other).exists() for other in other_words):
+            return
+        time.sleep(0.01)
+
 def at_once(save):
     def announced(*arguments):
-        Path(sys.argv[1]).touch()
-        while sys.argv[2:] and not Path(sys.argv[2]).exists():
-            time.sleep(0.01)
+        meet(word="begins", other_words=["begins"])
         return save(*arguments)
+    return announced
+
+def asking(lock):
+    def announced(*arguments):
+        Path(sys.argv[1] + "asks").touch()
+        return lock(*arguments)
     return announced
 
 def late(save):
     def kept_waiting(*arguments):
-        time.sleep(0.5)
+        # Where it may not come as far, the other one waits for the lock by now.
+        meet(word="saves", other_words=["saves", "asks"])
         return save(*arguments)
     return kept_waiting
 
@@ -257,6 +270,7 @@ def twice(x):
 if sys.argv[2:]:
     _jit._Files.save_overload = at_once(_jit._Files.save_overload)
     IndexDataCacheFile._save_index = late(IndexDataCacheFile._save_index)
+    fcntl.flock = asking(fcntl.flock)
     print(twice(1 if sys.argv[1] < sys.argv[2] else 0.5))
 else:
     print(twice(1), twice(0.5), *(sum(count.values()) for count in (twice.stats.cache_hits, twice.stats.cache_misses)))
@@ -277,7 +291,8 @@ def test_two_processes_keep_compiled_code_at_once(tmp_path: Path) -> None:
         subprocess.Popen([sys.executable, str(script), *names], env=environment, stdout=subprocess.PIPE, text=True)
         for names in ((one, other), (other, one))
     ]
-    assert {process.communicate(timeout=120)[0].strip() for process in both} == {"2", "1.0"}
+    told = {process.communicate(timeout=HANG_GUARD_S)[0].strip() for process in both}  # hang guard
+    assert told == {"2", "1.0"}
     later = subprocess.run([sys.executable, str(script), one], env=environment, capture_output=True, text=True)
     assert later.stdout.split() == ["2", "1.0", "2", "0"], later.stderr
 

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.runner import estimate as limits
 from boulder_sweep.runner import sweeper
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.estimate import (
@@ -117,9 +116,6 @@ class Clock:
         self.now = 0.0
         self._free_up_to, self._per_row, self._per_block = free_up_to, seconds_per_row, seconds_per_block
 
-    def thread_time(self) -> float:
-        return self.now
-
     def simulate(self, table, readings, control):
         """Let soils up to some stiffness cost nothing, as designs that are not touched do."""
         if control.locate_yield:
@@ -127,29 +123,32 @@ class Clock:
         self.now += self._per_block + self._per_row * int(np.count_nonzero(table.beta > self._free_up_to))
         return plausible(table, readings, control)
 
+    def sample(self, sweep):
+        """Take a sample by this clock."""
+        evaluation = evaluation_of(sweep, accuracy_of(sweep), self.simulate)
+        return take_sample(evaluation, sweep.block, sweep.n_designs, {}, lambda: self.now)
+
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.5, 0.7, 0.9])
 @pytest.mark.parametrize("slow_axis", [False, True])
-def test_a_sample_sees_how_many_designs_cost_nothing(monkeypatch, share, slow_axis):
+def test_a_sample_sees_how_many_designs_cost_nothing(share, slow_axis):
     """Whether those are the first of the table or spread all over it."""
     stiffness = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 200}"
     width = "{from: 1 m, to: 2 m, count: 5000}"
     finely = "{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 1000000}"
     sweep = grid_of(1, subgrade=finely) if slow_axis else grid_of(1, subgrade=stiffness, width=width)
     clock = Clock(200 * share, seconds_per_row=8e-6, seconds_per_block=2e-4)
-    monkeypatch.setattr(limits, "time", clock)
-    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), clock.simulate), sweep.block, sweep.n_designs, {})
+    sample = clock.sample(sweep)
     truth = 8e-6 * (1.0 - share)
     assert truth / 1.3 < sample.seconds_per_row < 1.3 * truth + 5e-7
     assert clock.now < 0.35
 
 
-def test_a_sample_of_slow_designs_behind_quick_ones_stays_short(monkeypatch):
+def test_a_sample_of_slow_designs_behind_quick_ones_stays_short():
     sweep = grid_of(1, subgrade="{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 100000}")
     for seconds in (1e-3, 0.05):
         clock = Clock(40.0, seconds_per_row=seconds, seconds_per_block=2e-4)
-        monkeypatch.setattr(limits, "time", clock)
-        sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), clock.simulate), sweep.block, sweep.n_designs, {})
+        sample = clock.sample(sweep)
         assert 0.8 * seconds / 2 < sample.seconds_per_row < 2 * 0.8 * seconds
         assert clock.now < 0.5 + 64 * seconds
 

@@ -15,8 +15,9 @@ from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.errors import FolderInUseError
 from boulder_sweep.store.reader import read_table
-from tests.faults.faulty import slowly
+from tests.faults.faulty import Bar, held, slowly
 from tests.runner.grids import grid_of, plausible, same_bits
+from tests.waiting import HANG_GUARD_S
 
 
 def test_runs_side_by_side(tmp_path):
@@ -57,14 +58,18 @@ def test_a_forked_process_can_run(tmp_path):
 
 
 @pytest.mark.parametrize("backend", ["threading", "dask"])
-def test_an_interrupted_run_leaves_the_process_as_it_was(tmp_path, backend):
-    """As in a notebook, where the interpreter goes on."""
+def test_an_interrupted_run_leaves_the_process_as_it_was(tmp_path, monkeypatch, backend):
+    """As in a notebook, where the interpreter goes on. The last rows are held until then."""
+    bar = Bar(tmp_path / "held", 20_000)
+    bar.allow(10_000)
+    monkeypatch.setenv(*next(iter(bar.environment.items())))
     before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
 
     def interrupt(progress):
         signal.raise_signal(signal.SIGINT)
+        bar.allow()  # the run has not ended, so it looks for signals again
 
-    how = {"backend": backend, "jobs": 2, "rows_per_part": 1000, "simulate": slowly}
+    how = {"backend": backend, "jobs": 2, "rows_per_part": 1000, "simulate": held}
     with pytest.raises(KeyboardInterrupt, match=r"interrupted by SIGINT; .* of 20,000 rows are safe") as stop:
         run(grid_of(20_000), tmp_path / "out", progress=interrupt, **how)
     assert isinstance(stop.value, Interrupted)
@@ -82,23 +87,44 @@ def test_a_call_returns_raises_and_is_left_at_a_signal():
     with pytest.raises(SystemExit):
         signals.call(lambda: (_ for _ in ()).throw(SystemExit(2)))
     going = threading.Event()
-    threading.Timer(0.2, setattr, (signals, "caught", signal.SIGTERM)).start()
+
+    def endless():
+        signals.caught = signal.SIGTERM
+        going.wait(HANG_GUARD_S)  # hang guard
+
     with pytest.raises(Interrupted) as stop:
-        signals.call(lambda: going.wait(20))
+        signals.call(endless)
     assert stop.value.exit_code == 143
     going.set()
     with pytest.raises(Interrupted):  # nothing new is begun
         signals.call(lambda: pytest.fail("begun"))
 
 
+class Watched(Signals):
+    """Tells how often somebody looked for a signal since one was caught."""
+
+    looks, _caught = threading.Semaphore(0), None
+
+    @property
+    def caught(self):
+        if self._caught is not None:
+            self.looks.release()
+        return self._caught
+
+    @caught.setter
+    def caught(self, number):
+        self._caught = number
+
+
 def test_a_call_waits_for_what_acts_on_signals_itself():
-    signals = Signals()
+    signals = Watched()
     closed = []
 
     def orderly():
         with signals.deferred():
             signals.caught = signal.SIGINT
-            threading.Event().wait(0.3)
+            for _ in range(3):
+                assert signals.looks.acquire(timeout=HANG_GUARD_S)  # hang guard
             closed.append(True)
             signals.check()
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import queue
 import threading
-import time
 from typing import NamedTuple
 
 import numpy as np
@@ -12,17 +13,17 @@ import pytest
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.judged import Judged, not_computed
-from boulder_sweep.runner import committer
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.assembly import Assembly
 from boulder_sweep.runner.backends import check_backend
-from boulder_sweep.runner.committer import Committer
+from boulder_sweep.runner.committer import COMMIT_SHARE, Committer
 from boulder_sweep.runner.computing import Computation, EncodedPart
 from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.runner.messages import Computed, Ended
 from boulder_sweep.runner.threads import ThreadWorkers
 from boulder_sweep.store.manifest import Manifest, Part, part_name
 from boulder_sweep.store.writer import StagedPart
+from tests.waiting import HANG_GUARD_S, wait_until
 
 
 class Rows(NamedTuple):
@@ -78,13 +79,13 @@ def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, part=100, make_b
     committer.start()
     workers.start()
     computed = 0
-    while not isinstance(message := workers.messages.get(timeout=60), Ended):
+    while not isinstance(message := workers.messages.get(timeout=HANG_GUARD_S), Ended):  # hang guard
         if isinstance(message, Computed):
             computed += message.rows
         else:
             committer.put(message)
     committer.finish()
-    committer.join(60)
+    committer.join(HANG_GUARD_S)  # hang guard
     assert committer.problem is None
     assert message.problem is None
     assert computed == rows
@@ -188,25 +189,24 @@ def test_a_mistake_in_making_blocks_is_reported_like_one_in_computing_them():
 
 
 def test_stopped_workers_hand_out_no_more():
-    begun = threading.Event()
-    count = []
+    begun, may_end = [], threading.Event()
 
-    def slow(block):
-        begun.set()
-        count.append(block)
-        threading.Event().wait(0.05)
+    def held(block):
+        begun.append(block)
+        assert may_end.wait(HANG_GUARD_S)  # hang guard
         return good(block)
 
     folder = Folder(10**9, 10**9)
     assembly = Assembly(folder.manifest.missing())
     ranges = blocks(folder.manifest.missing(), 1)
-    workers = ThreadWorkers(2, Recorder(slow, Rows, {}), ranges, Admission(10**9), assembly, folder)
+    workers = ThreadWorkers(2, Recorder(held, Rows, {}), ranges, Admission(10**9), assembly, folder)
     workers.start()
-    assert begun.wait(10)
+    wait_until(lambda: len(begun) == 2, "both threads are at work")
     workers.stop()
-    workers.join(10)
+    may_end.set()
+    workers.join(HANG_GUARD_S)  # hang guard
     assert not workers.is_alive()
-    assert len(count) < 1000
+    assert sorted(begun) == [(0, 1), (1, 2)]
 
 
 def test_a_problem_in_writing_ends_the_run():
@@ -219,7 +219,7 @@ def test_a_problem_in_writing_ends_the_run():
     ranges = blocks(folder.manifest.missing(), 10)
     workers = ThreadWorkers(2, Recorder(good, Rows, {}), ranges, Admission(10**9), assembly, folder)
     workers.start()
-    while not isinstance(message := workers.messages.get(timeout=60), Ended):
+    while not isinstance(message := workers.messages.get(timeout=HANG_GUARD_S), Ended):  # hang guard
         pass
     assert isinstance(message.problem, OSError)
 
@@ -234,9 +234,9 @@ def test_blocks_in_any_order_make_parts_in_order(order):
 
 
 def test_a_slow_run_writes_what_it_has_and_an_interrupted_one_flushes():
-    hasty = Assembly(iter([(0, 30)]), commit_every_s=0.0)
+    hasty = Assembly(iter([(0, 30)]), commit_every_s=0.0, clock=itertools.count().__next__)
     assert [len(hasty.add(first, good(Rows(first, first + 10)))) for first in (0, 10, 20)] == [1, 1, 1]
-    patient = Assembly(iter([(0, 30)]))
+    patient = Assembly(iter([(0, 30)]), clock=lambda: 0.0)
     assert patient.add(0, good(Rows(0, 10))) == patient.add(20, good(Rows(20, 30))) == []
     (flushed,) = patient.flush()
     assert (flushed.first, len(flushed.pieces)) == (0, 1)
@@ -256,21 +256,37 @@ def test_backends_that_do_not_exist(arguments, words):
         check_backend(*arguments)
 
 
-def test_a_large_manifest_is_written_seldom(monkeypatch):
+def test_a_large_manifest_is_written_seldom():
     """Parts that arrive while it would be too early share the next one; the last ones do not wait."""
-    monkeypatch.setattr(committer, "COMMIT_SHARE", 1e-9)
-    folder = Folder(100, 10)
-    commits = []
-    folder.commit = lambda staged: (commits.append(len(staged)), Folder.commit(folder, staged))
-    writer = Committer(folder, Recorder(good, Rows, {}), Admission(10**9), tuple)
+    folder, commits, now = Folder(200, 10), queue.SimpleQueue(), [0.0]
+    commit_s = 1.0
+    rest_s = commit_s / COMMIT_SHARE
+    folder.commit = lambda staged: (Folder.commit(folder, staged), commits.put(len(staged)))
+    work_clock = itertools.count(step=commit_s).__next__  # it is read before and after a commit
+    writer = Committer(
+        folder, Recorder(good, Rows, {}), Admission(10**9), tuple, clock=lambda: now[0], work_clock=work_clock
+    )
+
+    def put(*firsts):
+        for first in firsts:
+            writer.put(folder.stage(first, b"", 10, {"pieces": []}))
+
     writer.start()
-    for first in range(0, 100, 10):
-        writer.put(folder.stage(first, b"", 10, {"pieces": []}))
-        time.sleep(0.02)
-    assert commits == [1]
+    put(0)
+    assert commits.get(timeout=HANG_GUARD_S) == 1  # hang guard
+    put(*range(10, 80, 10))
+    now[0] = 0.99 * rest_s
+    put(80)
+    wait_until(lambda: len(writer._waiting) == 8 or not commits.empty(), "all have arrived")
+    assert commits.empty()
+    now[0] = 1.01 * rest_s
+    put(90)
+    assert commits.get(timeout=HANG_GUARD_S) == 9  # hang guard
+    put(*range(100, 200, 10))
     writer.finish()
-    writer.join(10)
-    assert commits == [1, 9]
+    writer.join(HANG_GUARD_S)  # hang guard
+    assert commits.get() == 10
+    assert commits.empty()
     assert writer.problem is None
 
 
@@ -282,8 +298,8 @@ def test_threads_that_the_system_does_not_start_end_the_run(no_more_threads, sta
     ranges = blocks(folder.manifest.missing(), 32)
     workers = ThreadWorkers(jobs, Recorder(good, Rows, {}), ranges, Admission(10**9), assembly, folder)
     workers.start()
-    message = workers.messages.get(timeout=60)
-    workers.join(10)
+    message = workers.messages.get(timeout=HANG_GUARD_S)  # hang guard
+    workers.join(HANG_GUARD_S)  # hang guard
     assert isinstance(message, Ended)
     assert isinstance(message.problem, BackendError)
     assert str(message.problem) == f"the system cannot start {jobs:,} threads; give a smaller number of --jobs"

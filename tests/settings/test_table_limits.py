@@ -1,4 +1,4 @@
-"""Tables and measured curves from anywhere: an answer in seconds and bounded memory, and never a traceback."""
+"""Tables and measured curves from anywhere: an answer after bounded work, in bounded memory, never a traceback."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import random
 import resource
 import subprocess
 import sys
-import time
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,8 @@ import pytest
 
 from boulder_sweep.crash_tests.measured import PULSE_SIGNALS, TEST_SIGNALS, read_history
 from boulder_sweep.settings import SettingsError, load_text
+from tests.counting import calls_of
+from tests.waiting import HANG_GUARD_S
 
 SETTINGS = """\
 name: t
@@ -30,6 +32,8 @@ vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN
 HEIGHT = "boulder_height_m"
 TABLE = f'{HEIGHT},friction_angle_deg,vehicle_mass_lb,note\n2.5,40,15000,a\n2.6,41,15000,b\n3,42,14000,"c, d"\n'
 PULSE = "time [ms], displacement [mm], acceleration [g]\n0,0,0\n1,13,-1\n2,26,-2\n3,38,-3\n4,50,\n5,61,-4\n"
+MOST_CALLS = 12_000_000
+"""Of functions, for the answer to any file: six a row of the longest curve that is read."""
 TOKENS = [
     *(b"nan", b"inf", b"-1e999", b"1" * 400, b"\0", b"\x1b[31m", b'"', b"'", b",", b";", b"\t", b"\n", b"\r", b"#"),
     *(b"\xff", b"\xef\xbb\xbf", "１２".encode(), "−1".encode(), b"0x1f", b"1_0", b"=cmd()", b"[", b"]", b"design_id"),
@@ -97,7 +101,7 @@ def fuzz(folder: Path, inputs: int, seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def seed():
-    return int(os.environ.get("TEST_SEED", time.time_ns() % 2**32))
+    return int(os.environ.get("TEST_SEED", "20263"))
 
 
 def test_a_thousand_wrong_files_are_refused_in_words(tmp_path, seed):
@@ -142,10 +146,14 @@ def test_numbers_that_are_none(tmp_path, values):
 
 @pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
 def test_a_named_pipe_is_not_waited_for(tmp_path, name):
+    """Whoever opens it for reading waits for one who opens it for writing, whom there is not."""
     os.mkfifo(tmp_path / name)
-    begun = time.monotonic()
-    read(tmp_path / name)
-    assert time.monotonic() - begun < 5
+    writer = threading.Timer(HANG_GUARD_S, lambda: os.open(tmp_path / name, os.O_RDWR))  # hang guard
+    writer.daemon = True
+    writer.start()
+    assert calls_of(lambda: read(tmp_path / name)) < 100_000
+    assert writer.is_alive()
+    writer.cancel()
 
 
 @pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
@@ -153,9 +161,7 @@ def test_more_columns_than_a_table_has(tmp_path, name):
     names = [f"c{place} [s]" for place in range(5000)]
     text = (",".join(names) + "\n" + ",".join("1" * len(names)) + "\n").encode()
     (tmp_path / name).write_bytes(parquet(**{name: [1.0] for name in names}) if name.endswith("parquet") else text * 2)
-    begun = time.monotonic()
-    read(tmp_path / name)
-    assert time.monotonic() - begun < 20
+    assert calls_of(lambda: read(tmp_path / name)) < 100_000  # a few a column; there are 12 million pairs
 
 
 def large(folder: Path) -> dict[str, Path]:
@@ -178,15 +184,32 @@ def large(folder: Path) -> dict[str, Path]:
     return {name: folder / name for name in made}
 
 
+COUNTED = """
+import sys, threading
+from boulder_sweep.cli import main
+calls = 0
+def count(frame, event, argument):
+    global calls
+    calls += event in ("call", "c_call")
+threading.setprofile(count)
+sys.setprofile(count)
+try:
+    main.main(sys.argv[1:])
+finally:
+    sys.setprofile(None)
+    threading.setprofile(None)
+    print(f"calls: {calls}", file=sys.__stderr__)
+"""
+
+
 @pytest.mark.nightly
-def test_large_files_are_answered_in_seconds_and_two_gigabytes(tmp_path):
+def test_large_files_are_answered_after_bounded_work_and_in_two_gigabytes(tmp_path):
     """20 million designs may be read; everything else is refused."""
     for name, path in large(tmp_path).items():
         (tmp_path / "grid.yaml").write_text(SETTINGS.format(file=name))
         words = ["fit-vehicle", path, "--mass", "6800 kg"] if name.startswith("pulse") else ["check", "grid.yaml"]
-        begun = time.monotonic()
         done = subprocess.run(
-            [sys.executable, "-m", "boulder_sweep", *map(str, words)],
+            [sys.executable, "-c", COUNTED, *map(str, words)],
             cwd=tmp_path,
             env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (2_000_000_000, 2_000_000_000)),
@@ -194,7 +217,7 @@ def test_large_files_are_answered_in_seconds_and_two_gigabytes(tmp_path):
             text=True,
             check=False,
         )
-        assert time.monotonic() - begun < 60, name
+        assert int(done.stderr.rsplit("calls: ")[-1]) < MOST_CALLS, (name, done.stderr)
         assert done.returncode == (0 if name == "repeated.parquet" else 2), (name, done.stderr)
         assert "Traceback" not in done.stderr
         assert "internal error" not in done.stderr

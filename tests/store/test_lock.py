@@ -8,20 +8,21 @@ import os
 import signal
 import subprocess
 import sys
-import time
+from types import SimpleNamespace
 
 import pytest
 
+from boulder_sweep.store import lock as locks
 from boulder_sweep.store.errors import FolderInUseError, WriteError
-from boulder_sweep.store.lock import LOCK_NAME, FolderLock, is_locked
+from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, LOCK_NAME, FolderLock, is_locked
 
 _HOLD = """
-import sys, time
+import signal, sys
 from pathlib import Path
 from boulder_sweep.store.lock import FolderLock
 lock = FolderLock(Path(sys.argv[1]), None, "nobody")
 print("held", flush=True)
-time.sleep(60)
+signal.pause()
 """
 
 
@@ -91,29 +92,44 @@ def no_shared_locks(monkeypatch):
     monkeypatch.setattr(fcntl, "flock", unsupported)
 
 
-def test_a_fresh_sign_of_life_on_another_machine_counts(tmp_path, no_shared_locks):
+NOW = 1e9
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that stands still until the test sets it."""
+    clock = SimpleNamespace(now=NOW)
+    stopped = SimpleNamespace(time=lambda: clock.now, monotonic=lambda: clock.now)
+    monkeypatch.setattr(locks, "time", stopped)
+    return clock
+
+
+def test_a_fresh_sign_of_life_on_another_machine_counts(tmp_path, no_shared_locks, clock):
     FolderLock(tmp_path, None, "nobody")
-    with pytest.raises(FolderInUseError, match=r"last heartbeat was \d+ s ago"):
+    os.utime(tmp_path / LOCK_NAME, (NOW, NOW))
+    clock.now = NOW + 0.9 * DEAD_AFTER_S
+    with pytest.raises(FolderInUseError, match=r"last heartbeat was 54 s ago"):
         FolderLock(tmp_path, "othermachine", "process 7 on othermachine")
 
 
-def test_an_old_sign_of_life_does_not(tmp_path, no_shared_locks):
+def test_an_old_sign_of_life_does_not(tmp_path, no_shared_locks, clock):
     FolderLock(tmp_path, None, "nobody")
-    os.utime(tmp_path / LOCK_NAME, (time.time() - 1000, time.time() - 1000))
+    os.utime(tmp_path / LOCK_NAME, (NOW, NOW))
+    clock.now = NOW + 1.1 * DEAD_AFTER_S
     lock = FolderLock(tmp_path, "othermachine", "process 7 on othermachine")
     assert lock.stale
-    assert time.time() - (tmp_path / LOCK_NAME).stat().st_mtime < 100
+    assert (tmp_path / LOCK_NAME).stat().st_mtime != NOW
     lock.release()
     assert names(tmp_path) == []
 
 
-def test_the_holder_gives_signs_of_life(tmp_path, monkeypatch):
+def test_the_holder_gives_signs_of_life(tmp_path, clock):
     lock = FolderLock(tmp_path, None, "nobody")
     os.utime(tmp_path / LOCK_NAME, (1000, 1000))
+    clock.now = NOW + 0.9 * HEARTBEAT_S
     lock.renew()
     assert (tmp_path / LOCK_NAME).stat().st_mtime == 1000  # not yet due
-    later = time.monotonic() + 60
-    monkeypatch.setattr(time, "monotonic", lambda: later)
+    clock.now = NOW + 1.1 * HEARTBEAT_S
     lock.renew()
     assert (tmp_path / LOCK_NAME).stat().st_mtime > 1000
     lock.release()
