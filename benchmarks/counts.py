@@ -1,8 +1,9 @@
-"""Counts of the kernels' work that depend on no clock: instructions, flops, calls.
+"""Counts of work that depend on no clock: instructions, flops, compiled functions, calls, and what a run does.
 
-Instructions and flops are counted in the machine code, which a process of its own compiles for one named processor on
-whatever processor this is. Calls are counted in another process, with the compiler off, while a few designs are
-simulated. So the counts change with the kernels and the compiler only, and a change of two per cent is a change.
+Instructions, flops and compiled functions are counted in machine code, which a process of its own compiles for one
+named processor on whatever processor this is, from nothing. Calls are counted in another process, with the compiler
+off, while a few designs are simulated; threads, bytes and designs in a third, during a small run. So the counts change
+with the code and the compiler only, and a change of two per cent is a change.
 """
 
 from __future__ import annotations
@@ -12,14 +13,16 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from .flops import operations_in_machine_code, operations_of_step
 from .report import FOLDER
+from .small_run import counts_of_run
 from .timing import versions
 
 RECORD = FOLDER / "counts.toml"
@@ -30,6 +33,7 @@ KERNELS = ("attempt_steps", "simulate_lanes", "simulate_rows", "element_sums")
 DESIGNS = 64
 """Designs that are simulated with the compiler off."""
 STEP_S = 0.012
+CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
 HEAD = """\
 # What benchmarks.gate compares its counts with; written by python -m benchmarks.gate --record.
 # Renew it in the commit that is meant to change them, and say there why they grow.
@@ -37,6 +41,8 @@ HEAD = """\
 Counts = dict[str, int]
 _INSTRUCTION = re.compile(r"^\t[a-z]")
 _SYMBOL = re.compile(r"^(\w[\w.$]*):")
+_COMPILED = {"functions": "*.nbi", "specialisations": "*.nbc"}
+"""Files in which Numba keeps what it has compiled: one for each function, one for each set of types of arguments."""
 _PROFILED = ("closed_form", "step", "work_out")
 
 
@@ -47,13 +53,8 @@ class Recorded(NamedTuple):
     counts: Counts
 
 
-def measured(kernels: Sequence[str] = KERNELS) -> Counts:
-    """Count everything, in processes of their own; compiling takes half a minute of CPU time the first time.
-
-    Parameters
-    ----------
-    kernels
-        Which of `KERNELS` to count in machine code.
+def measured() -> Counts:
+    """Count everything; half a minute of CPU time.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def measured(kernels: Sequence[str] = KERNELS) -> Counts:
     """
     evaluation, step = operations_of_step()
     of_formulas = {"flops of an evaluation, formulas": evaluation.flops, "flops of a step, formulas": step.flops}
-    return of_formulas | _in_a_process("calls", {"NUMBA_DISABLE_JIT": "1"}) | _in_a_process("code", TARGET, *kernels)
+    return of_formulas | count("calls") | count("run") | count("code", *KERNELS)
 
 
 def read(path: Path = RECORD) -> Recorded:
@@ -83,12 +84,33 @@ def compiler() -> str:
     return f"{versions('numba', 'llvmlite')}, {TARGET['NUMBA_CPU_NAME']}"
 
 
-def _in_a_process(what: str, settings: dict[str, str], *names: str) -> Counts:
-    """Count in a process that has these environment variables from its start."""
-    command = [sys.executable, "-m", "benchmarks.counts", what, *names]
-    done = subprocess.run(command, env=os.environ | settings, capture_output=True, text=True, check=False)
+def count(what: str, *kernels: str, folder: Path | None = None, environment: Mapping[str, str] = os.environ) -> Counts:
+    """Count in a process of its own, which finds no code compiled before where it counts that.
+
+    Parameters
+    ----------
+    what
+        ``calls``, ``run`` or ``code``.
+    kernels
+        For the code: which of `KERNELS`, the first ones in their order.
+    folder
+        Where Python finds the sources; the working directory by default.
+    environment
+        Variables of the process.
+
+    Raises
+    ------
+    RuntimeError
+        The process fails.
+    """
+    command = [sys.executable, "-m", "benchmarks.counts", what, *kernels]
+    with tempfile.TemporaryDirectory(prefix="sweep-counts-") as cache:
+        own = {"calls": {"NUMBA_DISABLE_JIT": "1"}, "run": {}, "code": TARGET | {CACHE_VARIABLE: cache}}[what]
+        done = subprocess.run(
+            command, cwd=folder, env={**environment, **own}, capture_output=True, text=True, check=False
+        )
     if done.returncode != 0:
-        raise RuntimeError(f"counting the {what} of the kernels failed:\n{done.stderr[-2000:]}")
+        raise RuntimeError(f"counting the {what} failed:\n{done.stderr[-2000:]}")
     return Counts(json.loads(done.stdout))
 
 
@@ -126,11 +148,16 @@ def _of_code(names: Sequence[str]) -> Counts:
         "element_sums": (soil.element_sums, (lines, constants)),
     }
     counts: Counts = {}
+    files = dict.fromkeys(_COMPILED, 0)
     for name in names:
         assembly = _assembly(*found[name])
         counts[f"instructions of {name}"] = instructions(assembly)
         if name == "attempt_steps":
             counts["flops of a step, machine code"] = operations_in_machine_code(assembly).flops
+        for kind, suffix in _COMPILED.items():
+            there = len(list(Path(os.environ[CACHE_VARIABLE]).rglob(suffix)))
+            counts |= {f"{kind} compiled for {name}": there - files[kind]} if there > files[kind] else {}
+            files[kind] = there
     return counts
 
 
@@ -149,17 +176,17 @@ def _of_calls() -> Counts:
     import numpy as np
 
     import boulder_kernels as bk
-    from boulder_kernels.lanes import simulate_lanes
     from boulder_kernels.table import simulate_rows
 
     from .designs import HORIZON, ROTATION_LIMIT, sample
 
-    designs = np.stack(sample(DESIGNS))
+    designs = sample(DESIGNS)
     control = bk.Control(STEP_S, HORIZON, ROTATION_LIMIT, 0, False)
     counts: Counts = {}
     with np.errstate(all="ignore"):
-        for name, simulate in (("lanes", simulate_lanes), ("one by one", simulate_rows)):
-            tally = _calls_of(simulate, designs, bk.corrected(), control)
+        ways = (("lanes", bk.simulate_table, designs), ("one by one", simulate_rows, np.stack(designs)))
+        for name, simulate, given in ways:
+            tally = _calls_of(simulate, given, bk.corrected(), control)
             counts |= {f"calls of {called}, {name}": count for called, count in tally.items() if count}
     return counts
 
@@ -182,5 +209,12 @@ def _calls_of(simulate: Callable[..., object], *arguments: Any) -> Counts:
     return tally
 
 
+def _of_run() -> Counts:
+    """Count during a small run; runs in a process with nothing else."""
+    with tempfile.TemporaryDirectory(prefix="sweep-counts-") as name:
+        return counts_of_run(Path(name))
+
+
 if __name__ == "__main__":
-    print(json.dumps(_of_calls() if sys.argv[1] == "calls" else _of_code(sys.argv[2:])))
+    _, asked, *names = sys.argv
+    print(json.dumps({"calls": _of_calls, "run": _of_run}[asked]() if asked != "code" else _of_code(names)))

@@ -1,136 +1,156 @@
-"""The gate lets through what is fast enough and names what is not; with a clock of its own, so nothing is timed."""
+"""The gate lets through what does no more than before and names what does; the tests hand in the times."""
 
-import hashlib
 import itertools
+import json
 import re
 import subprocess
-import threading
-import time
-import tomllib
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from benchmarks import counts, earlier, gate, together
+from benchmarks import counts, earlier, findings, gate, timed, together
 
 
 def nothing() -> None:
-    """A path that takes as long as the clock of the test says."""
+    """Work that takes as long as the clock of the test says."""
+
+
+def reference() -> None:
+    """What it is compared with."""
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[Callable[[], None], float]], None]:
-    """Let every path take a known time and the reference one second."""
+def clock(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Callable[[], None]]]:
+    """Let work take the times that a test gives, one after the other, and the reference one second."""
 
-    def set_times(seconds: dict[Callable[[], None], float]) -> None:
-        monkeypatch.setattr(gate, "cpu_seconds", lambda work: seconds.get(work, 1.0))
+    def set_times(seconds: dict[Callable[[], None], list[float]]) -> list[Callable[[], None]]:
+        in_turn = {work: itertools.cycle(times) for work, times in seconds.items()}
+        asked: list[Callable[[], None]] = []
 
-    monkeypatch.setattr(gate, "reference_work", lambda x, times: None)
+        def cpu_seconds(work: Callable[[], None]) -> float:
+            asked.append(work)
+            return next(in_turn[work]) if work in in_turn else 1.0
+
+        for module in (gate, timed):
+            monkeypatch.setattr(module, "cpu_seconds", cpu_seconds)
+        monkeypatch.setattr(timed, "reference_loop", lambda: reference)
+        return asked
+
     return set_times
 
 
-def test_a_path_made_slower_fails_by_name(clock: Callable[..., None]) -> None:
+def test_work_that_takes_half_as_long_again_fails_by_name(clock: Callable[..., object]) -> None:
     def lanes() -> None:
-        """As fast as when the threshold was set."""
+        """As fast as when the record was made."""
 
-    def slowed_lanes() -> None:
-        """The same with a change that doubles its cost."""
-
-    clock({lanes: 4.5, slowed_lanes: 9.0})
-    thresholds = {"lanes": 7.0, "sums": 2.0}
-    assert gate.complaint(gate.judged({"lanes": lanes, "sums": nothing}, thresholds, rounds=3)) == ""
-    found = gate.judged({"lanes": slowed_lanes, "sums": nothing}, thresholds, rounds=3)
-    assert [finding.passes for finding in found] == [False, True]
-    message = gate.complaint(found)
-    assert "lanes (9.000, at most 7.000)" in message
-    assert "sums" not in message
+    clock({lanes: [4.5], nothing: [9.1]})
+    found = gate.within({"lanes": lanes, "twice": nothing}, reference, {"lanes": 4.5, "twice": 6.0}, 1.5)
+    assert [each.passes for each in found] == [True, False]
+    message = findings.complaint(found)
+    assert "time of twice (1.517 of the record, at most 1.500)" in message
+    assert "lanes (" not in message
     assert "gate.toml" in message
+    assert findings.complaint(found[:1]) == ""
 
 
-def test_one_disturbed_round_does_not_decide(clock: Callable[..., None], monkeypatch: pytest.MonkeyPatch) -> None:
-    disturbed = itertools.cycle([4.0, 40.0, 4.0])
-    monkeypatch.setattr(gate, "cpu_seconds", lambda work: next(disturbed) if work is nothing else 1.0)
-    (finding,) = gate.judged({"path": nothing}, {"path": 5.0}, rounds=9)
-    assert finding.ratio == 4.0
-    assert finding.passes
+def test_timing_ends_with_the_first_round_that_passes(clock: Callable[..., list[object]]) -> None:
+    asked = clock({nothing: [9.0, 8.0, 5.9, 1.0]})
+    (found,) = gate.within({"lanes": nothing}, reference, {"lanes": 4.0}, 1.5)
+    assert found.passes
+    assert found.ratio == pytest.approx(5.9 / 4.0)
+    assert asked.count(nothing) == asked.count(reference) == 3
 
 
-def found_in_turn(*ratios: dict[str, float], counted: bool = False) -> Callable[[], list[gate.Finding]]:
-    """A measurement that finds these ratios, of at most 1, one after the other; a further one is an error."""
-    each = iter(ratios)
-    return lambda: [gate.Finding(name, ratio, 1.0, counted=counted) for name, ratio in next(each).items()]
+def test_timing_ends_with_the_ninth_round_that_fails(clock: Callable[..., list[object]]) -> None:
+    asked = clock({nothing: [9.0, 8.0, 7.0]})
+    (found,) = gate.within({"lanes": nothing}, reference, {"lanes": 4.0}, 1.5)
+    assert not found.passes
+    assert found.ratio == 7.0 / 4.0
+    assert asked.count(nothing) == asked.count(reference) == 9
 
 
-def test_what_is_too_slow_only_once_or_twice_passes(capsys: pytest.CaptureFixture[str]) -> None:
-    first, second, third = {"a": 6.0, "b": 0.5}, {"a": 2.0, "b": 3.0}, {"a": 0.9, "b": 4.0}
-    assert [finding.ratio for finding in gate.confirmed(found_in_turn(first, second, third))] == [0.9, 0.5]
-    assert capsys.readouterr().out.splitlines() == [
-        "too slow, so measured again: a (6.000, at most 1.000)",
-        "too slow, so measured again: a (2.000, at most 1.000)",
-    ]
-    assert [finding.ratio for finding in gate.confirmed(found_in_turn(third, second, first))] == [0.9, 0.5]
+def test_what_disturbs_the_reference_excuses_nothing(clock: Callable[..., object]) -> None:
+    """The least time of the reference counts, not that of the same round."""
+    clock({nothing: [7.0], reference: [1.0, 40.0]})
+    (found,) = gate.within({"lanes": nothing}, reference, {"lanes": 4.0}, 1.5)
+    assert found.ratio == 7.0 / 4.0
 
 
-@pytest.mark.parametrize("slow", [1.1, float("nan")])
-def test_what_is_too_slow_each_time_fails(slow: float) -> None:
-    measure = found_in_turn({"a": 0.5, "b": slow}, {"a": 0.5, "b": slow}, {"a": 2.0, "b": slow})
-    assert [finding.passes for finding in gate.confirmed(measure)] == [True, False]
+def test_everything_timed_has_a_record_that_any_processor_finds() -> None:
+    limits = findings.limits_of("time")
+    assert limits["most"] == 1.5
+    assert gate.ANY_PROCESSOR in limits["record"]
+    assert all(set(record) == set(gate.lanes()) for record in limits["record"].values())
+    assert all(value > 0.0 for record in limits["record"].values() for value in record.values())
 
 
-def test_counts_are_taken_once() -> None:
-    assert "counts have changed: a" in gate.complaint(gate.confirmed(found_in_turn({"a": 1.1}, counted=True)))
-
-
-def test_a_ratio_that_is_no_number_fails() -> None:
-    assert not gate.Finding("path", float("nan"), 1.0).passes
-
-
-def test_every_path_has_a_threshold_and_every_threshold_a_path(tmp_path: Path) -> None:
-    assert set(gate.paths(tmp_path)) == set(gate.thresholds_of())
-    with pytest.raises(ValueError, match="unknown"):
-        gate.judged({"lanes": nothing}, {"lanes": 1.0, "unknown": 1.0})
-
-
-def test_command_fails_with_a_message(
-    clock: Callable[..., None],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize(("known", "ratio"), [("this", 2.0), ("that", 4.0)])
+def test_a_processor_has_its_own_record_or_that_of_any(
+    clock: Callable[..., object], monkeypatch: pytest.MonkeyPatch, known: str, ratio: float
 ) -> None:
-    """The whole command on thresholds that nothing can keep; the committed ones would pass at this speed."""
-    clock({nothing: 0.5})
-    monkeypatch.setattr(gate, "paths", lambda folder: {"lanes_fast": nothing})
-    too_low = tmp_path / "low.toml"
-    too_low.write_text("[largest_ratio]\nlanes_fast = 0.1\n")
-    monkeypatch.setattr("sys.argv", ["gate", "--only", "reference", "--thresholds", str(too_low)])
-    assert gate.main() == 1
+    clock({nothing: [8.0]})
+    monkeypatch.setattr(gate, "lanes", lambda: {"fast": nothing})
+    record = {known: {"fast": 4.0}, gate.ANY_PROCESSOR: {"fast": 2.0}}
+    monkeypatch.setattr(gate, "limits_of", lambda section: {"time": {"most": 1.5, "record": record}}[section])
+    monkeypatch.setattr(gate.llvmlite.binding, "get_host_cpu_name", lambda: "this")
+    (found,) = gate.PARTS["time"]()
+    assert found.ratio == ratio
+
+
+def command(monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["gate", *words])
+    return gate.main()
+
+
+def test_command_fails_with_a_message(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setitem(gate.PARTS, "counts", lambda: [findings.Finding("steps", 1.0, 1.02, 0.98)])
+    ratios = iter([1.2, 1.7, 1.3])
+    monkeypatch.setitem(gate.PARTS, "time", lambda: [findings.Finding("time of fast", next(ratios), 1.5)])
+    assert command(monkeypatch) == 0
     printed = capsys.readouterr()
-    assert re.search(r"lanes_fast .*TOO SLOW", printed.out)
-    assert printed.err.startswith("benchmark gate: too slow: lanes_fast (0.500, at most 0.100)")
-    too_low.write_text("[largest_ratio]\nlanes_fast = 0.6\n")
-    assert gate.main() == 0
+    assert printed.err == ""
+    assert re.search(r"^steps .* ok\ntime of fast .* ok\npassed 1 of 1$", printed.out, re.MULTILINE)
+    assert command(monkeypatch, "--only", "time", "--times", "2") == 1
+    printed = capsys.readouterr()
+    assert "steps" not in printed.out
+    assert "passed 1 of 2" in printed.out
+    assert printed.err.startswith("benchmark gate: time of fast (1.700 of the record, at most 1.500).")
+
+
+def test_what_only_a_quiet_machine_tells_is_timed_when_asked_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    done: list[str] = []
+    for parts in (gate.PARTS, timed.PARTS):
+        for name in parts:
+            monkeypatch.setitem(parts, name, lambda name=name: done.append(name) or [])
+    assert command(monkeypatch) == 0
+    assert done == ["counts", "time"]
+    done.clear()
+    assert command(monkeypatch, "--timed") == 0
+    assert done == ["paths", "threads", "waiting", "earlier"]
     assert capsys.readouterr().err == ""
 
 
-def test_thresholds_are_committed_as_numbers() -> None:
-    with gate.THRESHOLDS.open("rb") as stream:
-        sections = tomllib.load(stream)
-    assert all(value > 0.0 for values in sections.values() for value in values.values())
+def test_a_ratio_that_is_no_number_fails() -> None:
+    assert not findings.Finding("path", float("nan"), 1.0).passes
 
 
 def test_a_count_may_change_by_two_per_cent_and_none_may_come_or_go() -> None:
     recorded = counts.Recorded(counts.compiler(), {"kept": 1000, "grown": 1000, "shrunk": 1000, "gone": 10})
     found = {"kept": 1019, "grown": 1021, "shrunk": 979, "new": 5}
-    complaint = gate.complaint(gate.counted(found, recorded, 0.02))
+    change = findings.limits_of("counts")["largest_change"]
+    complaint = findings.complaint(gate.compared(found, recorded, change))
     assert re.findall(r"(\w+) \(", complaint) == ["grown", "shrunk", "gone", "new"]
     assert "python -m benchmarks.gate --record" in complaint
-    assert gate.complaint(gate.counted(dict(recorded.counts), recorded, 0.02)) == ""
+    assert findings.complaint(gate.compared(dict(recorded.counts), recorded, change)) == ""
 
 
 def test_another_compiler_is_named_beside_its_counts() -> None:
-    (finding,) = gate.counted({"steps": 10}, counts.Recorded("numba 0.1", {"steps": 10}), 0.02)
+    (finding,) = gate.compared({"steps": 10}, counts.Recorded("numba 0.1", {"steps": 10}), 0.02)
     assert "of the record with numba 0.1" in str(finding)
     assert finding.passes
 
@@ -139,7 +159,6 @@ def test_the_record_is_read_as_it_was_written(tmp_path: Path) -> None:
     written = {"flops of a step, machine code": 1158, "calls of all, lanes": 7}
     counts.write(written, tmp_path / "counts.toml")
     assert counts.read(tmp_path / "counts.toml") == counts.Recorded(counts.compiler(), written)
-    assert "flops of a step, machine code" in counts.read().counts
 
 
 def test_instructions_are_those_of_kernels_without_their_wrappers() -> None:
@@ -157,6 +176,22 @@ NRT_decref:
 \tretq
 """
     assert counts.instructions(assembly) == 3
+
+
+def test_a_slower_path_fails_by_name_and_one_disturbed_round_does_not(clock: Callable[..., object]) -> None:
+    def sums() -> None:
+        """Disturbed in one of three rounds."""
+
+    clock({nothing: [9.0], sums: [4.0, 40.0, 4.0]})
+    found = timed.judged({"lanes": nothing, "sums": sums}, {"lanes": 7.0, "sums": 5.0})
+    assert [(each.ratio, each.passes) for each in found] == [(9.0, False), (4.0, True)]
+    assert "lanes (9.000 of the reference, at most 7.000)" in findings.complaint(found)
+
+
+def test_every_path_has_a_limit_and_every_limit_a_path(tmp_path: Path) -> None:
+    assert set(timed.paths(tmp_path)) == set(findings.limits_of("paths"))
+    with pytest.raises(ValueError, match="unknown"):
+        timed.judged({"lanes": nothing}, {"lanes": 1.0, "unknown": 1.0})
 
 
 def git(folder: Path, *words: str) -> str:
@@ -208,13 +243,6 @@ class Timed(NamedTuple):
         """Do nothing."""
 
 
-def compute() -> None:
-    """Compute for a while, as the clock of the thread tells."""
-    until = time.thread_time() + 0.05
-    while time.thread_time() < until:
-        hashlib.sha256(b"0" * 1_000_000)  # without the lock of the interpreter
-
-
 def share_nothing() -> None:
     """Work of a thread that needs nothing another one has."""
 
@@ -238,27 +266,24 @@ def test_the_gain_of_two_threads_is_that_over_work_that_shares_nothing(
     disturbed = itertools.cycle([40.0, *[1.0] * 11])  # of three rounds with four times each, one
     together_s = {share_nothing: host, wait_for_each_other: 2.0, slowed_by_each_other: 4.0 * host}
 
-    def timed(work: Callable[[], None], count: int) -> together.Timed:
+    def of_threads(work: Callable[[], None], count: int) -> together.Timed:
         seconds = (1.0 if count == 1 else together_s[work]) * next(disturbed)
         return together.Timed(seconds, float(count > 1 and work is wait_for_each_other))
 
-    monkeypatch.setattr(together, "timed", timed)
+    monkeypatch.setattr(together, "timed", of_threads)
     assert together.gain_over(work, share_nothing, rounds=9) == pytest.approx(gain)
 
 
-@pytest.mark.nightly
-def test_work_that_sleeps_is_told_from_work_that_computes() -> None:
-    assert together.idle_share(lambda: time.sleep(0.05), rounds=3) > 0.8
-    assert together.idle_share(compute, rounds=3) < 0.2
+LOOKS = [([1, 2], [], 6), ([1], [2], 3), ([], [1, 2], 1)]
+"""Threads awake, threads asleep, and how often both were found so."""
 
 
-@pytest.mark.nightly
-def test_threads_that_wait_for_each_other_gain_nothing() -> None:
-    lock = threading.Lock()
-
-    def alone() -> None:
-        with lock:
-            compute()
-
-    assert together.gain_over(alone, compute) < 0.7
-    assert together.gain_over(compute, compute) > 0.7
+def test_shares_of_time_are_those_of_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = f"import sys\nprint('begun', flush=True)\nsys.stdin.read()\nprint({json.dumps(LOOKS)!r})"
+    monkeypatch.setattr(together, "_LOOKING", program)
+    with together.Looking() as looking:
+        pass
+    assert looking.idle == pytest.approx(0.1)
+    assert [looking.asleep(thread) for thread in (1, 2, 3)] == pytest.approx([0.1, 0.4, 0.0])
+    assert looking.one_asleep([1, 2]) == pytest.approx(0.4)
+    assert looking.one_asleep([1, 3]) == 0.0

@@ -29,13 +29,39 @@ def test_each_setting_is_simulated_by_the_steps_of_its_accuracy(
     assert [readings for readings, _ in seen] == [*[bk.corrected()] * 3, bk.as_printed()]
 
 
-@pytest.mark.nightly
-def test_a_checkout_takes_as_long_as_itself(
+class Answering:
+    """A process with kernels, whose every third time is disturbed; the second one is that of kernels twice as fast."""
+
+    started = 0
+
+    def __init__(self, checkout: Path, cache: Path, designs: Path) -> None:
+        self._us = 4.0 / 2.0**Answering.started
+        Answering.started += 1
+        self._asked = 0
+
+    def cpu_s(self, designs: str, setting: ratio.Setting) -> float:
+        self._asked += 1
+        return 16e-6 * self._us * (1.0 if self._asked % 3 else 10.0)
+
+    def end(self) -> None:
+        """Nothing to end."""
+
+
+def test_ratios_are_those_of_the_times_of_both_checkouts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ratio, "tables", lambda: {"random": sample(1024)._asdict()})
-    cache = tmp_path / "cache"
-    ratio.compare_kernels((ratio.FOLDER, ratio.FOLDER), (cache, cache), tmp_path, 9)
-    ratios = re.findall(r"([\d.]+), [\d.]+$", capsys.readouterr().out, re.MULTILINE)
-    assert len(ratios) == len(ratio.SETTINGS)
-    assert all(0.7 < float(found) < 1.4 for found in ratios)
+    monkeypatch.setattr(ratio, "tables", lambda: {"random": sample(16)._asdict()})
+    monkeypatch.setattr(ratio, "Kernels", Answering)
+    monkeypatch.setattr(Answering, "started", 0)
+    ratio.compare_kernels((tmp_path, tmp_path), (tmp_path, tmp_path), tmp_path, 9)
+    found = re.findall(r"random +([\d.]+) +([\d.]+) +([\d.]+), ([\d.]+)$", capsys.readouterr().out, re.MULTILINE)
+    assert found == [("4.000", "2.000", "2.000", "2.000")] * len(ratio.SETTINGS)
+
+
+@pytest.mark.nightly
+@pytest.mark.compiled
+def test_a_process_with_the_kernels_of_a_checkout_answers_every_setting(tmp_path: Path) -> None:
+    np.save(tmp_path / "random.npy", np.stack(list(sample(8))))
+    kernels = ratio.Kernels(ratio.FOLDER, tmp_path / "cache", tmp_path)
+    assert all(kernels.cpu_s("random", setting) >= 0.0 for setting in ratio.SETTINGS.values())
+    kernels.end()
