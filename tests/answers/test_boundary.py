@@ -103,6 +103,7 @@ def random_grid(kind: str, rng: np.random.Generator) -> dict[str, str]:
     return own | {"friction": axis(*friction, many, " deg"), "site": "embedment_ratio: [0.5, 0.6, 0.7, 0.75]"}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["ratio", "depth", "height", "friction"])
 def test_of_random_grids_no_design_is_said_to_pass_that_does_not(kind: str) -> None:
     rng = np.random.default_rng(7)

@@ -53,8 +53,15 @@ def test_shallow_boulders_that_slide_are_found_as_well() -> None:
     assert fewer < every
 
 
-@pytest.mark.parametrize("between", [None, SHALLOW])
-@pytest.mark.parametrize("readings", ["corrected", "as_printed"])
+@pytest.mark.parametrize(
+    ("readings", "between"),
+    [
+        ("corrected", None),
+        pytest.param("corrected", SHALLOW, marks=pytest.mark.nightly),
+        pytest.param("as_printed", None, marks=pytest.mark.nightly),
+        ("as_printed", SHALLOW),
+    ],
+)
 def test_the_same_for_many_designs_and_both_readings(readings: str, between: Ends) -> None:
     corrected = readings == "corrected"
     sweep = random_designs(10_000 if corrected else 1000, seed=5)

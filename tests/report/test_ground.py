@@ -21,8 +21,13 @@ SOILS = {
 }
 
 
+IN_EVERY_RUN = (("layers", RESISTANCES[0]), ("all", RESISTANCES[1]))
+EVERY_SOIL = [*((soil, RESISTANCES[0]) for soil in SOILS), *product(["all"], RESISTANCES[1:])]
+
+
 @pytest.mark.parametrize(
-    ("soil", "law"), [*((soil, RESISTANCES[0]) for soil in SOILS), *product(["all"], RESISTANCES[1:])]
+    ("soil", "law"),
+    [pytest.param(*case, marks=[] if case in IN_EVERY_RUN else pytest.mark.nightly) for case in EVERY_SOIL],
 )
 def test_the_simulator_has_the_soil_of_the_command_line(soil, law, tmp_path, opened):
     sweep = boulder_sweep.load("configs/rwg.yaml", [*SOILS[soil], f"model.resistance={law}"])
@@ -56,6 +61,7 @@ def test_curves_and_energies_are_those_of_the_command_line(tmp_path, opened):
     assert energy.crush_spent_J[-1] > 0.0
 
 
+@pytest.mark.nightly
 def test_the_copied_file_has_it(tmp_path, opened):
     sweep = boulder_sweep.load("configs/rwg.yaml", [*IN_FILE, "partial_factor.friction_angle=1.25"])
     page = opened(write_explorer(sweep, 0, tmp_path / "page.html"))
@@ -63,6 +69,7 @@ def test_the_copied_file_has_it(tmp_path, opened):
     assert boulder_sweep.load(tmp_path / "copied.yaml").model.ground == sweep.model.ground
 
 
+@pytest.mark.nightly
 def test_a_report_has_it_in_its_rows(tmp_path, opened):
     """Rows of several depths, for some of which not every layer is in the way."""
     depths = "site.embedment_depth=[0.4, 0.5, 0.9, 1.6, 2.3] m"

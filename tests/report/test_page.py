@@ -95,6 +95,7 @@ def test_random_designs_come_out_as_the_command_line_has_them(explorer, opened):
     assert len(flags) > 5
 
 
+@pytest.mark.nightly
 def test_maps_come_out_as_a_sweep_has_them(report, result, opened):
     """Stopped at the limit, as rows are."""
     table = boulder_sweep.read(result)
@@ -132,6 +133,7 @@ def test_curves_are_those_of_the_command_line(explorer, opened):
         np.testing.assert_allclose(motion[name], theirs[name], rtol=0, atol=1e-9 * max(scale, 1e-12), err_msg=name)
 
 
+@pytest.mark.nightly
 def test_a_slider_moves_everything(explorer, opened):
     page = opened(explorer)
     before = page.inner_text("#outcomes")
@@ -148,6 +150,7 @@ def test_a_slider_moves_everything(explorer, opened):
     assert page.inner_text("#outcomes") == before
 
 
+@pytest.mark.nightly
 def test_units_switch_everywhere_and_back(report, opened):
     page = opened(report)
     metric = page.inner_text("main")
@@ -174,6 +177,7 @@ def test_the_copied_file_means_the_same_design(tmp_path, explorer, opened):
     assert sweep.resolved()["solver"] == boulder_sweep.load(explorer.with_name("case.yaml")).resolved()["solver"]
 
 
+@pytest.mark.nightly
 def test_the_list_comes_as_csv_with_the_names_of_the_table(explorer, opened, tmp_path):
     page = opened(explorer)
     page.click("#add")
@@ -189,6 +193,7 @@ def test_the_list_comes_as_csv_with_the_names_of_the_table(explorer, opened, tmp
     assert rows[0]["verdict"] == "pass"
 
 
+@pytest.mark.nightly
 def test_the_map_shows_the_rows_and_a_rectangle_can_be_picked(report, result, opened):
     page = opened(report)
     table = boulder_sweep.read(result)
@@ -210,6 +215,7 @@ def test_the_map_shows_the_rows_and_a_rectangle_can_be_picked(report, result, op
     assert design["friction_angle_deg"] == pytest.approx(shown[3]["friction_angle_deg"])
 
 
+@pytest.mark.nightly
 def test_named_soils_have_their_names_on_the_slider(tmp_path, opened):
     (tmp_path / "sites.yaml").write_text(SETS)
     boulder_sweep.run(boulder_sweep.load(tmp_path / "sites.yaml"), tmp_path / "out")
@@ -220,6 +226,7 @@ def test_named_soils_have_their_names_on_the_slider(tmp_path, opened):
     assert page.evaluate("page.design.soil_density_kg_m3") == 1900.0
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("width", "scheme"), [(480, "dark"), (1280, "light")])
 def test_nothing_is_wider_than_the_screen(report, opened, width, scheme):
     page = opened(report, viewport={"width": width, "height": 800}, color_scheme=scheme)
@@ -227,6 +234,7 @@ def test_nothing_is_wider_than_the_screen(report, opened, width, scheme):
     assert page.evaluate("document.documentElement.hasAttribute('data-dark')") is (scheme == "dark")
 
 
+@pytest.mark.nightly
 def test_every_control_has_a_name_and_every_picture_words(report, opened):
     page = opened(report)
     nameless = page.evaluate(
@@ -252,6 +260,7 @@ def test_a_hostile_name_is_only_a_name(tmp_path, opened):
     assert page.evaluate("JSON.parse(document.getElementById('data').textContent).title") == HOSTILE
 
 
+@pytest.mark.nightly
 def test_a_printed_reading_and_soil_elements_are_said(tmp_path, opened):
     sweep = boulder_sweep.load("configs/rwg.yaml", ["model.readings=as_printed", "model.soil={elements: 50}"])
     page = opened(write_explorer(sweep, 0, tmp_path / "printed.html"))
@@ -261,6 +270,7 @@ def test_a_printed_reading_and_soil_elements_are_said(tmp_path, opened):
     assert "strongly discouraged" in text
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("law", RESISTANCES[1:])
 def test_a_law_of_the_resistance_acts_in_the_simulator_and_is_copied(tmp_path, opened, law):
     sweep = boulder_sweep.load("configs/rwg.yaml", [f"model.resistance={law}"])
@@ -273,6 +283,7 @@ def test_a_law_of_the_resistance_acts_in_the_simulator_and_is_copied(tmp_path, o
     assert f"Ultimate resistance of the soil: {LAW_WORDS[law]}" in page.inner_text("main")
 
 
+@pytest.mark.nightly
 def test_a_slope_and_water_at_the_soil_line_act_in_the_simulator_and_are_copied(tmp_path, opened):
     sweep = boulder_sweep.load("configs/rwg.yaml", ["soil.slope=8 deg", "soil.water_table=0", "model.resistance=broms"])
     page = opened(write_explorer(sweep, 0, tmp_path / "ground.html"))
@@ -284,6 +295,7 @@ def test_a_slope_and_water_at_the_soil_line_act_in_the_simulator_and_are_copied(
     assert boulder_sweep.load(tmp_path / "copied.yaml").model.ground == sweep.model.ground
 
 
+@pytest.mark.nightly
 def test_print_has_every_section_and_no_switches(report, opened):
     page = opened(report)
     page.emulate_media(media="print")
@@ -302,12 +314,14 @@ def test_a_design_that_cannot_be_computed_says_why(tmp_path, opened):
     assert page.complaints == []
 
 
+@pytest.mark.nightly
 def test_chosen_designs_are_those_asked_for(result, tmp_path, opened):
     page = opened(write_report(result, tmp_path / "two.html", designs=(7, 200), units="us"))
     assert page.locator("article h3").all_inner_texts() == ["Design 7 (design 7)", "Design 200 (design 200)"]
     assert page.input_value("#units") == "us"
 
 
+@pytest.mark.nightly
 def test_the_map_is_walked_and_picked_by_keys(report, opened):
     page = opened(report)
     page.focus("#figure-sweep-map")
@@ -336,6 +350,7 @@ def test_the_map_is_walked_and_picked_by_keys(report, opened):
 KINETIC = "page.motions.live.motion.columns.vehicle_kinetic[0]"
 
 
+@pytest.mark.nightly
 def test_the_energy_follows_when_the_reader_pauses(explorer, opened):
     page = opened(explorer)
     energies = "page.plots.find('live-energies').data.vehicle_kinetic[0]"

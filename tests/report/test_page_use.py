@@ -59,6 +59,7 @@ def test_one_axis_is_a_strip(tmp_path, opened):
     assert page.complaints == []
 
 
+@pytest.mark.nightly
 def test_no_input_is_both_across_and_up(report, opened):
     page = opened(report)
     for across, up, changed in (("#across", "#up", "sweep"), ("#live-across", "#live-up", "live")):
@@ -71,6 +72,7 @@ def test_no_input_is_both_across_and_up(report, opened):
         assert page.evaluate(f"page.cells.{changed}.length") == shown
 
 
+@pytest.mark.nightly
 def test_designs_of_a_list_at_one_place_show_the_worst_of_them(tmp_path, opened):
     places = [(height, depth) for height in (3.2, 3.4) for depth in (1.8, 2.2)]
     lines = [f"{height},{depth},{angle}" for angle in (30, 38, 42) for height, depth in places]
@@ -135,6 +137,7 @@ OWN_CLOCK = """(() => {
 })()"""
 
 
+@pytest.mark.nightly
 def test_one_player_that_pauses(report, opened):
     page = opened(report)
     page.evaluate(OWN_CLOCK)
@@ -171,6 +174,7 @@ def test_one_player_that_pauses(report, opened):
     assert page.complaints == []
 
 
+@pytest.mark.nightly
 def test_the_colours_of_legends_are_printed(report, opened):
     page = opened(report)
     page.emulate_media(media="print")
@@ -179,6 +183,7 @@ def test_the_colours_of_legends_are_printed(report, opened):
         assert style == "exact"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("width", "below"), [(390, True), (1280, False)])
 def test_on_a_phone_legends_are_below_their_figures(report, opened, width, below):
     page = opened(report, viewport={"width": width, "height": 844})

@@ -33,6 +33,7 @@ def test_the_simulator_knows_the_second_spring(sweep, tmp_path, opened):
     assert ledger.crush_spent_J[-1] > 0.0
 
 
+@pytest.mark.nightly
 def test_the_copied_file_has_it(sweep, tmp_path, opened):
     page = opened(write_explorer(sweep, 0, tmp_path / "two.html"))
     (tmp_path / "copied.yaml").write_text(page.input_value("#yaml"))
@@ -41,6 +42,7 @@ def test_the_copied_file_has_it(sweep, tmp_path, opened):
     assert refused[0]["reason"] == "second spring of the vehicle is softer than the first"
 
 
+@pytest.mark.nightly
 def test_a_report_has_it_in_its_rows(tmp_path, opened):
     grid = boulder_sweep.load(
         "configs/rwg.yaml", [STAGES.replace("0.4 m", "[0.4 m, 5 m]"), "vehicle.speed=[12, 14] m/s"]
