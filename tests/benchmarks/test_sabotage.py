@@ -10,7 +10,6 @@ import pytest
 from benchmarks import counts
 from benchmarks.sabotage import SABOTAGES, Sabotage, complaint_about_counts, sabotaged
 
-
 SHOWN_TWICE = ("a lane step done twice, by calls", "a design simulated twice by the kernels, by calls")
 """Counts of machine code, and of a run, show these at less cost."""
 
