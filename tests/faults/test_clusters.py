@@ -183,6 +183,7 @@ def test_a_scheduler_that_hangs_is_noticed(tmp_path, monkeypatch, bar):
     assert status(out, verify=True).damaged == {}
 
 
+@pytest.mark.nightly
 def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypatch):
     out, rows = tmp_path / "out", 8
     run(grid_of(rows), tmp_path / "whole", simulate=plausible)
@@ -213,6 +214,7 @@ def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypa
     assert same_bits(table.take(others), whole.take(others))
 
 
+@pytest.mark.nightly
 def test_an_adaptive_cluster_starts_workers_for_a_run(tmp_path):
     """From none: work that waits is what makes it start them."""
     rows, how = 4000, {"rows_per_part": 500, "simulate": slowly}

@@ -106,6 +106,7 @@ def test_designs_of_a_list_at_one_place_show_the_worst_of_them(tmp_path, opened)
     assert "the map has 6 places" in page.inner_text("#sweep-words")
 
 
+@pytest.mark.nightly
 def test_leaving_a_box_shows_what_is_simulated(report, opened):
     page = opened(report)
     box, said = "#in-friction_angle_deg", "#limited-friction_angle_deg"
