@@ -40,13 +40,20 @@ def chosen(count: int) -> list[dict[str, Any]]:
     return [entry for turn in turns for entry in turn if entry is not None][:count]
 
 
-def differences(found: Summary, known: Summary) -> dict[str, tuple[object, object]]:
-    """What is not the same: values to a part in 10^9, instants of flat maxima to a microsecond."""
+def differences(found: Summary, known: Summary, options: dict[str, Any]) -> dict[str, tuple[object, object]]:
+    """What is not the same on any processor: values to a part in 10^9, instants of flat maxima to a microsecond.
+
+    The last digits of sines and sums are those of a processor's libraries. They decide where steps lie; so where steps
+    go over kinks, which costs accuracy, one processor differs from another by up to 10^-5. A stiff impact rings, and
+    which of its many equal maxima is the largest is theirs to decide as well.
+    """
+    exact = options["land_on_kinks"] or options["stiff"]
+    value, instant = (1e-9, 1e-6) if exact else (1e-4, 1e-4)
 
     def same(a: Any, b: Any) -> bool:
         if isinstance(a, Peak):
-            return same(a.value, b.value) and abs(a.time - b.time) <= 1e-6
-        return np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=1e-9, atol=1e-11)
+            return same(a.value, b.value) and (options["stiff"] or abs(a.time - b.time) <= instant)
+        return np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=value, atol=0.01 * value)
 
     pairs = {name: (getattr(found, name), getattr(known, name)) for name in Summary.__dataclass_fields__}
     return {name: pair for name, pair in pairs.items() if not same(*pair)}
@@ -56,7 +63,7 @@ def computed_again(entry: dict[str, Any]) -> dict[str, tuple[object, object]]:
     """Differences between an entry and the impact integrated anew."""
     inputs, readings, options = arguments_of(entry["case"])
     again = summary_of(simulate.__wrapped__(inputs, readings, **options))
-    return differences(again, records.summary_from(entry["found"]))
+    return differences(again, records.summary_from(entry["found"]), options)
 
 
 def test_record_is_of_the_present_sources() -> None:
