@@ -14,6 +14,9 @@ import pytest
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
+# Two workers on two processors: threads of linear algebra would be in the way of each other. NumPy reads this once.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # A busy machine is no reason to fail, and every run tries the same examples unless others are asked for.
 hypothesis.settings.register_profile(
     "patient", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow], derandomize=True

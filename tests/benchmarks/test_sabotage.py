@@ -12,11 +12,12 @@ from benchmarks.sabotage import SABOTAGES, Sabotage, complaint_about_counts, sab
 
 SHOWN_TWICE = ("a lane step done twice, by calls", "a design simulated twice by the kernels, by calls")
 """Counts of machine code, and of a run, show these at less cost."""
+LONG = "a proof of rest that no longer ends a simulation"
 
 
 def marks_of(name: str, sabotage: Sabotage) -> list[pytest.MarkDecorator]:
     compiled = [] if sabotage.shown_by == ("calls",) else [pytest.mark.compiled]
-    return compiled + ([pytest.mark.nightly] if name in SHOWN_TWICE else [])
+    return compiled + ([pytest.mark.nightly] if name in (*SHOWN_TWICE, LONG) else [])
 
 
 SHOWN_BY_COUNTS = [

@@ -125,7 +125,9 @@ def _with_streams(redirection, *words, **environment):
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("redirection", [">&-", "2>&-", ">&- 2>&-", "2>/dev/full"])
+@pytest.mark.parametrize(
+    "redirection", [pytest.param(">&-", marks=pytest.mark.nightly), "2>&-", ">&- 2>&-", "2>/dev/full"]
+)
 def test_closed_and_full_streams_change_no_exit_code(grid, redirection):
     assert _with_streams(redirection, "run", "grid.yaml", "-o", "out.sweep")[0] == 3
     assert Path("out.sweep/_manifest.parquet").exists()
@@ -135,7 +137,9 @@ def test_closed_and_full_streams_change_no_exit_code(grid, redirection):
     assert _with_streams(redirection, "check", "nothere.yaml")[0] == 2
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+@pytest.mark.parametrize(
+    "encoding", ["ascii", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("latin-1", "cp1252"))]
+)
 def test_what_the_encoding_of_stdout_lacks_is_replaced(possible_grid, encoding):
     text = possible_grid.read_text().replace("[1.6, 2.6, 3.5] m", "2.6 m").replace("[60, 95]", "60")
     possible_grid.write_text(text.replace("[0.8, 1.2, 1.5] m", "1.5 m"))

@@ -32,6 +32,8 @@ WORDS = {
     "fit-vehicle": ("pulse.csv", "--mass", "6800 kg"),
 }
 """A plain use of every command."""
+LONG = ("uncertainty", "tradeoff", "validate")
+"""Commands that take seconds; their widths are nightly."""
 PULSE = "time_s,acceleration_m_s2\n" + "".join(
     f"{t / 1000:.3f},{-153 * (t / 60) * (2 - t / 60):.3f}\n" for t in range(121)
 )
@@ -73,7 +75,9 @@ def test_help(sweep, name):
     assert wide(out) == []
 
 
-@pytest.mark.parametrize("name", WORDS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.nightly] if name in LONG else []) for name in WORDS]
+)
 def test_output(sweep, name):
     words = ("--overwrite",) if name == "run" else ()
     code, out, err = sweep(name, *WORDS[name], *words)

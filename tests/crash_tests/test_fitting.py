@@ -53,7 +53,9 @@ def test_exact_pulse_gives_the_vehicle_back(wall: RigidWall, signals: list[str])
     assert fit.warnings == ()
 
 
-@pytest.mark.parametrize("signals", [["velocity"], ["displacement", "acceleration"]])
+@pytest.mark.parametrize(
+    "signals", [["velocity"], pytest.param(["displacement", "acceleration"], marks=pytest.mark.nightly)]
+)
 def test_standard_errors_are_those_of_repeated_fits(signals: list[str]) -> None:
     scatter = np.array(
         [offsets(fit_pulse(pulse(PAPER, signals, 0.02, seed), PAPER.mass_kg), PAPER) for seed in range(20)]

@@ -44,9 +44,9 @@ def summed_up(values: np.ndarray, step: float) -> np.ndarray:
     ("signals", "times", "cutoff_Hz"),
     [
         (["acceleration"], TIMES, None),
-        (["velocity"], TIMES, None),
-        (["displacement"], TIMES, None),
-        (ALL, TIMES, None),
+        pytest.param(["velocity"], TIMES, None, marks=pytest.mark.nightly),
+        pytest.param(["displacement"], TIMES, None, marks=pytest.mark.nightly),
+        pytest.param(ALL, TIMES, None, marks=pytest.mark.nightly),
         (["acceleration"], FINE, 100.0),
     ],
     ids=["acceleration", "velocity", "displacement", "all", "filtered"],

@@ -70,6 +70,7 @@ def test_element_sums_approach_the_closed_form(found: Validation) -> None:
     assert convergence([50]).elements == (50,)
 
 
+@pytest.mark.nightly
 def test_command_writes_pictures_and_tables(sweep: Command, tmp_path: Path) -> None:
     code, out, err = sweep("validate", "-o", tmp_path / "v")
     assert (code, err) == (0, "")

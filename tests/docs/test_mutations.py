@@ -16,6 +16,14 @@ REGISTER = {entry.number: entry for entry in entries((ROOT / "docs" / "equations
 _PASSED = re.compile(r"^(\S+?::\w+).* PASSED", re.MULTILINE)
 
 
+def is_of_kernels(mutation: Mutation) -> bool:
+    return mutation.file.startswith("kernels/")
+
+
+IN_ORDER = sorted(MUTATIONS, key=is_of_kernels, reverse=True)
+"""Those beside the kernels last: their tests need compiled kernels, which other tests have compiled by then."""
+
+
 def name_of(mutation: Mutation) -> str:
     return f"{'-'.join(map(str, mutation.equations))}: {mutation.old}"
 
@@ -40,7 +48,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("mutation", MUTATIONS, ids=name_of)
+@pytest.mark.parametrize("mutation", IN_ORDER, ids=name_of)
 def test_a_broken_equation_turns_its_tests_red(copy: Path, mutation: Mutation) -> None:
     tests = sorted({test for number in mutation.equations for test in REGISTER[number].tests})
     with broken(copy, mutation):
@@ -71,7 +79,3 @@ def test_a_run_that_breaks_off_is_no_failed_test(tmp_path: Path) -> None:
     (tmp_path / "conftest.py").write_text(f"raise SystemExit({int(pytest.ExitCode.TESTS_FAILED)})\n")
     done = run_tests(tmp_path, ["."], compiled=False)
     assert done.code == BROKEN_RUN, done.output
-
-
-def is_of_kernels(mutation: Mutation) -> bool:
-    return mutation.file.startswith("kernels/")

@@ -79,6 +79,7 @@ def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
         assert expected in (site / name).read_text(encoding="utf-8"), name
 
 
+@pytest.mark.nightly
 def test_search_works_from_disk(site: Path, chromium: Any) -> None:
     errors: list[str] = []
     asked: list[str] = []

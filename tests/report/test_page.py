@@ -13,7 +13,6 @@ from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.views.wording import LAW_WORDS
 from tests.report.conftest import GRID, SETS
 
-DESIGNS = 200
 SLIDERS = {
     "boulder_length_m": (0.6, 2.0),
     "boulder_width_m": (0.8, 2.5),
@@ -45,9 +44,9 @@ def explorer(tmp_path_factory):
     return write_explorer(boulder_sweep.load(folder / "case.yaml"), 0, folder / "case.html")
 
 
-def random_designs():
+def random_designs(count):
     rng = np.random.default_rng(12)
-    for _ in range(DESIGNS):
+    for _ in range(count):
         design = {name: float(rng.uniform(*ends)) for name, ends in SLIDERS.items()} | KEPT
         design["embedment_depth_m"] = design["boulder_height_m"] * float(rng.uniform(0.35, 0.75))
         yield design
@@ -73,9 +72,10 @@ def test_the_page_forbids_the_network(report, opened):
     assert page.evaluate("window.added") is None
 
 
-def test_random_designs_come_out_as_the_command_line_has_them(explorer, opened):
+@pytest.mark.parametrize("count", [60, pytest.param(200, marks=pytest.mark.nightly)])
+def test_random_designs_come_out_as_the_command_line_has_them(explorer, opened, count):
     page = opened(explorer)
-    designs = list(random_designs())
+    designs = list(random_designs(count))
     code = "(designs) => designs.map((one) => { page.take(one); return page.simulator.whole(page.design).judged; })"
     found = page.evaluate(code, designs)
     seen, flags = set(), set()
@@ -110,7 +110,7 @@ def test_maps_come_out_as_a_sweep_has_them(report, result, opened):
 
 def test_curves_are_those_of_the_command_line(explorer, opened):
     page = opened(explorer)
-    design = next(random_designs())
+    design = next(random_designs(1))
     motion = page.evaluate(
         """(design) => {
           page.take(design);
@@ -167,7 +167,7 @@ def test_units_switch_everywhere_and_back(report, opened):
 
 def test_the_copied_file_means_the_same_design(tmp_path, explorer, opened):
     page = opened(explorer)
-    design = next(random_designs())
+    design = next(random_designs(1))
     page.evaluate("(design) => page.take(design)", design)
     (tmp_path / "copied.yaml").write_text(page.input_value("#yaml"))
     sweep = boulder_sweep.load(tmp_path / "copied.yaml")

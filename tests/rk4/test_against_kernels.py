@@ -53,7 +53,8 @@ def test_the_same_motion(preset: str) -> None:
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("preset", ["corrected", pytest.param("as_printed", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("preset", ["corrected", "as_printed"])
 def test_the_same_motion_of_many(preset: str) -> None:
     """Designs that graze the printed jump, or the limit, may differ; no more than one in a thousand does."""
     turned, moved, crushed = differences(sample(4000), preset)

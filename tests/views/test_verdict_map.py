@@ -171,7 +171,7 @@ def in_pieces(table: pd.DataFrame, size: int) -> Pieces:
     return pieces
 
 
-@pytest.mark.parametrize("size", [1, 7, 100])
+@pytest.mark.parametrize("size", [pytest.param(1, marks=pytest.mark.nightly), 7, 100])
 @pytest.mark.parametrize("cells", [True, False])
 def test_a_table_in_pieces_gives_the_same_picture(table, tmp_path, monkeypatch, size, cells):
     if not cells:
