@@ -203,9 +203,7 @@ def main() -> int:
     wanted = parser.parse_args().only or [*SABOTAGES, "untouched"]
     print(machine())
     failed = 0
-    for name in wanted:
-        if name == "untouched":
-            continue
+    for name in filter(SABOTAGES.get, wanted):
         with tempfile.TemporaryDirectory(prefix="sweep-sabotage-") as folder:
             stopped, trials = caught(Path(folder), SABOTAGES[name]), SABOTAGES[name].trials
         print(f"{name}: stopped {stopped} of {trials} times", flush=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
 from collections.abc import Callable, Iterator
@@ -14,8 +15,11 @@ import pytest
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
-# Two workers on two processors: threads of linear algebra would be in the way of each other. NumPy reads this once.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Two workers on two processors: further threads for linear algebra would be in the way. NumPy and SciPy read this once,
+# when they are imported. It does not stay set: processes that tests start have the environment of a user.
+with pytest.MonkeyPatch.context() as while_importing:
+    while_importing.setenv("OPENBLAS_NUM_THREADS", "1")
+    importlib.import_module("scipy.linalg")
 
 # A busy machine is no reason to fail, and every run tries the same examples unless others are asked for.
 hypothesis.settings.register_profile(

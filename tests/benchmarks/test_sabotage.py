@@ -10,14 +10,18 @@ import pytest
 from benchmarks import counts
 from benchmarks.sabotage import SABOTAGES, Sabotage, complaint_about_counts, sabotaged
 
-SHOWN_TWICE = ("a lane step done twice, by calls", "a design simulated twice by the kernels, by calls")
-"""Counts of machine code, and of a run, show these at less cost."""
-LONG = "a proof of rest that no longer ends a simulation"
+NIGHTLY = (
+    # Counts of machine code, and of a run, show these two at less cost.
+    "a lane step done twice, by calls",
+    "a design simulated twice by the kernels, by calls",
+    # Simulates to the horizon without the compiler, which takes seconds.
+    "a proof of rest that no longer ends a simulation",
+)
 
 
 def marks_of(name: str, sabotage: Sabotage) -> list[pytest.MarkDecorator]:
     compiled = [] if sabotage.shown_by == ("calls",) else [pytest.mark.compiled]
-    return compiled + ([pytest.mark.nightly] if name in (*SHOWN_TWICE, LONG) else [])
+    return compiled + ([pytest.mark.nightly] if name in NIGHTLY else [])
 
 
 SHOWN_BY_COUNTS = [
