@@ -86,7 +86,7 @@ def test_an_interrupted_run_goes_on_to_the_same_table(tmp_path, bar):
     assert same_bits(read_table(out), read_table(tmp_path / "whole"))
 
 
-@pytest.mark.parametrize("backend", ["threading", "dask"])
+@pytest.mark.parametrize("backend", ["threading", pytest.param("dask", marks=pytest.mark.nightly)])
 def test_the_second_signal_ends_it_at_once(tmp_path, bar, backend):
     """The first one is noted, and nobody is there to act on it."""
     driver = Driver(tmp_path / "out", *HELD, "--backend", backend, "--stuck", **bar.environment)

@@ -305,6 +305,7 @@ def test_print_has_every_section_and_no_switches(report, opened):
     assert page.pdf(format="A4").startswith(b"%PDF")
 
 
+@pytest.mark.nightly
 def test_a_design_that_cannot_be_computed_says_why(tmp_path, opened):
     (tmp_path / "grid.yaml").write_text(GRID.replace("{from: 0.45, to: 0.75, count: 7}", "[0.6, 1.0]"))
     boulder_sweep.run(boulder_sweep.load(tmp_path / "grid.yaml"), tmp_path / "out")

@@ -24,7 +24,8 @@ def reported(text, folder):
     return write_report(folder / "site.sweep", folder / "site.html")
 
 
-@pytest.mark.parametrize("kind", [pytest.param("run", marks=pytest.mark.nightly), "uncertainty"])
+@pytest.mark.nightly
+@pytest.mark.parametrize("kind", ["run", "uncertainty"])
 def test_the_report_of_one_design_has_a_simulator_and_no_map(kind, tmp_path, opened):
     if kind == "run":
         file = reported(SITE, tmp_path)
