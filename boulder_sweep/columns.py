@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 ColumnType = Literal["int64", "float64", "dictionary"]
-Rows = Literal["all", "judged", "computed", "rated", "overturned"]
+Rows = Literal["all", "judged", "computed", "free", "rated", "overturned"]
 
 VERDICTS = ("pass", "fail", "undecided", "error")
 REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override")
@@ -55,9 +55,10 @@ class OutcomeColumn(ColumnSpec):
     value : callable
         From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
         (n,): numbers in `unit`, or codes.
-    rows : {'all', 'judged', 'computed', 'rated', 'overturned'}
-        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* those simulated, *rated*
-        those whose penetration counts: neither overturned nor left undecided by anything but the numerical error.
+    rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned'}
+        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* those simulated, *free* those
+        of them that were not stopped at the limit of the rotation, *rated* those whose penetration counts: neither
+        overturned nor left undecided by anything but the numerical error.
     words : tuple of str
         What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
     """
@@ -192,8 +193,9 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "rotation_error_deg",
         "float64",
         "deg",
-        "estimated numerical error of max_rotation_deg",
+        "estimated numerical error of max_rotation_deg; null where that is the limit itself",
         lambda facts: np.degrees(facts.outcomes.theta_error),
+        rows="free",
     ),
     OutcomeColumn(
         "displacement_error_m",
@@ -201,6 +203,14 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "m",
         "estimated numerical error of the displacements",
         lambda facts: facts.outcomes.x_error,
+    ),
+    OutcomeColumn(
+        "time_to_limit_error_s",
+        "float64",
+        "s",
+        "estimated numerical error of time_to_limit_s: that of the displacements over the speed of impact",
+        lambda facts: facts.outcomes.x_error / np.where(facts.rows["overturned"], facts.designs.table.v_0, np.nan),
+        rows="overturned",
     ),
     OutcomeColumn(
         "vehicle_crush_m",

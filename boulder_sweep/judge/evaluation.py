@@ -20,7 +20,7 @@ from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, PASS, Judged, joined, not_computed, with_rows
-from boulder_sweep.judge.refinement import finer_controls, is_open, reported_step_s
+from boulder_sweep.judge.refinement import agree, finer_controls, is_late, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 
@@ -113,8 +113,9 @@ class Evaluation:
     def judged(self, designs: Designs) -> Judged:
         """Simulate and judge designs that can be computed.
 
-        Rows that are refused for their time steps, or undecided for their numerical error, are simulated again by
-        finer steps until they are decided or `finer_controls` ends. A row depends on nothing but its own design.
+        Rows that are refused for their time steps, undecided for their numerical error, or late are simulated again
+        by finer steps until they are decided or `finer_controls` ends, see `refinement`. A row depends on nothing but
+        its own design.
 
         Parameters
         ----------
@@ -132,14 +133,27 @@ class Evaluation:
         then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         """
-        found = self._once(designs, self.control)
+        found, outcomes = self._once(designs, self.control)
+        steps_s = np.full(designs.size, reported_step_s(self.control))
+        late = is_late(found, outcomes, self.control)
         for control in finer_controls(self.control):
-            again = np.flatnonzero(is_open(found, control))
+            again = np.flatnonzero(is_open(found, control) | (late & (not control.last_resort)))
             if not len(again):
                 break
-            finer = self._once(designs.rows(again), control)
-            computed = finer.verdict != ERROR
-            found = with_rows(found, again[computed], finer.rows(computed))
+            some = designs.rows(again)
+            finer, solution = self._once(some, control)
+            confirmed = late[again] & (finer.verdict == found.verdict[again])
+            confirmed &= agree(_rows_of(outcomes, again), solution, some.table.v_0)
+            late[again[confirmed]] = False
+            taken = (finer.verdict != ERROR) & ~confirmed
+            places = again[taken]
+            late[places] = is_late(finer, solution, control)[taken]
+            found = with_rows(found, places, finer.rows(taken))
+            steps_s[places] = reported_step_s(control)
+            for values, new in zip(outcomes, solution, strict=True):
+                values[places] = new[taken]
+        if late.any():
+            found = self._doubted(found, np.flatnonzero(late), designs, outcomes, steps_s)
         found = joined([found])
         return self._margins_proved(found, designs) if self.least_margin > 0.0 else found
 
@@ -160,10 +174,18 @@ class Evaluation:
         margin[there[reduced.judged(designs.rows(there)).verdict != PASS]] = np.nextafter(self.least_margin, 0.0)
         return replace(found, columns=found.columns | {"margin": margin})
 
-    def _once(self, designs: Designs, control: Control) -> Judged:
+    def _once(self, designs: Designs, control: Control) -> tuple[Judged, OutcomeTable]:
         """Simulate and judge designs once."""
         outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
-        return judge(outcomes, designs, self.limits, reported_step_s(control), self.only)
+        return judge(outcomes, designs, self.limits, reported_step_s(control), self.only), outcomes
+
+    def _doubted(
+        self, found: Judged, places: np.ndarray, designs: Designs, outcomes: OutcomeTable, steps_s: np.ndarray
+    ) -> Judged:
+        """Judge late rows, on which no two solutions agree, as of unknown error."""
+        unknown = np.full(len(places), np.inf)
+        doubted = _rows_of(outcomes, places)._replace(theta_error=unknown, x_error=unknown)
+        return with_rows(found, places, judge(doubted, designs.rows(places), self.limits, steps_s[places], self.only))
 
     @property
     def columns(self) -> tuple[OutcomeColumn, ...]:
@@ -213,6 +235,11 @@ _warm_ups_s: list[float] = []
 def warm_up_s() -> float | None:
     """Return how long the last warm-up of this process took [s]; None where there was none."""
     return _warm_ups_s[-1] if _warm_ups_s else None
+
+
+def _rows_of(outcomes: OutcomeTable, places: np.ndarray) -> OutcomeTable:
+    """Return some rows of outcomes."""
+    return type(outcomes)(*(values[places] for values in outcomes))
 
 
 def evaluation_of(

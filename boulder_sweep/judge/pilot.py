@@ -117,9 +117,16 @@ def simulated(designs: Designs, readings: Readings, control: Control) -> Outcome
 
 
 def estimated_error_deg(designs: Designs, readings: Readings, control: Control) -> float:
-    """Quantile of the estimated errors of the rotation [deg] where the limit was not reached; 0 where it always was."""
+    """Quantile of the estimated errors of the rotation [deg]; 0 where no error could be estimated.
+
+    A boulder that overturns has no error of its largest rotation, but its other errors stand for one: those of the
+    displacements, over the embedment depth or half the height of the boulder, as `estimate_errors` compares them.
+    """
     outcomes = simulated(designs, readings, control)
-    counts = ~np.isnan(outcomes.theta_error) & (outcomes.status != Status.LIMIT)
+    arm = np.maximum(designs.table.d, 0.5 * designs.table.H)
+    limit = (outcomes.status == Status.LIMIT) & np.isfinite(outcomes.theta_error)
+    errors = np.where(limit, outcomes.x_error / arm, outcomes.theta_error)
+    counts = ~np.isnan(errors)
     if not counts.any():
         return 0.0
-    return math.degrees(float(np.quantile(outcomes.theta_error[counts], QUANTILE, method="higher")))
+    return math.degrees(float(np.quantile(errors[counts], QUANTILE, method="higher")))

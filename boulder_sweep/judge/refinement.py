@@ -1,6 +1,11 @@
-"""Finer steps for the rows that need them: those refused for their time steps, or undecided for their error.
+"""Finer steps for the rows that need them: refused for their time steps, undecided for their error, or late.
 
-What is still refused by the finest of them is simulated a last time by `boulder_kernels.last_resort`.
+A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking amplifies
+every error: both solutions from which the error is estimated can follow the same wrong branch, where the estimate does
+not see it. So a late row passes or overturns only if solutions whose steps differ by 1/`FACTOR` over the whole motion
+agree; until they do it is simulated again by finer steps, and is undecided where even the finest two differ.
+
+What is still refused by the finest steps is simulated a last time by `boulder_kernels.last_resort`.
 """
 
 from __future__ import annotations
@@ -9,10 +14,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from boulder_kernels import Control
+from boulder_kernels import Control, OutcomeTable, Status
+from boulder_kernels.memory import ELASTIC
 from boulder_sweep.columns import REASONS
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, finer_step_s
-from boulder_sweep.judge.judged import NUMERICAL_ERROR, Judged
+from boulder_sweep.judge.judged import NUMERICAL_ERROR, OVERTURNS, PASS, Judged
 from boulder_sweep.judge.verdict import STEP_REASONS
 
 FACTOR = 0.25
@@ -21,6 +27,10 @@ LAST_RESORT_STEPS = 2_000
 """Steps to the horizon of the last attempt, where nothing asks for shorter ones."""
 MOST_STEPS = 20_000
 """Steps to the horizon at which it ends, with the soil in closed form; fewer with many soil elements."""
+
+SAME_ANGLE, SAME_WAY = 1e-6, 1e-4
+"""Solutions of a late row agree if what they reach differs by no more than the error estimated for the coarser, or by
+less than this [rad], [m]: with the shortest steps the estimate falls below the rounding that late motion amplifies."""
 
 
 def finer_controls(control: Control) -> Iterator[Control]:
@@ -55,3 +65,32 @@ def is_open(judged: Judged, control: Control) -> np.ndarray:
     """Return which rows finer steps, those of a control, may decide (bool, shape (n,))."""
     refused = [code for code, reason in enumerate(judged.reasons) if code >= len(REASONS) and reason in STEP_REASONS]
     return np.isin(judged.reason, refused if control.last_resort else [NUMERICAL_ERROR, *refused])
+
+
+def is_late(judged: Judged, outcomes: OutcomeTable, control: Control) -> np.ndarray:
+    """Return which rows need another solution to agree with them before they pass or overturn (bool, shape (n,)).
+
+    None where no error is estimated: such verdicts are unguarded. None either in soil that stays pressed, where every
+    motion goes on until it rests, and loses its energy to the soil instead of rocking.
+    """
+    if not control.error_estimate or control.unloading != ELASTIC:
+        return np.zeros(len(judged), dtype=bool)
+    return (outcomes.t_end > control.horizon) & ((judged.verdict == PASS) | (judged.reason == OVERTURNS))
+
+
+def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: np.ndarray) -> np.ndarray:
+    """Return which rows of two solutions end alike (bool, shape (n,)).
+
+    Parameters
+    ----------
+    coarse, fine
+        Solutions whose steps differ by `FACTOR`, each with its estimated errors.
+    v_0
+        Speeds of impact [m/s]: an error of the displacement is one of the time, too, see
+        `boulder_kernels.table.estimate_errors`.
+    """
+    limit = coarse.status == Status.LIMIT
+    alike = limit == (fine.status == Status.LIMIT)
+    in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= np.maximum(coarse.x_error, SAME_WAY)
+    in_angle = np.abs(coarse.theta_max - fine.theta_max) <= np.maximum(coarse.theta_error, SAME_ANGLE)
+    return alike & np.isfinite(fine.x_error) & np.where(limit, in_time, in_angle)

@@ -14,7 +14,8 @@ The rules, worst first; the first that applies decides the row:
 9. ``pass``. Where a reading lets forces feed energy, as the printed ones do, nothing can be proved of later times; such
    rows are undecided by rule 7, unless a comparison of readings asks only what stands to the longest horizon.
 
-A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side.
+A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
+one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.
 Where no error was estimated (NaN), rule 8 cannot apply and the verdict is unguarded.
 """
 
@@ -99,8 +100,8 @@ class Facts(NamedTuple):
     designs: Designs
     """Inputs of the same rows."""
     limits: Limits
-    step_s: float
-    """Step of the solution that is judged [s]."""
+    step_s: float | np.ndarray
+    """Step of the solution that is judged [s], of all rows or of each."""
     rows: dict[Rows, np.ndarray]
     """Masks, see `OutcomeColumn`."""
     overlap: np.ndarray
@@ -122,7 +123,11 @@ class Facts(NamedTuple):
 
 
 def judge(
-    outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float, only: tuple[str, ...] = ()
+    outcomes: OutcomeTable,
+    designs: Designs,
+    limits: Limits,
+    step_s: float | np.ndarray,
+    only: tuple[str, ...] = (),
 ) -> Judged:
     """Apply the rules of this module to n rows.
 
@@ -135,7 +140,7 @@ def judge(
     limits
         Limits of the criterion, and what the model was tested on.
     step_s
-        Step of the solution [s].
+        Step of the solution [s], one or of each row.
     only
         Columns wanted; all of the table where empty.
 
@@ -161,7 +166,7 @@ def judge(
     return Judged(columns, words)
 
 
-def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float) -> Facts:
+def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float | np.ndarray) -> Facts:
     """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
     no_contact = status == Status.NO_CONTACT
@@ -179,6 +184,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
     computed = simulated & finite
 
     overturned = computed & ((status == Status.LIMIT) | (outcomes.theta_max >= limits.rotation))
+    overturned &= ~np.isinf(outcomes.theta_error)
     standing = computed & ~overturned
     penetration = outcomes.x_v_max - designs.bed_offset - designs.table.L
     too_deep = standing & (penetration > limits.penetration)
@@ -217,7 +223,13 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
         designs=designs,
         limits=limits,
         step_s=step_s,
-        rows={"judged": verdict != ERROR, "computed": computed, "rated": rated, "overturned": overturned},
+        rows={
+            "judged": verdict != ERROR,
+            "computed": computed,
+            "free": computed & ~(overturned & (status == Status.LIMIT)),
+            "rated": rated,
+            "overturned": overturned,
+        },
         overlap=overlap,
         penetration=penetration,
         margin=np.minimum(

@@ -52,7 +52,8 @@ function judge(outcomes, row, inputs, rules) {
   const ended = of("status");
   const [theta, x_b, x_v, F_v, crush, end] = ["theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max", "t_end"].map(of);
   const valid = rules.simulated.includes(ended) && [theta, x_b, x_v, F_v, crush, end].every(Number.isFinite);
-  const overturned = valid && (ended === status.LIMIT || theta >= rules.rotation);
+  // Where only one of two solutions overturns the error is infinite, and nothing is decided.
+  const overturned = valid && (ended === status.LIMIT || theta >= rules.rotation) && of("theta_error") !== Infinity;
   const standing = valid && !overturned;
   const penetration = x_v - inputs.bed_offset_m - inputs.boulder_length_m;
   const overlap = inputs.boulder_height_m - inputs.embedment_depth_m - inputs.bumper_height_m;
@@ -85,8 +86,9 @@ function judge(outcomes, row, inputs, rules) {
     rating: rated ? rating : null,
     time_to_limit_s: kept(of("t_limit"), overturned),
     end_time_s: kept(end),
-    rotation_error_deg: kept(of("theta_error") * DEGREES),
+    rotation_error_deg: kept(of("theta_error") * DEGREES, valid && !(overturned && ended === status.LIMIT)),
     displacement_error_m: kept(of("x_error")),
+    time_to_limit_error_s: kept(of("x_error") / inputs.impact_speed_m_s, overturned),
     vehicle_crush_m: kept(crush),
     overlap_m: verdict === "error" ? null : overlap,
     validity: verdict === "error" ? null : flagsOf(outcomes, row, inputs, overlap, rules).join(";"),

@@ -1,0 +1,162 @@
+"""Rows whose motion goes on past the horizon pass or overturn only where finer steps agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import boulder_sweep
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status
+from boulder_sweep.judge.evaluation import by_kernels, control_of, evaluation_of
+from boulder_sweep.judge.inputs import Designs, designs_of
+from boulder_sweep.judge.judged import FAIL, NUMERICAL_ERROR, PASS, UNDECIDED
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.refinement import FACTOR
+
+SHALLOW = """\
+boulder_length_m,boulder_width_m,boulder_height_m,boulder_density_kg_m3,soil_density_kg_m3,friction_angle_deg,\
+subgrade_reaction_MN_m3,strain_rate_factor,vehicle_mass_kg,impact_speed_m_s,vehicle_spring_N_m,vehicle_damper_N_s_m,\
+bumper_height_m,hood_height_m,embedment_depth_m
+1.5175642672043272,2.0086155649431463,2.1544118974593518,2668.5187732058989,1778.1235550135909,29.988006683300725,\
+47.517960530047262,1.1832883910480101,5185.5194984995205,9.9252117458555631,2778193.7671021004,233182.88706600768,\
+0.50942725528288069,0.8619359132632276,0.60235264669532462
+1.502280695652227,1.1139247119819158,2.3308538663460663,2963.973468061834,1902.1084775141585,36.346164056331773,\
+82.446721419430375,1.1876368779669542,5873.4937051077195,8.4890135860984426,3739407.5626126858,211565.17370188705,\
+0.54098269172023872,1.0552274848342793,0.4639680028016327
+1.7267622569633507,1.1164691914674638,3.6766641193069773,2685.7831413812228,1780.3915651491579,44.217416342339774,\
+80.959672846799066,1.1612394108875881,5370.2545153646934,12.531666703950298,2992081.0788948722,95706.921823045297,\
+0.30434791362803376,1.5604768003176754,0.35112200475351385
+1.0396496863513607,1.2368295035308081,3.5585521023483393,2833.601524964186,1967.1905605859411,33.382355174363568,\
+76.509283794733975,1.144231049395666,2996.3404984853523,6.5000576848891729,1531226.7552959598,191862.689050157,\
+0.49592580209088999,0.82944033472981094,0.61707544290783711
+"""
+"""Boulders that rock for seconds. An independent integration by steps of 0.1 ms (`benchmarks.late`) finds: the first
+two overturn at 7.0313 s and 6.769 s, the third stands for 10 s and overturns later, the fourth stands, at most 16.034
+deg."""
+
+
+def sweep_of(folder: Path, accuracy: str = "balanced") -> boulder_sweep.Sweep:
+    (folder / "designs.csv").write_text(SHALLOW)
+    grid = folder / "grid.yaml"
+    grid.write_text(f"name: shallow\ntable: designs.csv\nsolver: {{accuracy: {accuracy}}}\n")
+    return boulder_sweep.load(grid)
+
+
+def designs_in(sweep: boulder_sweep.Sweep) -> Designs:
+    return designs_of(sweep.block(0, sweep.n_designs), None)
+
+
+@pytest.mark.parametrize("accuracy", ["balanced", "fine"])
+def test_shallow_boulders_end_as_an_independent_integration_says(tmp_path: Path, accuracy: str) -> None:
+    sweep = sweep_of(tmp_path, accuracy)
+    found = evaluation_of(sweep, accuracy_of(sweep)).judged(designs_in(sweep))
+    rows = [found.row(place) for place in range(4)]
+    assert [(row["verdict"], row["reason"]) for row in rows] == [
+        ("fail", "overturns"),
+        ("fail", "overturns"),
+        ("undecided", "horizon"),
+        ("pass", ""),
+    ]
+    assert rows[0]["time_to_limit_s"] == pytest.approx(7.0313, abs=2e-4)
+    assert rows[1]["time_to_limit_s"] == pytest.approx(6.769, abs=3e-3)
+    assert rows[2]["max_rotation_deg"] == pytest.approx(3.4489, abs=1e-3)
+    assert rows[3]["max_rotation_deg"] == pytest.approx(16.0344, abs=1e-3)
+
+
+def test_an_overturned_row_has_an_error_of_its_time_and_none_of_its_rotation(tmp_path: Path) -> None:
+    sweep = sweep_of(tmp_path)
+    found = evaluation_of(sweep, accuracy_of(sweep)).judged(designs_in(sweep))
+    overturned, standing = found.row(0), found.row(3)
+    assert overturned["rotation_error_deg"] is None
+    assert 0.0 < overturned["time_to_limit_error_s"] < 0.1
+    assert standing["time_to_limit_error_s"] is None
+    assert 0.0 < standing["rotation_error_deg"] < 0.1
+
+
+def stand_in(ends: dict[int, tuple[Status, float]], asked: list[float]):
+    """Kernels whose solutions at each refinement (0, 1, ...) end after 5 s in some way, at some rotation [rad]."""
+
+    def simulate(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+        asked.append(control.h)
+        level = len(asked) - 1
+        status, theta = ends.get(level, ends[max(ends)])
+        out = by_kernels(table, readings, control._replace(h=0.001, horizon=0.01, longest_horizon=0.0))
+        n = len(table.L)
+        at_limit = status == Status.LIMIT
+        return out._replace(
+            status=np.full(n, status, np.int8),
+            theta_max=np.full(n, theta),
+            t_limit=np.full(n, 5.0 if at_limit else np.nan),
+            t_end=np.full(n, 5.0),
+            theta_error=np.full(n, 0.0 if at_limit else 1e-4),
+            x_error=np.full(n, 1e-3),
+        )
+
+    return simulate
+
+
+def judged_by(folder: Path, ends: dict[int, tuple[Status, float]], asked: list[float]):
+    sweep = sweep_of(folder)
+    evaluation = replace(evaluation_of(sweep, accuracy_of(sweep)), simulate=stand_in(ends, asked))
+    return evaluation.judged(designs_in(sweep).rows(slice(3, 4)))
+
+
+def test_a_late_pass_needs_a_finer_solution_that_agrees(tmp_path: Path) -> None:
+    asked: list[float] = []
+    found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1)}, asked)
+    assert found.verdict[0] == PASS
+    assert len(asked) == 2
+    assert asked[1] == pytest.approx(FACTOR * asked[0])
+
+
+def test_a_late_pass_that_finer_steps_overturn_is_no_pass(tmp_path: Path) -> None:
+    asked: list[float] = []
+    found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1), 1: (Status.LIMIT, np.radians(20.0))}, asked)
+    assert found.verdict[0] == FAIL
+    assert len(asked) == 3
+
+
+def test_a_late_row_whose_peak_moves_by_more_than_its_error_is_refined_further(tmp_path: Path) -> None:
+    asked: list[float] = []
+    found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1), 1: (Status.SETTLED, 0.1 + 2e-4)}, asked)
+    assert found.verdict[0] == PASS
+    assert len(asked) == 3
+
+
+def test_a_late_row_on_which_no_two_solutions_agree_is_undecided(tmp_path: Path) -> None:
+    asked: list[float] = []
+    peaks = {level: (Status.SETTLED, 0.1 + 1e-3 * level) for level in range(40)}
+    found = judged_by(tmp_path, peaks, asked)
+    assert (found.verdict[0], found.reason[0]) == (UNDECIDED, NUMERICAL_ERROR)
+    assert len(asked) > 3
+
+
+def test_rows_without_an_estimate_of_their_error_are_not_repeated(tmp_path: Path) -> None:
+    asked: list[float] = []
+    sweep = sweep_of(tmp_path, "fast")
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    evaluation = replace(evaluation, simulate=stand_in({0: (Status.SETTLED, 0.1)}, asked))
+    evaluation.judged(designs_in(sweep).rows(slice(3, 4)))
+    assert len(asked) == 1
+    assert not control_of(sweep, accuracy_of(sweep)).error_estimate
+
+
+def test_where_one_solution_overturns_and_the_other_does_not_nothing_is_decided(tmp_path: Path) -> None:
+    sweep = sweep_of(tmp_path)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+
+    def disagree(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
+        out = stand_in({0: (Status.LIMIT, np.radians(20.0))}, [])(table, readings, control)
+        return out._replace(theta_error=np.full(len(table.L), np.inf), x_error=np.full(len(table.L), np.inf))
+
+    found = replace(evaluation, simulate=disagree).judged(designs_in(sweep).rows(slice(0, 1)))
+    assert (found.verdict[0], found.reason[0]) == (UNDECIDED, NUMERICAL_ERROR)
+    assert np.isnan(found["time_to_limit_s"][0])
+
+
+def test_the_pilot_counts_designs_that_overturn(tmp_path: Path) -> None:
+    sweep = sweep_of(tmp_path, "1e-4 deg")
+    assert accuracy_of(sweep).steps.step_s < 0.012
