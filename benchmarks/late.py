@@ -12,6 +12,7 @@ import argparse
 import math
 import sys
 import tempfile
+from collections import namedtuple
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,23 +40,8 @@ HELD, CLOCKWISE, ANTICLOCKWISE = 0, 1, -1
 _compiled = numba.njit(nogil=True, error_model="numpy", cache=True)
 
 
-class Inputs(NamedTuple):
-    """One impact: symbols of the paper, SI, beta in N/m^3."""
-
-    L: float
-    W: float
-    H: float
-    rho_b: float
-    d: float
-    e: float
-    rho_s: float
-    phi: float
-    beta: float
-    K_epsilon: float
-    m_v: float
-    v_0: float
-    k_v: float
-    c_v: float
+Inputs = namedtuple("Inputs", "L W H rho_b d e rho_s phi beta K_epsilon m_v v_0 k_v c_v")
+"""One impact: symbols of the paper, SI, beta in N/m^3."""
 
 
 class Body(NamedTuple):

@@ -13,8 +13,9 @@ import llvmlite.binding
 import llvmlite.ir
 import numba
 
-ACCUMULATORS = 20
-"""Independent chains: two units times a latency of four cycles need eight at least."""
+ACCUMULATORS = {8: 20, 4: 12, 2: 12}
+"""Independent chains by the width of a vector, with 32 registers for AVX-512 and 16 without; two units times a latency
+of four or five cycles need eight to ten."""
 ITERATIONS = 1_000_000
 
 
@@ -27,6 +28,8 @@ class PeakLoop:
         features = llvmlite.binding.get_host_cpu_features()
         self.width = 8 if features.get("avx512f") else 4 if features.get("avx2") else 2
         """Doubles in a vector."""
+        self.accumulators = ACCUMULATORS[self.width]
+        """Vectors that are summed up at once."""
         machine = llvmlite.binding.Target.from_default_triple().create_target_machine(
             cpu=llvmlite.binding.get_host_cpu_name(), features=f"{features.flatten()},-prefer-256-bit", opt=3
         )
@@ -40,7 +43,7 @@ class PeakLoop:
     @property
     def flops(self) -> int:
         """Floating-point operations of one call; a fused multiply-add is two."""
-        return 2 * ITERATIONS * ACCUMULATORS * self.width
+        return 2 * ITERATIONS * self.accumulators * self.width
 
     def __call__(self) -> float:
         """Run the loop; the result converges to 1 and only prevents the loop from being optimised away."""
@@ -72,9 +75,9 @@ class PeakLoop:
         build = llvmlite.ir.IRBuilder(loop)
         turn = build.phi(index)
         turn.add_incoming(index(0), entry)
-        before = [build.phi(vector) for _ in range(ACCUMULATORS)]
+        before = [build.phi(vector) for _ in range(self.accumulators)]
         after = [build.call(fma, [accumulator, factor, factor]) for accumulator in before]
-        for chain in range(ACCUMULATORS):
+        for chain in range(self.accumulators):
             before[chain].add_incoming(vector([0.1 * chain] * self.width), entry)
             before[chain].add_incoming(after[chain], loop)
         following = build.add(turn, index(1))
@@ -86,5 +89,5 @@ class PeakLoop:
         for accumulator in after:
             for place in range(self.width):
                 total = build.fadd(total, build.extract_element(accumulator, index(place)))
-        build.ret(build.fdiv(total, llvmlite.ir.Constant(number, float(ACCUMULATORS * self.width))))
+        build.ret(build.fdiv(total, llvmlite.ir.Constant(number, float(self.accumulators * self.width))))
         return module

@@ -9,7 +9,9 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.columns import VERDICTS
+from boulder_sweep.impact import simulation
 from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge import evaluation
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings.model import PRESETS
@@ -33,17 +35,34 @@ def test_error_is_estimated_also_where_the_step_is_shortened(preset: str, change
     assert apart <= found["rotation_error_deg"] + row["rotation_error_deg"][0]
 
 
-@pytest.mark.skip(reason="such designs are refined now until both solutions agree")
-def test_error_is_infinite_where_only_one_solution_reaches_the_limit() -> None:
-    """A limit between the peaks of the two solutions: neither says by how much it is wrong."""
-    sweep = boulder_sweep.load(CONFIGS / "rwg.yaml", ["solver.accuracy=balanced"])
-    coarse, fine = (simulate(sweep, step_s=step).summary()["max_rotation_deg"] for step in (0.012, 0.004))
+def between_the_peaks_of_the_first_two_solutions() -> boulder_sweep.Sweep:
+    coarse, fine = (
+        simulate(boulder_sweep.load(CONFIGS / "rwg.yaml"), step_s=step).summary()["max_rotation_deg"]
+        for step in (0.012, 0.004)
+    )
     limit = 0.75 * coarse + 0.25 * fine
-    between = boulder_sweep.load(
+    return boulder_sweep.load(
         CONFIGS / "rwg.yaml", ["solver.accuracy=balanced", f"criterion.max_rotation={limit!r} deg"]
     )
+
+
+def test_error_is_infinite_where_only_one_solution_reaches_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither says by how much it is wrong, and where no finer steps are left nothing is decided."""
+    for module in (evaluation, simulation):
+        monkeypatch.setattr(module, "finer_controls", lambda control: iter(()))
+    between = between_the_peaks_of_the_first_two_solutions()
     row = evaluation_of(between, accuracy_of(between))(between.block(0, 1))
     found = simulate(between)
-    assert found.verdict == VERDICTS[row.verdict[0]]
+    assert found.verdict == VERDICTS[row.verdict[0]] == "undecided"
     assert np.isinf(row["displacement_error_m"][0])
     assert np.isinf(found.judged["displacement_error_m"][0])
+
+
+def test_a_limit_between_two_solutions_is_decided_by_finer_ones() -> None:
+    between = between_the_peaks_of_the_first_two_solutions()
+    row = evaluation_of(between, accuracy_of(between))(between.block(0, 1))
+    found = simulate(between)
+    assert found.verdict == VERDICTS[row.verdict[0]] == "fail"
+    assert row["step_s"][0] < 0.004
+    assert row["time_to_limit_error_s"][0] == found.judged["time_to_limit_error_s"][0]
+    assert 0.0 < row["time_to_limit_error_s"][0] < 1e-4
