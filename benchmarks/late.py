@@ -23,7 +23,7 @@ import pandas as pd
 
 import boulder_sweep
 
-from .report import Table
+from .report import Table, write_between_markers
 
 DESIGNS = 30_000
 SEED = 22
@@ -372,9 +372,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--accuracy", nargs="+", default=["balanced", "fine"])
+    parser.add_argument("--write", action="store_true", help="write the table into benchmarks/README.md")
     arguments = parser.parse_args()
     table, right = measure(arguments.designs, arguments.seed, arguments.jobs, arguments.accuracy)
     print(table.markdown())
+    if arguments.write:
+        write_between_markers([table])
     return 0 if right else 1
 
 
