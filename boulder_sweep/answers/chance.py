@@ -122,6 +122,7 @@ def chance(
     count = np.zeros(rows, dtype=np.int64)
     open_ = np.arange(rows)
     done, target = 0, first
+    sure = 0.5 + 0.5 * confidence
     while len(open_) and done < target:
         new = points.upto(target)[:, done:target]
         flat = new.reshape(-1, new.shape[2])
@@ -130,10 +131,10 @@ def chance(
         happened[open_] += found.sum(axis=2)
         count[open_] = target
         done = target
-        low, high = interval(happened[open_], target, confidence)
+        low, high = interval(happened[open_], target, sure)
         open_ = open_[high - low > 2.0 * half_width]
         target = min(2 * target, max(most // SCRAMBLINGS, first))
-    low, high = interval(happened, count, confidence)
+    low, high = interval(happened, count, sure)
     return Chance(happened.sum(axis=1) / (SCRAMBLINGS * count), low, high, SCRAMBLINGS * count)
 
 
