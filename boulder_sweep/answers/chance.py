@@ -8,6 +8,9 @@ The share: if one input decides, every scrambling of N points counts N p points 
 rounded up with a chance equal to the fraction f of N p. All S scramblings may then agree, and have no spread, however
 far N p is from a whole number. They agree on the lower one with the chance (1 - f)^S, which is less than 1 - confidence
 if f is more than 1 - (1 - confidence)^(1/S).
+
+The sample grows until the interval is narrow enough, and intervals that are too narrow by chance end it. Nearly all
+rows end at one of two looks, so that the interval of each look is allowed half of the misses.
 """
 
 from __future__ import annotations
@@ -122,7 +125,7 @@ def chance(
     count = np.zeros(rows, dtype=np.int64)
     open_ = np.arange(rows)
     done, target = 0, first
-    sure = 0.5 + 0.5 * confidence
+    sure = 0.5 + 0.5 * confidence  # half of the misses for each of two looks
     while len(open_) and done < target:
         new = points.upto(target)[:, done:target]
         flat = new.reshape(-1, new.shape[2])

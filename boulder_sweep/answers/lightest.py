@@ -18,7 +18,7 @@ from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
 from boulder_sweep.errors import QuestionError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.settings import Sweep
@@ -31,7 +31,7 @@ MILLIMETRES = 1000
 """Sides and depths are whole millimetres."""
 SCALES = (0.5, 2.0)
 """If the file gives a single boulder, it is scaled within these bounds at constant proportions."""
-COARSE, FINE = 9, 5
+COARSE, FINE = 7, 5
 """Number of values of each other side and of the depth: on the first lattice, and on each finer one."""
 ROUNDS = 8
 """Number of finer lattices, each half as wide as the one before."""
@@ -92,18 +92,24 @@ class LightestQuestion:
         n = stop - start
         # If the lightest boulder is as long, wide or high as it may be, a search for this side has no way to vary the
         # others at that end; the search for another side has.
-        trials = [_Boulders(self, rows, side) for side in self.free or (None,)]
-        found = [trial.certified(trial.lightest()) for trial in trials]
-        masses = np.array([np.where(np.isnan(own.passes), np.inf, own.passes) for own in found])
-        best = masses.argmin(axis=0) * n + np.arange(n)
-
-        def chosen(values: Iterable[np.ndarray]) -> np.ndarray:
-            return np.concatenate(list(values))[best]
-
-        sizes = {name: chosen(own.block.columns[name].to_numpy() for own in found) for name in (*SIDES, DEPTH)}
-        block = replace(taken(rows, np.arange(n), **sizes), labels=self.open.labels(start, stop))
-        kind, fails, passes = (chosen(getattr(own, name) for own in found) for name in ("kind", "fails", "passes"))
-        simulated = sum(own.simulated for own in found) + n
+        trials = [_Boulders(self, rows, side) for side in reversed(self.free)] or [_Boulders(self, rows, None)]
+        others = [trial.lightest() for trial in trials]
+        found = [trial.certified(own) for trial, own in zip(trials, others, strict=True)]
+        best = _lightest(found)
+        sizes = {name: _taken((own.block.columns[name].to_numpy() for own in found), best) for name in SIDES}
+        if SHARE in others[0]:
+            sizes[SHARE] = _taken((own[SHARE] for own in others), best)
+        # A side that is as small as it may be has no bracket; the same boulder has one by another side.
+        found += [trial.certified(sizes) for trial in trials]
+        best = _lightest(found)
+        kind, fails, passes = (
+            _taken((getattr(own, name) for own in found), best) for name in ("kind", "fails", "passes")
+        )
+        columns = {
+            name: _taken((own.block.columns[name].to_numpy() for own in found), best) for name in (*SIDES, DEPTH)
+        }
+        block = replace(taken(rows, np.arange(n), **columns), labels=self.open.labels(start, stop))
+        simulated = sum(trial.simulated for trial in trials) + n
         return Answers(block, self.judges.own(block), kind, fails, passes, [None] * n, simulated)
 
 
@@ -217,10 +223,12 @@ class _Boulders:
             part = self.least(wrong, {name: values[wrong] for name, values in others.items()}, quick=False)
             found = replaced(found, wrong, part)
         at_least = found.holds == self.first
-        for name, values in others.items():
-            at_least &= (name == SHARE) | (values <= self.asked.bounds.get(name, (0.0, 0.0))[0])
+        sides = self.sides(found.holds, others)
+        for side in self.asked.free:
+            at_least &= sides[side] <= self.asked.bounds[side][0]
         kind = np.where(found.has_holds, np.where(at_least, ALWAYS, FOUND), NEVER).astype(np.int8)
         shown = self.block(index, found.shown, others)
+        self.simulated += n
         return Answers(
             shown,
             self.judges.own(shown),
@@ -228,8 +236,20 @@ class _Boulders:
             np.where(found.has_fails, self.mass(index, found.fails, others), np.nan),
             np.where(found.has_holds, self.mass(index, found.holds, others), np.nan),
             [None] * n,
-            self.simulated + n,
+            self.simulated,
         )
+
+
+def _lightest(found: Sequence[Answers]) -> np.ndarray:
+    """Return the place of the lightest of several answers, one after the other, for each row; rather with a bracket."""
+    n = len(found[0].passes)
+    masses = [np.where(np.isnan(own.passes), np.inf, own.passes) + 1e-6 * np.isnan(own.fails) for own in found]
+    return np.argmin(masses, axis=0) * n + np.arange(n)
+
+
+def _taken(values: Iterable[np.ndarray], places: np.ndarray) -> np.ndarray:
+    """Return what stands at some places of arrays, one after the other."""
+    return np.concatenate(list(values))[places]
 
 
 def _millimetres(lengths: np.ndarray) -> np.ndarray:
