@@ -8,6 +8,9 @@ The share: if one input decides, every scrambling of N points counts N p points 
 rounded up with a chance equal to the fraction f of N p. All S scramblings may then agree, and have no spread, however
 far N p is from a whole number. They agree on the lower one with the chance (1 - f)^S, which is less than 1 - confidence
 if f is more than 1 - (1 - confidence)^(1/S).
+
+The sample grows until the interval is narrow enough, and intervals that are too narrow by chance end it. Nearly all
+rows end at one of two looks, so that the interval of each look is allowed half of the misses.
 """
 
 from __future__ import annotations
@@ -122,6 +125,7 @@ def chance(
     count = np.zeros(rows, dtype=np.int64)
     open_ = np.arange(rows)
     done, target = 0, first
+    sure = 0.5 + 0.5 * confidence  # half of the misses for each of two looks
     while len(open_) and done < target:
         new = points.upto(target)[:, done:target]
         flat = new.reshape(-1, new.shape[2])
@@ -130,10 +134,10 @@ def chance(
         happened[open_] += found.sum(axis=2)
         count[open_] = target
         done = target
-        low, high = interval(happened[open_], target, confidence)
+        low, high = interval(happened[open_], target, sure)
         open_ = open_[high - low > 2.0 * half_width]
         target = min(2 * target, max(most // SCRAMBLINGS, first))
-    low, high = interval(happened, count, confidence)
+    low, high = interval(happened, count, sure)
     return Chance(happened.sum(axis=1) / (SCRAMBLINGS * count), low, high, SCRAMBLINGS * count)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from boulder_sweep.answers.chance import SCRAMBLINGS, Chance, Points, chance
 from boulder_sweep.answers.draws import Draws, threads
-from boulder_sweep.answers.keys import Ends, Key, range_of, reach_of, refuse_coarse
+from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_coarse
 from boulder_sweep.answers.search import BEYOND, BLOCKED, CELLS, FAILS, FAR, HOLDS, NEVER, NOT_MONOTONE, Search, search
 from boulder_sweep.answers.spread import Spread, uncertain_rows
-from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, ranges, taken
+from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, ranges, taken, too_low
 from boulder_sweep.judge.judged import with_rows
 
 CHECKED_AT_ONCE = 65_536
@@ -117,7 +117,7 @@ class Question:
         return Answers(
             replace(block, labels=self.open.labels(start, stop)),
             judged,
-            self.kinds(rows, found, trial),
+            self.kinds(rows, found),
             np.where(found.has_fails, self.key.values(found.fails), np.nan),
             np.where(found.has_holds, self.key.values(found.holds), np.nan),
             [_stretches(self.key, found.changes.get(row), first[row], last[row]) for row in range(stop - start)],
@@ -135,20 +135,18 @@ class Question:
         """Return the object that tries values in some rows."""
         return Trial(self.key, self.judges, rows)
 
-    def kinds(self, rows: Rows, found: Search, trial: Trial) -> np.ndarray:
+    def kinds(self, rows: Rows, found: Search) -> np.ndarray:
         """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
 
-        Where nothing passes, the end of the range tells whether the truck goes over the boulder there, and not the last
-        place of the lattice, which may lie before it.
+        Where nothing passes, the design at the end of the range tells by its sizes whether the truck goes over it: not
+        the last place of the lattice, which may lie before it, nor its verdict, which may name another failure.
         """
         kind = found.kind.copy()
-        never = np.flatnonzero(kind == NEVER)
-        if len(never):
+        none = np.flatnonzero(~found.has_holds)
+        if len(none):
             end = range_of(self.sweep, self.key, rows, self.between)[0 if self.key.most else 1]
-            beyond = end >= reach_of(self.key, rows) * (1.0 - 1e-12)
-            untried = never[~beyond[never] & (self.key.values(found.shown[never]) != end[never])]
-            beyond[untried] = trial.beyond(untried, end[untried])
-            kind[never[beyond[never]]] = BLOCKED
+            last = taken(rows, none, **{self.key.name: end[none]})
+            kind[none] = np.where(too_low(last, self.sweep.criterion.min_overlap_m), BLOCKED, NEVER)
         return kind
 
 
@@ -220,12 +218,6 @@ class Trial:
     def block(self, index: np.ndarray, places: np.ndarray) -> DesignBlock:
         """Return the designs with these values."""
         return taken(self.rows, index, **{self.key.name: self.key.values(places)})
-
-    def beyond(self, index: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Return whether there is nothing to try at these values, which need not be on the lattice, shape (m,)."""
-        block = taken(self.rows, index, **{self.key.name: values})
-        self.simulated += len(index)
-        return beyond_reach(block, self.judges.quick(block))
 
     def contradicted(self, found: Search, block: DesignBlock, judged: Judged) -> np.ndarray:
         """Return the rows that the accuracy of the sweep does not confirm, shape (m,).

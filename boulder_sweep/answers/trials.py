@@ -25,6 +25,8 @@ OUT_OF_REACH = ("no_contact", "override")
 NO_FACE = (REASONS[1], REASONS[3])
 """Reasons of designs that cannot be computed for which there is nothing to search either: the boulder is buried, or
 ends below the impact height of the file."""
+ROUNDING_M = 1e-9
+"""What sums of heights may be off by [m]."""
 PLACEHOLDER = 0.5
 SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "vehicle_crush_m")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
@@ -120,6 +122,15 @@ def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:
     """Return whether the truck goes over the boulder or the row is not a valid design, bool, shape (n,)."""
     words = [code for code, word in enumerate(judged.reasons) if word in OUT_OF_REACH]
     return np.isin(judged.reason, words) | (np.asarray(block.reasons.codes) != 0)
+
+
+def too_low(block: DesignBlock, least_overlap_m: float) -> np.ndarray:
+    """Return whether boulders overlap the bumper by less than they must, or have no face for the truck, shape (n,)."""
+    sizes = ("boulder_height_m", "embedment_depth_m", "bumper_height_m")
+    height, depth, bumper = (block.columns[name].to_numpy() for name in sizes)
+    overlap = height - depth - bumper
+    no_face = np.isin(block.reasons.codes, [REASONS.index(word) for word in NO_FACE])
+    return no_face | (overlap <= ROUNDING_M) | (overlap < least_overlap_m - ROUNDING_M)
 
 
 def ranges(count: int, most: int) -> Iterator[tuple[int, int]]:

@@ -67,7 +67,8 @@ def need(
 
     If KEY is an axis of the grid, the axis is the search range; otherwise the usual range, for depths from 0.35 of the
     height to where the truck would go over the boulder. Every answer has a bracket: the value that passes and the next
-    one, which does not, both judged as in `sweep run`.
+    one, which does not, both judged as in `sweep run`. A row of which nothing passes is `blocked_by_overlap` if the
+    truck goes over the boulder at the end of the range (overlap below criterion.min_overlap), and `never` if not.
     """
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.printing import need_lines
