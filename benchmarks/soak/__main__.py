@@ -14,6 +14,7 @@ trials are kept. Two quiet cores need about a quarter of an hour for everything.
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import shutil
 import signal
@@ -40,6 +41,8 @@ KINDS = {
 WANTED = {"disk": 100, "store": 100, "lost": 50, "stopped": 20, "left-over": 5}
 LANES = {"disk": 2, "store": 2, "lost": 2, "stopped": 5, "left-over": 1}
 """Trials at the same time; a run with a stopped worker only waits."""
+_LEAST_OF_A_LANE = 4
+"""Trials that are worth another lane, with a cluster of its own."""
 MOST_MINUTES = 40.0
 _MOST_MISSES = 20
 """Trials in which a run was over before anything was done to it."""
@@ -81,13 +84,22 @@ class Soak:
                 if number is None:
                     return
                 yield number
-                say(f"{kind}: {total.disturbed} of {wanted}")
+                say(f"{kind}: {min(total.disturbed, wanted)} of {wanted}")
 
         work = {"disk": self._kill, "store": self._kill, "left-over": self._leave_over}.get(kind, self._disturb)
         with ThreadPoolExecutor(LANES[kind]) as pool:
-            lanes = [pool.submit(work, kind, trials(), total) for _ in range(min(LANES[kind], wanted))]
-            for lane in lanes:
-                lane.result()
+            lanes = [
+                pool.submit(work, kind, trials(), total)
+                for _ in range(min(LANES[kind], -(-wanted // _LEAST_OF_A_LANE)))
+            ]
+            try:
+                for lane in lanes:
+                    if (problem := lane.exception()) is not None:
+                        self._done(total, Found(kind, failures=[f"{kind}: {type(problem).__name__}: {problem}"]))
+            except BaseException:  # Ctrl-C: the lanes must not go on
+                self._until = -math.inf
+                end_all()
+                raise
         if total.disturbed < wanted:
             total.failures.append(f"{kind}: no more than {total.disturbed} of {wanted} came about")
         say(f"{kind}: {time.monotonic() - begun:.0f} s, {'right' if total.right else 'WRONG'}")
@@ -145,17 +157,15 @@ class Soak:
     def _leave_over(self, kind: str, numbers: Iterator[int], total: Found) -> None:
         """Overwrite tables while workers of killed runs go on."""
         frame, _ = self._trial(kind, "whole").undisturbed(*LARGE, *OTHER_SPEED)
-        reference, usual = Reference(frame), None
-        for number in numbers:
-            cluster = self._cluster()
-            try:
-                if usual is None:
-                    run = self._trial(kind, "usual")
-                    usual = run.undisturbed(*LARGE, "--backend", "dask", "--scheduler", cluster.address)[1]
+        reference, cluster = Reference(frame), self._cluster()
+        try:
+            # Workers that have computed before write their parts soon after they go on.
+            self._trial(kind, "usual").undisturbed(*LARGE, "--backend", "dask", "--scheduler", cluster.address)
+            for number in numbers:
                 chance = random.Random(f"{self._seed} {kind} {number}")
-                self._done(total, left_over(self._trial(kind, number, reference), chance, usual, cluster))
-            finally:
-                cluster.close()
+                self._done(total, left_over(self._trial(kind, number, reference), chance, cluster))
+        finally:
+            cluster.close()
 
     def _cluster(self) -> Cluster:
         """Start a cluster."""

@@ -336,22 +336,22 @@ def without_a_worker(trial: Trial, aim: Aim, usual: Usual, cluster: Cluster, num
     return trial.finish()
 
 
-def left_over(trial: Trial, chance: random.Random, usual: Usual, cluster: Cluster) -> Found:
+def left_over(trial: Trial, chance: random.Random, cluster: Cluster) -> Found:
     """Overwrite the table of a killed run while workers of that run, stopped meanwhile, go on with their tasks.
 
-    The run that overwrites stands still for a while where it comes to the parts that the workers had in hand: both
-    would use the same names just then.
+    The run that overwrites is held for a while where it comes to the parts that the workers had in hand, or will take
+    next: both may have the same part in hand just then.
     """
     first = trial.run(*LARGE, "--backend", "dask", "--scheduler", cluster.address)
-    if not meets(first, Changes(trial.local, max(2, round(chance.uniform(0.1, 0.6) * usual.changes)))):
+    if not meets(first, Parts(trial.local, chance.randint(1, 5))):
         trial.wait(first)
         return Found(trial.found.name)
-    time.sleep(chance.uniform(0.0, 0.1))
+    time.sleep(chance.uniform(0.0, 0.3))
     for worker in cluster.workers:
         worker.send_signal(signal.SIGSTOP)
     first.signal(signal.SIGKILL)
-    trial.wait(first, (-signal.SIGKILL,))
-    parts = len(data_files(trial.local)) + chance.choice((1, 1, 2, 3))
+    trial.wait(first, (0, -signal.SIGKILL))
+    parts = len(data_files(trial.local)) + chance.randint(1, 4)
     second = trial.run(*LARGE, *OTHER_SPEED, "--overwrite", "--jobs", "2")
     if meets(second, Parts(trial.local, parts)):
         second.signal(signal.SIGSTOP)
