@@ -194,6 +194,11 @@ def table(results: list[Found], seed: int, minutes: float) -> Table:
     found.notes = [
         "Lost, doubled, wrong: rows, summed over all looks at all tables. Other: trials that ended in another way than "
         "they should, or tables that could not be read, wrong rows included.",
+        "Some of the rows, and not all, were there just then: "
+        + ", ".join(
+            f"{one.halfway} of {one.disturbed} ({KINDS[one.name]})" for one in results if one.name != "left-over"
+        )
+        + ".",
         "Longest: from what was done to a run, or from the start of the one that resumed it, to its end.",
     ]
     return found

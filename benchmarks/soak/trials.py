@@ -107,6 +107,8 @@ class Found:
     name: str
     disturbed: int = 0
     tables: int = 0
+    halfway: int = 0
+    """How often some of the rows were there just then, and not all."""
     lost: int = 0
     doubled: int = 0
     wrong: int = 0
@@ -118,7 +120,7 @@ class Found:
     def add(self, other: Found) -> None:
         """Add what a trial has found."""
         with self.lock:
-            for name in ("disturbed", "tables", "lost", "doubled", "wrong", "hangs"):
+            for name in ("disturbed", "tables", "halfway", "lost", "doubled", "wrong", "hangs"):
                 setattr(self, name, getattr(self, name) + getattr(other, name))
             self.longest_s = max(self.longest_s, other.longest_s)
             self.failures += other.failures
@@ -274,6 +276,10 @@ class Trial:
             if own and not tally.wrong:
                 self._seen[frame["design_id"].to_numpy()] = True
 
+    def is_halfway(self) -> bool:
+        """Whether some rows have been seen, and not all."""
+        return bool(self._seen.any() and not self._seen.all())
+
     def finish(self) -> Found:
         """Look for the last time, and remove what went well."""
         self.look(finished=True, others=True)
@@ -309,6 +315,7 @@ def killed(trial: Trial, aims: list[Aim], usual: Usual) -> Found:
         trial.look(others=True)
         if code == 0:
             return trial.finish()
+        trial.found.halfway += code == -signal.SIGKILL and trial.is_halfway()
     run = trial.run("--resume")
     meets(run, Time(aims[0].share * usual.seconds))
     trial.look()
@@ -326,6 +333,7 @@ def without_a_worker(trial: Trial, aim: Aim, usual: Usual, cluster: Cluster, num
             cluster.workers[number % len(cluster.workers)].send_signal(aim.signal)
             trial.found.disturbed = 1
     trial.look()
+    trial.found.halfway = int(trial.found.disturbed and trial.is_halfway())
     lost = aim.signal == signal.SIGKILL
     code = trial.wait(run, (0, *INTERRUPTED) if lost else (0,), HANG_S if lost else HANG_S + usual.seconds)
     if code != 0:

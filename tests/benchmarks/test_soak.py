@@ -136,7 +136,9 @@ def test_whatever_is_wrong_shows_in_the_table():
     for name in ("lost", "doubled", "wrong", "hangs"):
         assert not Found("disk", **{name: 1}).right
     assert not Found("disk", failures=["exit code 1"]).right
-    (cells,) = table([Found("disk", 3, 2, lost=4, doubled=5, wrong=6, hangs=7, failures=["one"])], SEED, 1.0).rows
+    (cells,) = table(
+        [Found("disk", 3, 2, halfway=1, lost=4, doubled=5, wrong=6, hangs=7, failures=["one"])], SEED, 1.0
+    ).rows
     assert cells[1:-1] == ["3", "2", "4", "5", "6", "7", "1"]
 
 
