@@ -67,6 +67,8 @@ class Run:
 
     def __init__(self, grid: Path, out: str, log: Path, *options: str):
         self._log = log
+        self.since = time.monotonic()
+        """When it was started, or something was last done to it."""
         words = ["boulder_sweep", "run", str(grid), "-o", out, "-q", "--json", *options]
         self.process = started(words, log, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
@@ -76,6 +78,7 @@ class Run:
 
     def signal(self, number: int) -> None:
         """Send a signal to the whole group."""
+        self.since = time.monotonic()
         if self.process.poll() is None:
             os.killpg(self.process.pid, number)
 

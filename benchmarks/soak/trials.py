@@ -233,9 +233,8 @@ class Trial:
 
     def wait(self, run: Run, allowed: tuple[int, ...] = (0,), limit_s: float = HANG_S) -> int | None:
         """Wait for the end of a run, and note if it hangs or ends in another way than allowed."""
-        begun = time.monotonic()
-        code = run.end(limit_s)
-        self.found.longest_s = max(self.found.longest_s, time.monotonic() - begun)
+        code = run.end(max(1.0, run.since + limit_s - time.monotonic()))
+        self.found.longest_s = max(self.found.longest_s, time.monotonic() - run.since)
         if code is None:
             self.found.hangs += 1
         elif code not in allowed:
@@ -308,7 +307,7 @@ def killed(trial: Trial, aims: list[Aim], usual: Usual) -> Found:
         stopping = met and aim.signal == signal.SIGTERM
         if stopping:
             watch.done()  # a write that is held would hold it up
-        code = trial.wait(run, STOPPED if stopping else (0, -signal.SIGKILL))
+        code = trial.wait(run, STOPPED if stopping else (0, -signal.SIGKILL) if met else (0,))
         if not stopping:
             watch.done()
         trial.found.disturbed += code == -signal.SIGKILL
@@ -331,6 +330,7 @@ def without_a_worker(trial: Trial, aim: Aim, usual: Usual, cluster: Cluster, num
         time.sleep(aim.pause_s)
         if not run.has_ended():
             cluster.workers[number % len(cluster.workers)].send_signal(aim.signal)
+            run.since = time.monotonic()
             trial.found.disturbed = 1
     trial.look()
     trial.found.halfway = int(trial.found.disturbed and trial.is_halfway())
