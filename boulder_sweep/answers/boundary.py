@@ -10,7 +10,6 @@ verdicts beside which nothing was simulated, or such a second change along a lin
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -176,7 +175,7 @@ def _without_overlap(found: Boundary) -> Boundary:
     )
 
 
-def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
+def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any], str]:
     """Read a map that `Boundary.write` wrote.
 
     Returns
@@ -185,6 +184,8 @@ def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         One row a design.
     settings : dict
         The resolved settings of the grid.
+    judged_by : str
+        By whose rules the verdicts were found; empty where by those of this version.
 
     Raises
     ------
@@ -198,10 +199,12 @@ def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         table = pq.read_table(path)
     except (OSError, pa.ArrowException) as problem:
         raise QuestionError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
-    settings = (table.schema.metadata or {}).get(b"boulder_sweep.settings")
-    if settings is None or not {"verdict", "reason", "simulated"} <= set(table.column_names):
+    from boulder_sweep.store.provenance import identity_in, judged_by
+
+    found = identity_in(table.schema.metadata)
+    if "settings" not in found or not {"verdict", "reason", "simulated"} <= set(table.column_names):
         raise QuestionError(f"{path} is neither the folder of a run nor a file that `sweep boundary` wrote")
-    return table.to_pandas(), json.loads(settings)
+    return table.to_pandas(), found["settings"], judged_by(found)
 
 
 class _Lines:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
+JUDGED_BY = Shown(
+    "judged_by", "judged_by", "", 1.0, "by whose rules the verdict was found; a column of tables of other versions only"
+)
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
 
@@ -81,6 +84,8 @@ def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[st
     identity: Mapping[str, Any] = finished.identity
     yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
     yield "rows", f"{finished.rows_done:,} of {finished.rows:,}", ""
+    if finished.judged_by:
+        yield "verdicts", finished.judged_by, ""
     for name, version in identity["versions"].items():
         yield f"version of {name}", version, ""
     yield "hash of the settings", identity["settings_sha256"], ""
@@ -97,10 +102,13 @@ def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[st
 
 def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
     """Yield the rows piece by piece in the requested units."""
+    import pyarrow as pa
     import pyarrow.compute as pc
 
     for table in finished.tables():
-        columns = [shown_column(name, units) for name in table.column_names]
+        if finished.judged_by:
+            table = table.append_column(JUDGED_BY.stored, pa.array([finished.judged_by] * len(table)))
+        columns = [JUDGED_BY if name == JUDGED_BY.stored else shown_column(name, units) for name in table.column_names]
         for place, column in enumerate(columns):
             if column.size != 1.0:
                 values = pc.divide(table.column(place), column.size)

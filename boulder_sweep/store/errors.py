@@ -66,7 +66,7 @@ class NotASweepError(StoreError):
 
 
 class OtherVersionError(StoreError):
-    """A result is in a format that this version does not know.
+    """A result is in a format that this version does not know, or one with which its runs cannot go on.
 
     Parameters
     ----------
@@ -84,8 +84,8 @@ class OtherVersionError(StoreError):
         self.path, self.why, self.version = path, why, version
         noted = f", {version}" if version else ""
         super().__init__(
-            f"{path} was written by another version of boulder-sweep{noted} ({why}). Resume or inspect it "
-            f"with that version; pandas, Polars and DuckDB can read the parts as a table in any case. "
+            f"{path} was written by another version of boulder-sweep{noted} ({why}). Use that version to "
+            f"go on with it; pandas, Polars and DuckDB can read the parts as a table in any case. "
             f"`sweep run` with --overwrite starts again"
         )
 

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, field
 from io import BytesIO
 from typing import IO, Any
 
-from boulder_sweep.columns import AT_REST, COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError, StoreError
@@ -28,9 +28,12 @@ from boulder_sweep.store.storage import Storage
 
 _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
+"""Of tables, apart from the version of the package: docs/formats.md says when it must grow."""
+_IN_EVERY_TABLE = frozenset({DESIGN_ID.name, *INPUT_COLUMNS, "verdict", "reason"})
 _PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
 _DIGITS = 12
-_PART_NAME = re.compile(rf"{_PART_PREFIX}\d{{{_DIGITS},}}-\d{{{_DIGITS},}}{re.escape(_PART_SUFFIX)}")
+_PART_NAME = re.compile(rf"{_PART_PREFIX}\d{{{_DIGITS},}}(-\d{{{_DIGITS},}})?{re.escape(_PART_SUFFIX)}")
+"""The first tables named a part by its first row only."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,10 @@ class Manifest:
         Runs into this folder, oldest first.
     merge
         The merge under way, if any.
+    columns
+        Names of the columns that are stored; of a manifest that was read.
+    differing
+        What another version wrote otherwise: such a table can be read, but no run goes on there.
     """
 
     identity: dict[str, Any]
@@ -116,6 +123,8 @@ class Manifest:
     parts: dict[str, Part] = field(default_factory=dict)
     sessions: list[Session] = field(default_factory=list)
     merge: Merge | None = None
+    columns: tuple[str, ...] = field(default=(), compare=False)
+    differing: list[str] = field(default_factory=list, compare=False)
 
     @property
     def rows_done(self) -> int:
@@ -209,7 +218,8 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
 
     from boulder_sweep.store.schema import table_schema
 
-    text = json.dumps({"format": _FORMAT, **asdict(manifest)}, separators=(",", ":"))
+    records = {name: value for name, value in asdict(manifest).items() if name not in ("columns", "differing")}
+    text = json.dumps({"format": _FORMAT, **records}, separators=(",", ":"))
     value = hashlib.sha256(text.encode()).hexdigest() + text
     schema = table_schema({_KEY: value.encode(), **more}, manifest.more_columns)
     sink = pa.BufferOutputStream()
@@ -219,7 +229,7 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
 
 
 def load(folder: Place) -> Manifest:
-    """Read the manifest of a folder.
+    """Read the manifest of a folder, by whichever version it was written.
 
     Raises
     ------
@@ -228,7 +238,7 @@ def load(folder: Place) -> Manifest:
     DamagedError
         It cannot be trusted.
     OtherVersionError
-        It is intact, but not what this version writes.
+        It is intact, but of a format that this version does not know.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -252,10 +262,24 @@ def load(folder: Place) -> Manifest:
     try:
         content = json.loads(text)
         manifest = _from_json(content)
-        _check_columns(found.schema.names, manifest.more_columns)
+        manifest.columns = tuple(found.schema.names)
+        manifest.differing = [*_differing_columns(manifest), *manifest.differing]
         return manifest
     except ValueError as unfamiliar:
         raise OtherVersionError(path, str(unfamiliar), version_of(content)) from None
+
+
+def check_own(manifest: Manifest, folder: Place) -> None:
+    """Check that a run of this version may go on with a table.
+
+    Raises
+    ------
+    OtherVersionError
+        Another version wrote it, with other columns or records.
+    """
+    if manifest.differing:
+        why = "; ".join(manifest.differing[:3]) + ("; ..." if len(manifest.differing) > 3 else "")
+        raise OtherVersionError(folder / MANIFEST_NAME, why, version_of({"identity": manifest.identity}))
 
 
 def _opened(folder: Place) -> IO[bytes]:
@@ -287,12 +311,20 @@ def _no_result(folder: Place) -> str:
     return f"{folder} is a file; the result of a sweep is a folder{inside}"
 
 
-def _check_columns(names: list[str], more: tuple[str, ...]) -> None:
-    """Raise ValueError where a table has other columns than today."""
-    expected = [*(spec.name for spec in COLUMNS), *more]
-    differing = sorted(set(names) ^ set(expected))
-    if differing:
-        raise ValueError(f"its table has other columns: {', '.join(differing)}")
+def _differing_columns(manifest: Manifest) -> list[str]:
+    """Say which columns a table has more or less than today.
+
+    Raises
+    ------
+    ValueError
+        It lacks one that every version has.
+    """
+    there, expected = set(manifest.columns), {*(spec.name for spec in COLUMNS), *manifest.more_columns}
+    lacking = expected - there
+    if lacking & _IN_EVERY_TABLE:
+        raise ValueError(f"its table lacks columns: {', '.join(sorted(lacking & _IN_EVERY_TABLE))}")
+    differing = ((lacking, "lacks"), (there - expected, "also has"))
+    return [f"its table {verb} {', '.join(sorted(names))}" for names, verb in differing if names]
 
 
 def _from_json(content: Any) -> Manifest:
@@ -307,14 +339,22 @@ def _from_json(content: Any) -> Manifest:
         raise ValueError("its records do not say their format")
     if content["format"] != _FORMAT:
         raise ValueError(f"its format is {content['format']}, and this version knows {_FORMAT} only")
-    entries = entries_of(Manifest, "the manifest", {key: value for key, value in content.items() if key != "format"})
-    parts = {
-        name: Part(**entries_of(Part, f"the record of {name}", record)) for name, record in entries["parts"].items()
-    }
-    sessions = [Session(**entries_of(Session, "the record of a run", record)) for record in entries["sessions"]]
+    differing: list[str] = []
+    known = {key: value for key, value in content.items() if key != "format"}
+    entries = entries_of(Manifest, "the manifest", known, differing)
+    parts = {name: _part(name, record, differing) for name, record in entries["parts"].items()}
+    sessions = [
+        Session(**entries_of(Session, "the record of a run", record, differing)) for record in entries["sessions"]
+    ]
     merge = None
-    if entries["merge"] is not None:
-        merging = entries_of(Merge, "the record of a merge", entries["merge"])
-        part = Part(**entries_of(Part, f"the record of {merging['name']}", merging["part"]))
-        merge = Merge(**{**merging, "part": part})
-    return Manifest(**{**entries, "parts": parts, "sessions": sessions, "merge": merge})
+    if entries.get("merge") is not None:
+        merging = entries_of(Merge, "the record of a merge", entries["merge"], differing)
+        merge = Merge(**{**merging, "part": _part(merging["name"], merging["part"], differing)})
+    return Manifest(**{**entries, "parts": parts, "sessions": sessions, "merge": merge, "differing": differing})
+
+
+def _part(name: str, record: Any, differing: list[str]) -> Part:
+    """Rebuild the record of a part; the first tables kept the size of a file, which could still grow, apart."""
+    if isinstance(record, dict) and isinstance(record.get("now"), dict):
+        record = {**record, **record["now"]}
+    return Part(**entries_of(Part, f"the record of {name}", record, differing))

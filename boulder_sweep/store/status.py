@@ -11,6 +11,7 @@ from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import Session
 from boulder_sweep.store.object_lock import is_held
+from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.verify import load_checked
 
 
@@ -44,6 +45,8 @@ class RunStatus:
         Settings, versions and hashes that all rows share.
     resume_command
         The command that resumes the run in this folder, which may have been moved; None if it is complete.
+    judged_by
+        By whose rules the rows were judged; empty where by those of this version.
     settings_missing
         The settings file that `resume_command` names, if there is none of this name.
     """
@@ -61,6 +64,7 @@ class RunStatus:
     resume_command: str | None
     sessions: list[Session] = field(repr=False)
     identity: dict[str, Any] = field(repr=False)
+    judged_by: str = ""
     settings_missing: str | None = None
 
     @property
@@ -120,6 +124,7 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         verdicts=manifest.verdicts,
         bytes=sum(part.bytes for part in manifest.parts.values()),
         resume_command=command,
+        judged_by=judged_by(manifest.identity),
         settings_missing=settings_missing,
         sessions=manifest.sessions,
         identity=manifest.identity,

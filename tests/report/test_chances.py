@@ -126,5 +126,9 @@ def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> 
     del settings["model"]["calibrated_crush_m"]
     metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
     pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
-    with pytest.raises(ReportError, match="another version, whose settings lack 'calibrated_crush_m'"):
+    write_report(tmp_path / "old.parquet", tmp_path / "page.html")  # with the default of this version
+    del settings["model"]["preset"]
+    metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
+    with pytest.raises(ReportError, match=r"another version, whose settings are not those of this one \('preset'\)"):
         write_report(tmp_path / "old.parquet", tmp_path / "page.html")
