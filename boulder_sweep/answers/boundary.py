@@ -11,6 +11,7 @@ verdicts beside which nothing was simulated, or such a second change along a lin
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,7 @@ from boulder_sweep.answers.trials import Judges, judges_of
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
-from boulder_sweep.errors import QuestionError
+from boulder_sweep.errors import OlderRulesWarning, QuestionError
 from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
 from boulder_sweep.places import Place
 from boulder_sweep.runner.pool import Pool
@@ -204,7 +205,9 @@ def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any], str]:
     found = identity_in(table.schema.metadata)
     if "settings" not in found or not {"verdict", "reason", "simulated"} <= set(table.column_names):
         raise QuestionError(f"{path} is neither the folder of a run nor a file that `sweep boundary` wrote")
-    return table.to_pandas(), found["settings"], judged_by(found)
+    if judged := judged_by(found):
+        warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=2)
+    return table.to_pandas(), found["settings"], judged
 
 
 class _Lines:

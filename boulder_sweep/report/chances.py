@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boulder_sweep.columns import COLUMNS
-from boulder_sweep.errors import ReportError
+from boulder_sweep.errors import OlderRulesWarning, ReportError
 from boulder_sweep.store.provenance import identity_in, judged_by
 from boulder_sweep.text import counted, one_line
 
@@ -43,6 +44,8 @@ class ChanceFile:
         if "settings" not in self.identity or not set(CHANCES) <= set(self._table.column_names):
             raise ReportError(f"{path} is neither the folder of a run nor a file that `sweep uncertainty` wrote")
         self.judged_by = judged_by(self.identity)
+        if self.judged_by:
+            warnings.warn(f"{path} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
         self.columns = tuple(dict.fromkeys((*(spec.name for spec in COLUMNS), *self._table.column_names)))
         self.lacking = frozenset(self.columns) - frozenset(self._table.column_names)
         self.rows = self.rows_done = len(self._table)

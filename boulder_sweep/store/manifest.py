@@ -32,7 +32,7 @@ _FORMAT = 1
 _IN_EVERY_TABLE = frozenset({DESIGN_ID.name, *INPUT_COLUMNS, "verdict", "reason"})
 _PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
 _DIGITS = 12
-_PART_NAME = re.compile(rf"{_PART_PREFIX}\d{{{_DIGITS},}}(-\d{{{_DIGITS},}})?{re.escape(_PART_SUFFIX)}")
+_PART_NAME = re.compile(rf"{_PART_PREFIX}[0-9]{{{_DIGITS},}}(-[0-9]{{{_DIGITS},}})?{re.escape(_PART_SUFFIX)}")
 """The first tables named a part by its first row only."""
 
 

@@ -1,7 +1,7 @@
 """Tables of every version so far, kept as those versions wrote them: read for good, gone on with by their own only.
 
-A folder of tests/store/data was written by `sweep run` of the last commit before the next change of the format. The
-oldest comes first; its name says what was new. Whoever changes the format (docs/formats.md) adds one.
+A folder of tests/store/data was written by `sweep run` while its format was that of the project; docs/formats.md says
+what was new in each. The oldest comes first. Whoever changes the format adds one of the new.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from boulder_sweep.store.schema import encode, table_schema
 from tests.store.folders import IDENTITY, ROWS, finished_folder, open_folder, part_record, rewrite_records
 
 DATA = Path(__file__).with_name("data")
-KEPT = sorted(path.name for path in DATA.iterdir())
+KEPT = sorted(path.name for path in DATA.glob("*.sweep"))
 FIRST = ["time_to_limit_error_s", "vehicle_crush_m", "overlap_m", "validity", "step_s"]
 LACKING = {
     "1_one_number.sweep": FIRST,
