@@ -34,6 +34,7 @@ def test_an_old_table_is_drawn_exported_and_reported(sweep, old, monkeypatch):
     judged = judged_by(load(Path(old)).identity)
     assert sweep("plot", old, "-o", "map.svg") == (0, "map.svg: 18 of 18 designs\n", note_on(old))
     assert " ".join(captions[0].split()).endswith(f"J{judged[1:]}.")
+    assert ("what the model was tested on" in " ".join(captions[0].split())) == ("validity" not in LACKING.get(old, []))
     assert sweep("export", old, "-o", "t.csv") == (0, "t.csv: 18 rows\n", note_on(old))
     with Path("t.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
