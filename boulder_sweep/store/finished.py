@@ -17,6 +17,7 @@ from typing import IO, TYPE_CHECKING, Any
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.errors import DamagedError, StoreError
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.manifest import Manifest, Part, load
@@ -84,7 +85,7 @@ class FinishedRows:
         if self.lacking:
             yield f"has no {', '.join(name for name in self.columns if name in self.lacking)} (null here)"
         if more := [name for name in self.columns if name not in today]:
-            yield f"has more columns, kept as they are: {', '.join(more)}"
+            yield f"has more columns, kept as they are: {shorten(', '.join(more), 200)}"
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows in the order of the designs, about a part at a time.

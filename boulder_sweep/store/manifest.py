@@ -18,6 +18,7 @@ from typing import IO, Any
 from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.settings.model import UNLOADINGS
+from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError, StoreError
 from boulder_sweep.store.files import WRITING_SUFFIX
 from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
@@ -279,7 +280,7 @@ def check_own(manifest: Manifest, folder: Place) -> None:
     """
     if manifest.differing:
         why = "; ".join(manifest.differing[:3]) + ("; ..." if len(manifest.differing) > 3 else "")
-        raise OtherVersionError(folder / MANIFEST_NAME, why, version_of({"identity": manifest.identity}))
+        raise OtherVersionError(folder / MANIFEST_NAME, shorten(why, 300), version_of({"identity": manifest.identity}))
 
 
 def _opened(folder: Place) -> IO[bytes]:

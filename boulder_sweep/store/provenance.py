@@ -22,6 +22,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.manifest import Session
 
 PREFIX = "boulder_sweep."
@@ -116,8 +117,8 @@ def judged_by(there: Mapping[str, Any]) -> str:
         return ""
     versions_ = there.get("versions")
     version_ = versions_.get("boulder-sweep", "unknown") if isinstance(versions_, Mapping) else "unknown"
-    hashes = ", ".join(f"{name} {str(there.get(f'{name}_sha256', 'unknown'))[:8]}" for name in names)
-    return f"judged by the rules of version {version_} ({hashes})"
+    hashes = ", ".join(f"{name} {shorten(str(there.get(f'{name}_sha256', 'unknown'))[:8])}" for name in names)
+    return f"judged by the rules of version {shorten(str(version_))} ({hashes})"
 
 
 def file_metadata(

@@ -144,6 +144,9 @@ def test_other_rules_or_kernels_are_told(tmp_path, name):
 def test_who_wrote_no_hash_is_not_of_this_version():
     assert judged_by({}) == "judged by the rules of version unknown (rules unknown, kernels unknown)"
     assert judged_by(IDENTITY) == ""
+    long = judged_by({"rules_sha256": "\x1b[2J" * 99, "versions": {"boulder-sweep": "9\n" * 10**6}})
+    assert long.isprintable()
+    assert len(long) < 200
 
 
 def with_colour(out: Path, *, also_in_manifest: bool = True) -> None:
