@@ -102,5 +102,23 @@ class WriteError(StoreError):
     exit_code = EXIT_INTERNAL
 
 
+class LinkError(StoreError):
+    """A link lies where a file is to be written; whoever put it there would choose what is overwritten."""
+
+
+class FolderRemovedError(StoreError):
+    """The output folder was removed during the run, or moved, or is that of another run by now."""
+
+    def __init__(self, out: Place):
+        super().__init__(out)
+        self.out = out
+
+    def __str__(self) -> str:
+        return (
+            f"{self.out} was removed, moved or replaced during the run, or its file _lock was; nothing more is "
+            f"written. Run again to compute what is missing"
+        )
+
+
 class DoesNotFitError(StoreError):
     """The result cannot fit on the disk or in memory; found before any work."""

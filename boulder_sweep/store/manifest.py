@@ -19,7 +19,7 @@ from boulder_sweep.columns import AT_REST, COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError, StoreError
-from boulder_sweep.store.files import WRITING_SUFFIX
+from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
 from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
 from boulder_sweep.store.lock import LOCK_NAME
 from boulder_sweep.store.object_lock import is_probe
@@ -30,7 +30,8 @@ _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
 _PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
 _DIGITS = 12
-_PART_NAME = re.compile(rf"{_PART_PREFIX}\d{{{_DIGITS},}}-\d{{{_DIGITS},}}{re.escape(_PART_SUFFIX)}")
+_PART_NAME = re.compile(rf"{_PART_PREFIX}[0-9]{{{_DIGITS},}}-[0-9]{{{_DIGITS},}}{re.escape(_PART_SUFFIX)}")
+_TOKENS = re.compile(r"(\.[0-9a-f]{16})+$")
 
 
 @dataclass(frozen=True)
@@ -176,10 +177,15 @@ def part_name(first: int, stop: int, table_rows: int) -> str:
     return f"{_PART_PREFIX}{first:0{digits}d}-{stop:0{digits}d}{_PART_SUFFIX}"
 
 
+def staged_name(name: str, token: str, sha256: str) -> str:
+    """Return the temporary name of a part: no other run, and no other content, has the same."""
+    return hidden_name(f"{name}.{token}.{sha256[:16]}")
+
+
 def is_ours(name: str) -> bool:
     """Whether a sweep gives its files such a name, temporary names included."""
     if name.endswith(WRITING_SUFFIX):
-        return name.startswith("_") and is_ours(name[1 : -len(WRITING_SUFFIX)])
+        return name.startswith("_") and is_ours(_TOKENS.sub("", name[1 : -len(WRITING_SUFFIX)]))
     known = is_part_name(name) or is_generation(name) or is_probe(name)
     return known or name in (MANIFEST_NAME, LOCK_NAME)
 
