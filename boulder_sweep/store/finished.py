@@ -57,6 +57,7 @@ class FinishedRows:
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
         self.more_columns = manifest.more_columns
         self._folder = folder
+        self._schemas: dict[str, pa.Schema] = {}
         self._places = _Places(manifest)
         self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())
 
@@ -152,8 +153,11 @@ class FinishedRows:
                 source = pa.BufferReader(content)
             # Parts are read in parallel already, and reading through a dataset would take twice as long.
             with pq.ParquetFile(source, page_checksum_verification=True) as opened:
+                schema = self._schemas.setdefault("of all parts", opened.schema_arrow)  # one step, as of threads
+                if opened.metadata.num_rows != part.rows or not opened.schema_arrow.equals(schema):
+                    raise DamagedError(_damage_text(self._folder, {name: "other rows or columns than recorded"}))
                 table = opened.read(columns, use_threads=False)
-        except (OSError, pa.ArrowException) as problem:
+        except (OSError, ValueError, pa.ArrowException) as problem:  # ValueError: a name that is no text
             raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
         return table if columns is None else table.select(columns)  # in the order asked for
 
