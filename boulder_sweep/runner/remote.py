@@ -24,8 +24,8 @@ _preparing = threading.Lock()
 class Work:
     """What every task of a run has in common; sent to the cluster once."""
 
-    token: str
-    """Of the run's output folder; new for every run."""
+    name: str
+    """The token of the run, see `OutputFolder`."""
     computation: Computation
     rows_per_block: int
     rows_per_part: int
@@ -67,7 +67,7 @@ def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
         if relayed:
             done.relayed.append(part._replace(content=bytes(part.content)))
         else:
-            staged = stage(storage, work.token, work.table_rows, part.first, part.content, part.rows, part.verdicts)
+            staged = stage(storage, work.name, work.table_rows, part.first, part.content, part.rows, part.verdicts)
             done.staged.append(staged)
     return done
 
@@ -81,11 +81,11 @@ def prepare(work: Work) -> None:
         Rows computed here could differ from those of the others.
     """
     with _preparing:
-        if work.token not in _prepared:
+        if work.name not in _prepared:
             if fingerprint() != work.fingerprint:
                 raise BackendError(other_versions_text("a worker"))
             work.computation.warm_up()
-            _prepared.add(work.token)
+            _prepared.add(work.name)
 
 
 def parts_of(start: int, stop: int, size: int) -> list[tuple[int, int]]:
