@@ -77,6 +77,7 @@ class FinishedRows:
         if said := [*([f"was {self.judged_by}"] if self.judged_by else []), *self._other_columns(today)]:
             warnings.warn(f"{folder} {'; it '.join(said)}", OlderRulesWarning, stacklevel=2)
         self._folder = folder
+        self._schemas: dict[str, pa.Schema] = {}
         self._places = _Places(manifest)
         self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())
 
@@ -184,8 +185,11 @@ class FinishedRows:
                 if set(opened.schema_arrow.names) != set(self._stored):
                     wrong = "its columns are not those of the manifest"
                     raise DamagedError(_damage_text(self._folder, {name: wrong}))
+                schema = self._schemas.setdefault("of all parts", opened.schema_arrow)  # one step, as of threads
+                if opened.metadata.num_rows != part.rows or not opened.schema_arrow.equals(schema):
+                    raise DamagedError(_damage_text(self._folder, {name: "other rows or columns than recorded"}))
                 table = opened.read(columns, use_threads=False)
-        except (OSError, pa.ArrowException) as problem:
+        except (OSError, ValueError, pa.ArrowException) as problem:  # ValueError: a name that is no text
             raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
         if not self.lacking and columns is None:
             return table

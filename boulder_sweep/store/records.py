@@ -63,4 +63,6 @@ def _fits(value: Any, type_: Any) -> bool:
     if kinds:
         return any(_fits(value, kind) for kind in kinds)
     kind = get_origin(type_) or type_
+    if kind is int and isinstance(value, bool):
+        return False
     return isinstance(value, kind if kind in (str, int, dict, list) else dict)

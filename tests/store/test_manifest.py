@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import pyarrow as pa
@@ -44,7 +45,9 @@ def test_what_is_saved_is_loaded(tmp_path, merging):
     manifest = manifest_with_parts()
     if merging:
         name, part = next(iter(manifest.parts.items()))
-        manifest.merge = Merge("x", part, [name])
+        small = {part_name(first, first + 150, 1000): replace(part, first=first, rows=150) for first in (0, 150)}
+        manifest.parts = small | {key: one for key, one in manifest.parts.items() if key != name}
+        manifest.merge = Merge(name, part, [*small])
     save(manifest, DiskStorage(tmp_path))
     assert load(tmp_path) == manifest
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST_NAME]
