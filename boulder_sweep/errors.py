@@ -32,6 +32,10 @@ class BoulderSweepError(Exception):
         return f"error: {self}"
 
 
+class OlderRulesWarning(UserWarning):
+    """A table was judged by the rules of another version, or has other columns; it is read all the same."""
+
+
 class BackendError(BoulderSweepError):
     """Workers are not available; the text says why and what to do."""
 

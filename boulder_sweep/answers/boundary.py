@@ -10,8 +10,8 @@ verdicts beside which nothing was simulated, or such a second change along a lin
 
 from __future__ import annotations
 
-import json
 import math
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ from boulder_sweep.answers.trials import Judges, judges_of
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
-from boulder_sweep.errors import QuestionError
+from boulder_sweep.errors import OlderRulesWarning, QuestionError
 from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
 from boulder_sweep.places import Place
 from boulder_sweep.runner.pool import Pool
@@ -176,7 +176,7 @@ def _without_overlap(found: Boundary) -> Boundary:
     )
 
 
-def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
+def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any], str]:
     """Read a map that `Boundary.write` wrote.
 
     Returns
@@ -185,6 +185,8 @@ def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         One row a design.
     settings : dict
         The resolved settings of the grid.
+    judged_by : str
+        By whose rules the verdicts were found; empty where by those of this version.
 
     Raises
     ------
@@ -198,10 +200,14 @@ def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         table = pq.read_table(path)
     except (OSError, pa.ArrowException) as problem:
         raise QuestionError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
-    settings = (table.schema.metadata or {}).get(b"boulder_sweep.settings")
-    if settings is None or not {"verdict", "reason", "simulated"} <= set(table.column_names):
+    from boulder_sweep.store.provenance import identity_in, judged_by
+
+    found = identity_in(table.schema.metadata)
+    if "settings" not in found or not {"verdict", "reason", "simulated"} <= set(table.column_names):
         raise QuestionError(f"{path} is neither the folder of a run nor a file that `sweep boundary` wrote")
-    return table.to_pandas(), json.loads(settings)
+    if judged := judged_by(found):
+        warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=2)
+    return table.to_pandas(), found["settings"], judged
 
 
 class _Lines:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from boulder_sweep.answers.subset import FAILING
 from boulder_sweep.columns import DESIGN_ID, INPUTS
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.places import Place, RemotePath, place_of
+from boulder_sweep.store.files import replacing
 from boulder_sweep.store.schema import part_table
 from boulder_sweep.store.targets import check_target
 
@@ -258,14 +260,15 @@ def write_parquet(table: pa.Table, path: str | Place) -> Place:
     words = [field.name for field in table.schema if pa.types.is_dictionary(field.type)]
     content = io.BytesIO()
     try:
-        pq.write_table(
-            table,
-            target if isinstance(target, Path) else content,
-            compression="zstd",
-            use_dictionary=words,
-            use_byte_stream_split=split,
-            write_page_checksum=True,
-        )
+        with replacing(target) if isinstance(target, Path) else nullcontext(content) as file:
+            pq.write_table(
+                table,
+                file,
+                compression="zstd",
+                use_dictionary=words,
+                use_byte_stream_split=split,
+                write_page_checksum=True,
+            )
         if isinstance(target, RemotePath):
             target.put(content.getbuffer())
     except OSError as problem:

@@ -41,6 +41,9 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
     if as_json:
         show(json.dumps(found.to_dict()))
         return 0
+    for name, judged_by in zip((before, after), found.judged_by, strict=True):
+        if any(found.judged_by):
+            show(f"rules    {name}: {judged_by or 'judged by the rules of this version'}")
     for line in found.changed:
         show(f"changed  {line}")
     alone = f"{found.only_before:,} only before, {found.only_after:,} only after"

@@ -152,6 +152,7 @@ def status_lines(status: RunStatus) -> list[str]:
         f"({status.rows_done / max(status.rows, 1):.1%}), {size_text(status.bytes)}",
         *verdict_lines(status.verdicts, status.rows_done),
     ]
+    lines += [f"rules    {status.judged_by}"] if status.judged_by else []
     lines += [f"damaged  {name}: {what}" for name, what in status.damaged.items()]
     lines += [f"missing  designs {start:,} to {stop - 1:,}" for start, stop in status.missing[:10]]
     if len(status.missing) > 10:

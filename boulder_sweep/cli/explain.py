@@ -53,7 +53,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
         if trajectory is not None:
             found.trajectory.to_parquet(trajectory)
     elif plot is not None or trajectory is not None:
-        say("note: the design cannot be computed; there is no time history")
+        say(f"note: the design cannot be computed{' again' if found.unfamiliar else ''}; there is no time history")
     if as_json:
         show(json.dumps(found.as_dict(units)))
         return 0
@@ -63,7 +63,11 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
         show(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
     for line in found.changed:
         show(f"changed since: {line}")
-    if not found.unequal:
+    if found.judged_by:
+        show(f"as stored, the row was {found.judged_by}")
+    if found.unfamiliar:
+        show(f"not computed again: {found.unfamiliar}")
+    elif not found.unequal:
         show("computed again: the same to the last bit")
     return 0
 
@@ -107,7 +111,8 @@ def why_lines(found: Explanation) -> list[str]:
         lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
     if row.get("validity"):
         lines.append("  outside what the model was tested on (docs/validity.md):")
-        lines += [f"    {name}: {BY_FLAG[name].meaning}" for name in row["validity"].split(";")]
+        names = row["validity"].split(";")
+        lines += [f"    {name}: {BY_FLAG[name].meaning}" if name in BY_FLAG else f"    {name}" for name in names]
     return lines
 
 

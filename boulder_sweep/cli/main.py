@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Sequence
-from typing import NoReturn
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NoReturn
 
 import click
 
@@ -33,7 +35,14 @@ from boulder_sweep.cli.tradeoff import tradeoff
 from boulder_sweep.cli.uncertainty import uncertainty
 from boulder_sweep.cli.validate import validate
 from boulder_sweep.cli.which import which
-from boulder_sweep.errors import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_WRONG_USE, BoulderSweepError, Interrupted
+from boulder_sweep.errors import (
+    EXIT_INTERNAL,
+    EXIT_INTERRUPTED,
+    EXIT_WRONG_USE,
+    BoulderSweepError,
+    Interrupted,
+    OlderRulesWarning,
+)
 from boulder_sweep.runner.interruption import noted_signals
 
 COMMANDS = (
@@ -104,7 +113,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
         return shell_complete(cli, {}, "sweep", COMPLETION, completion)
     try:
-        with noted_signals() as signals:
+        with noted_signals() as signals, _older_rules_told():
             code = signals.call(lambda: _invoke(words))
         sys.stdout.flush()
         return code
@@ -125,6 +134,25 @@ def execute(arguments: Sequence[str] | None = None) -> int:
         return EXIT_INTERRUPTED
     except Exception as error:
         return _report(error, verbose=bool({"-v", "--verbose"} & set(words)))
+
+
+@contextmanager
+def _older_rules_told() -> Iterator[None]:
+    """Say by whose rules a table was judged in one line, however often it is read; other warnings stay as they are."""
+    said: set[str] = set()
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", OlderRulesWarning)
+        usual = warnings.showwarning
+
+        def showwarning(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+            if not issubclass(category, OlderRulesWarning):
+                usual(message, category, *where, **more)
+            elif str(message) not in said:
+                said.add(str(message))
+                say(f"note: {message}")
+
+        warnings.showwarning = showwarning
+        yield
 
 
 def _usage_text(error: click.ClickException) -> str:

@@ -29,7 +29,7 @@ def new(file: Path, yes: bool) -> int:
     from boulder_sweep.settings import load
     from boulder_sweep.settings.starter import CLASSES, UNITS, UNPUBLISHED, starter
 
-    if file.exists():
+    if file.exists() or file.is_symlink():
         raise ExistingFileError(f"{file} exists already; name another file")
     name = re.sub(r"[^\w.+-]+", "-", file.stem).strip("-.+")[:80] or "my-site"
     vehicle, units = next(iter(CLASSES)), UNITS[0]
@@ -37,7 +37,8 @@ def new(file: Path, yes: bool) -> int:
         name = click.prompt("Name of the study", default=name, value_proc=_checked_name, err=True)
         vehicle = click.prompt("Class of the vehicle", type=click.Choice(list(CLASSES)), default=vehicle, err=True)
         units = click.prompt("Units", type=click.Choice(UNITS), default=units, err=True)
-    file.write_text(starter(name, vehicle, "us" if units == "us" else "si", str(file)), encoding="utf-8")
+    with file.open("x", encoding="utf-8") as new_file:  # no link is followed that has come since
+        new_file.write(starter(name, vehicle, "us" if units == "us" else "si", str(file)))
     quoted = shlex.quote(str(file))
     if CLASSES[vehicle][0] != CLASSES[next(iter(CLASSES))][0]:
         show(

@@ -61,7 +61,8 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     settings = source.settings
     sets = settings.get("labels", {}) if settings["order"] != "table" else {}
     held = {name: _held(name, text, sets) for name, text in given.items()}
-    words = {"title": settings["name"], "terms": terms_line(settings)}
+    judged = f" {source.judged_by[0].upper()}{source.judged_by[1:]}." if source.judged_by else ""
+    words = {"title": settings["name"], "terms": f"{terms_line(settings)}{judged}"}
     shown = draw_verdict_map(source.table, target, at=held, sets=sets, units=units, **words, **axes)
     for name, value in held.items():
         taken = shown.fixed.get(name, value)
@@ -78,6 +79,7 @@ class _Source(NamedTuple):
 
     table: Any
     settings: dict[str, Any]
+    judged_by: str
     rows_done: int
     rows: int
 
@@ -95,15 +97,16 @@ def _of_run(out: str) -> _Source:
     from boulder_sweep.views.pieces import finished_pieces
 
     finished = FinishedRows(place_of(out))
-    return _Source(finished_pieces(finished), finished.identity["settings"], finished.rows_done, finished.rows)
+    settings, done = finished.identity["settings"], finished.rows_done
+    return _Source(finished_pieces(finished), settings, finished.judged_by, done, finished.rows)
 
 
 def _of_map(out: str) -> _Source:
     """Return the map in a file of `sweep boundary`."""
     from boulder_sweep.answers.boundary import read_map
 
-    frame, settings = read_map(out)
-    return _Source(frame, settings, len(frame), len(frame))
+    frame, settings, judged_by = read_map(out)
+    return _Source(frame, settings, judged_by, len(frame), len(frame))
 
 
 def _given(text: str) -> tuple[str, str]:

@@ -13,20 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OutcomeColumn
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.judge.evaluation import Evaluation
+from boulder_sweep.judge.evaluation import Evaluation, known_control
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings
+from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
 from boulder_sweep.settings.shown_units import shown_values
-from boulder_sweep.store.errors import OtherVersionError
 from boulder_sweep.store.manifest import load as load_manifest
-from boulder_sweep.store.provenance import differences, identity
+from boulder_sweep.store.provenance import differences, identity, judged_by
 from boulder_sweep.store.reader import read_row
-from boulder_sweep.store.records import version_of
 from boulder_sweep.store.schema import part_table
 
 if TYPE_CHECKING:
@@ -53,6 +51,10 @@ class Explanation:
         What is different now from when the table was computed: versions, kernels, rules. Empty where nothing is.
     trajectory : Trajectory or None
         The impact over time; None where the design cannot be computed.
+    judged_by : str
+        By whose rules the row was judged; empty where by those of this version.
+    unfamiliar : str
+        Why a row of another version cannot be computed again; `recomputed` is empty then.
     """
 
     name: str
@@ -62,11 +64,13 @@ class Explanation:
     recomputed: dict[str, Any]
     changed: tuple[str, ...]
     trajectory: Trajectory | None
+    judged_by: str = ""
+    unfamiliar: str = ""
 
     @property
     def unequal(self) -> tuple[str, ...]:
-        """Outcomes that are not the same to the last bit."""
-        return tuple(name for name, value in self.stored.items() if not _same(value, self.recomputed[name]))
+        """Outcomes that are not the same to the last bit; those that the table does not have are not compared."""
+        return tuple(name for name, value in self.recomputed.items() if not _same(value, self.stored[name]))
 
     def as_dict(self, units: str = "si") -> dict[str, Any]:
         """Return everything but the trajectory as plain data, in ``si`` or ``us`` units."""
@@ -79,9 +83,11 @@ class Explanation:
             "design_id": self.design_id,
             "inputs": shown_values(self.inputs, units),
             "outcomes": shown_values(self.stored, units),
-            "same_bits": not self.unequal,
+            "same_bits": not self.unequal and not self.unfamiliar,
             "unequal": {name: [were[name], are[name]] for name in were},
             "changed_since": list(self.changed),
+            "judged_by": self.judged_by,
+            "unfamiliar": self.unfamiliar,
         }
 
 
@@ -98,7 +104,8 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     Returns
     -------
     Explanation
-        The row as stored and as recomputed, and its time history.
+        The row as stored and as recomputed, and its time history; of another version's table, as far as its settings
+        are understood.
 
     Raises
     ------
@@ -108,17 +115,25 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         The table has no such row, or not yet.
     """
     folder = place_of(out)
-    there = load_manifest(folder).identity
+    manifest = load_manifest(folder)
+    there = manifest.identity
     row = read_row(folder, design_id)
     values = row.to_pylist()[0]
     inputs = {name: values[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in values}
+    own: dict[str, Any] = {
+        "design_id": design_id,
+        "inputs": inputs,
+        "stored": {name: value for name, value in values.items() if isinstance(BY_NAME.get(name), OutcomeColumn)},
+        "judged_by": judged_by(there),
+    }
     try:
-        control, readings = Control(**there["control"]), Readings(**there["readings"])
-        sweep = _one_design(there["settings"], inputs, control, values["step_s"] or reported_step_s(control))
-        stated = [there[part] for part in ("settings", "readings", "control", "accuracy")]
+        control, readings = known_control(there["control"]), Readings(**there["readings"])
+        settings = completed(there["settings"])
+        sweep = _one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
+        stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     except (LookupError, TypeError, ValueError) as unfamiliar:
-        why = f"its settings are not those of this version: {unfamiliar}"
-        raise OtherVersionError(folder, why, version_of({"identity": there})) from unfamiliar
+        why = f"its settings are not those of this version: {type(unfamiliar).__name__}: {unfamiliar}"
+        return Explanation(name=folder.name, recomputed={}, changed=(), trajectory=None, unfamiliar=why, **own)
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
     model = sweep.model
@@ -128,12 +143,10 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     computable = not block.reasons[0]
     return Explanation(
         name=sweep.name,
-        design_id=design_id,
-        inputs=inputs,
-        stored={spec.name: values[spec.name] for spec in evaluation.columns},
-        recomputed={spec.name: again[spec.name] for spec in evaluation.columns},
+        recomputed={spec.name: again[spec.name] for spec in evaluation.columns if spec.name in manifest.columns},
         changed=tuple(differences(there, identity(*stated))),
         trajectory=simulate(sweep) if computable else None,
+        **own,
     )
 
 

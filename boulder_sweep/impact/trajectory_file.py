@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ import pyarrow.parquet as pq
 
 from boulder_sweep.errors import HistoryFileError
 from boulder_sweep.impact.trajectory_columns import BY_NAME
+from boulder_sweep.store.files import replacing
 from boulder_sweep.store.targets import check_target
 
 _TYPES = {"float64": pa.float64(), "dictionary": pa.dictionary(pa.int32(), pa.string())}
@@ -52,7 +52,8 @@ def write(table: pa.Table, path: str | Path) -> None:
     """
     target = checked_history(path)
     try:
-        pq.write_table(table, target, compression="zstd", write_page_checksum=True)
+        with replacing(target) as file:
+            pq.write_table(table, file, compression="zstd", write_page_checksum=True)
     except OSError as problem:
         why = os.strerror(problem.errno) if problem.errno else str(problem)
         raise HistoryFileError(f"{path} cannot be written: {why}") from problem
@@ -70,6 +71,4 @@ def checked_history(path: str | Path) -> Path:
     if target.suffix.lower() != ".parquet":
         raise HistoryFileError(f"{path}: a time history is a Parquet file; its name must end in .parquet")
     check_target(target, HistoryFileError)
-    if target.exists() and not os.access(target, os.W_OK):  # not replaced, but written anew
-        raise HistoryFileError(f"{path} cannot be written: {os.strerror(errno.EACCES)}")
     return target

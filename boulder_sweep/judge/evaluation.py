@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -260,6 +260,11 @@ def evaluation_of(
 def readings_of(sweep: Sweep) -> Readings:
     """Return the readings of a sweep's model as the kernels name them."""
     return Readings(*sweep.model.readings.corrected)
+
+
+def known_control(recorded: Mapping[str, Any]) -> Control:
+    """Return the control that a table records, without entries of another version that this one does not know."""
+    return Control(**{name: value for name, value in recorded.items() if name in Control._fields})
 
 
 def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:

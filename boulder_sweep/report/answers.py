@@ -66,11 +66,15 @@ def answer_of(rows: Rows) -> Answer:
     others = [f"{count:,} {_in_words(name)}" for name, count in counts.items() if name not in ("pass", NOT_YET)]
     if others:
         sentences.append((f"The others: {'; '.join(others)}.",))
-    flagged = n - rows.flags.get("", 0)
+    flagged = n - rows.flags.get("", 0) if rows.flags else 0
     if flagged:
         commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
-        most = "; ".join(f"{count:,} with {BY_FLAG[name].meaning}" for count, name in commonest[:3])
+        most = "; ".join(
+            f"{count:,} with {BY_FLAG[name].meaning if name in BY_FLAG else name}" for count, name in commonest[:3]
+        )
         sentences.append((f"{flagged:,} of those that pass lie outside what the model was tested on: {most}.",))
+    elif n and not rows.flags:
+        sentences.append(("The table does not say which of those that pass lie outside what the model was tested on.",))
     if n == 0:
         none = "No design passes at the means." if uncertain else "No design passes."
         return Answer((*sentences, (none,)), tuple(own for _, own in uncertain if own))

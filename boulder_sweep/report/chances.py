@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.errors import ReportError
-from boulder_sweep.store.provenance import PREFIX
+from boulder_sweep.columns import COLUMNS
+from boulder_sweep.errors import OlderRulesWarning, ReportError
+from boulder_sweep.store.provenance import identity_in, judged_by
 from boulder_sweep.text import counted, one_line
 
 if TYPE_CHECKING:
@@ -39,20 +40,21 @@ class ChanceFile:
             self._table = pq.read_table(path)
         except (OSError, pa.ArrowException) as problem:
             raise ReportError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
-        entries = {
-            key.decode().removeprefix(PREFIX): value
-            for key, value in (self._table.schema.metadata or {}).items()
-            if key.startswith(PREFIX.encode())
-        }
-        if "settings" not in entries or not set(CHANCES) <= set(self._table.column_names):
+        self.identity = identity_in(self._table.schema.metadata)
+        if "settings" not in self.identity or not set(CHANCES) <= set(self._table.column_names):
             raise ReportError(f"{path} is neither the folder of a run nor a file that `sweep uncertainty` wrote")
-        parsed = ("settings", "readings", "control", "accuracy", "versions")
-        self.identity = {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
+        self.judged_by = judged_by(self.identity)
+        if self.judged_by:
+            warnings.warn(f"{path} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
+        self.columns = tuple(dict.fromkeys((*(spec.name for spec in COLUMNS), *self._table.column_names)))
+        self.lacking = frozenset(self.columns) - frozenset(self._table.column_names)
         self.rows = self.rows_done = len(self._table)
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows, or some of their columns, at once."""
-        yield self._table if columns is None else self._table.select(list(columns))
+        from boulder_sweep.store.schema import with_columns
+
+        yield with_columns(self._table, self.columns if columns is None else columns)
 
     def row(self, number: int) -> pa.Table:
         """Return one row.

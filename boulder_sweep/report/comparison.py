@@ -32,6 +32,8 @@ class Comparison:
         Designs without a counterpart in the other result.
     changed : tuple of str
         Settings, versions and hashes that differ, one line each.
+    judged_by : tuple of str
+        By whose rules each of the two was judged; empty where by those of this version.
     least : dict
         ``mass_kg`` and ``depth_m``: the least of a design that passes, before and after; None where none does.
     """
@@ -40,6 +42,7 @@ class Comparison:
     only_before: int
     only_after: int
     changed: tuple[str, ...]
+    judged_by: tuple[str, str]
     least: dict[str, tuple[float | None, float | None]]
 
     @property
@@ -69,6 +72,7 @@ class Comparison:
             "flips": self.flips(),
             "least": {name: list(pair) for name, pair in self.least.items()},
             "changed": list(self.changed),
+            "judged_by": list(self.judged_by),
         }
 
 
@@ -95,13 +99,14 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     matched = tables[0].merge(
         tables[1].drop(columns=[*INPUT_COLUMNS, "mass_kg"]), on=[*keys, "nth"], suffixes=("_before", "_after")
     )
-    identities = [FinishedRows(place_of(folder)).identity for folder in (before, after)]
+    one, other = (FinishedRows(place_of(folder)) for folder in (before, after))
     passing = [table[table.verdict == "pass"] for table in tables]
     return Comparison(
         matched=matched.drop(columns=[*keys, "nth"]),
         only_before=len(tables[0]) - len(matched),
         only_after=len(tables[1]) - len(matched),
-        changed=tuple(differences(*identities)),
+        changed=tuple(differences(one.identity, other.identity)),
+        judged_by=(one.judged_by, other.judged_by),
         least={
             "mass_kg": (_least(passing[0].mass_kg), _least(passing[1].mass_kg)),
             "depth_m": (_least(passing[0].embedment_depth_m), _least(passing[1].embedment_depth_m)),

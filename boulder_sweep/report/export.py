@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from boulder_sweep.errors import ReportError
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_column
+from boulder_sweep.store.files import replacing
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.targets import check_target
 from boulder_sweep.text import printable
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
+JUDGED_BY = Shown(
+    "judged_by", "judged_by", "", 1.0, "by whose rules the verdict was found; a column of tables of other versions only"
+)
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
 
@@ -64,16 +69,12 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
         )
-    writer: Callable[[Path, FinishedRows, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
-    passing = target.with_name(f".{target.name}.part")
+    writer: Callable[[BinaryIO, FinishedRows, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
     try:
-        rows = writer(passing, finished, units)
-        passing.replace(target)
+        with replacing(target) as passing:
+            return writer(passing, finished, units)
     except OSError as problem:
         raise ReportError(f"{file} cannot be written: {problem.strerror or problem}") from problem
-    finally:
-        passing.unlink(missing_ok=True)
-    return rows
 
 
 def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[str, str, str]]:
@@ -81,6 +82,8 @@ def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[st
     identity: Mapping[str, Any] = finished.identity
     yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
     yield "rows", f"{finished.rows_done:,} of {finished.rows:,}", ""
+    if finished.judged_by:
+        yield "verdicts", finished.judged_by, ""
     for name, version in identity["versions"].items():
         yield f"version of {name}", version, ""
     yield "hash of the settings", identity["settings_sha256"], ""
@@ -97,10 +100,13 @@ def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[st
 
 def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
     """Yield the rows piece by piece in the requested units."""
+    import pyarrow as pa
     import pyarrow.compute as pc
 
     for table in finished.tables():
-        columns = [shown_column(name, units) for name in table.column_names]
+        if finished.judged_by:
+            table = table.append_column(JUDGED_BY.stored, pa.array([finished.judged_by] * len(table)))
+        columns = [JUDGED_BY if name == JUDGED_BY.stored else shown_column(name, units) for name in table.column_names]
         for place, column in enumerate(columns):
             if column.size != 1.0:
                 values = pc.divide(table.column(place), column.size)
@@ -108,16 +114,17 @@ def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], p
         yield columns, table.rename_columns([column.name for column in columns])
 
 
-def _csv(target: Path, finished: FinishedRows, units: str) -> int:
+def _csv(target: BinaryIO, finished: FinishedRows, units: str) -> int:
     """Write comma-separated values; null is empty."""
     rows = 0
-    with target.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        for columns, table in _tables(finished, units):
-            if rows == 0:
-                writer.writerow(_cells(column.name for column in columns))
-            writer.writerows(zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True))
-            rows += len(table)
+    file = TextIOWrapper(target, newline="", encoding="utf-8")
+    writer = csv.writer(file)
+    for columns, table in _tables(finished, units):
+        if rows == 0:
+            writer.writerow(_cells(column.name for column in columns))
+        writer.writerows(zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True))
+        rows += len(table)
+    file.detach()
     return rows
 
 
@@ -131,7 +138,7 @@ def _cell(text: str) -> str:
     return f"'{shown}" if text.startswith(FORMULA_SIGNS) else shown
 
 
-def _parquet(target: Path, finished: FinishedRows, units: str) -> int:
+def _parquet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
     """Write one Parquet file with units and meanings in its field metadata, settings and versions in its own."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -153,7 +160,7 @@ def _parquet(target: Path, finished: FinishedRows, units: str) -> int:
     return rows
 
 
-def _sheet(target: Path, finished: FinishedRows, units: str) -> int:
+def _sheet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
     """Write a spreadsheet: the designs, and what a reader must know about them."""
     rows, columns = 0, list[Shown]()
     with _workbook(target) as book:
@@ -172,7 +179,7 @@ def _sheet(target: Path, finished: FinishedRows, units: str) -> int:
 
 
 @contextmanager
-def _workbook(target: Path) -> Iterator[Any]:
+def _workbook(target: BinaryIO) -> Iterator[Any]:
     """Return a workbook that is written as it grows."""
     try:
         from openpyxl import Workbook

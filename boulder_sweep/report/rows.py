@@ -75,7 +75,7 @@ class Rows:
     codes : ndarray of uint8, shape (rows,)
         Index of the name of every row.
     flags : dict of str to int
-        Designs that pass, by validity flags; under ``""`` those without.
+        Designs that pass, by validity flags; under ``""`` those without. Empty for a table that does not have them.
     axes : dict of str to ndarray
         Values along each axis of the grid, the last fastest; for named sets of soils or vehicles their numbers. Empty
         for a list of designs.
@@ -250,7 +250,8 @@ def read_rows(folder: Place) -> Rows:
     names: list[str] = []
     flags: Counter[str] = Counter()
     for table in finished.tables(["design_id", "verdict", "reason", "validity", *stored]):
-        flags.update(_flags_of_passes(table))
+        if "validity" not in finished.lacking:
+            flags.update(_flags_of_passes(table))
         rows = table.column("design_id").to_numpy()
         codes[rows] = _codes(table, names)
         for name in stored:
@@ -265,7 +266,8 @@ def read_rows(folder: Place) -> Rows:
     for place, (axis, values) in enumerate(axes.items()):
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
-    return Rows(folder, finished, (*names, NOT_YET), codes, flag_counts(flags.items()), axes, sets, inputs)
+    told = flag_counts(flags.items()) if flags else {}
+    return Rows(folder, finished, (*names, NOT_YET), codes, told, axes, sets, inputs)
 
 
 def _check_whole(file: ChanceFile, path: Place) -> None:

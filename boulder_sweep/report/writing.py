@@ -11,13 +11,13 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
-from boulder_sweep.judge.evaluation import control_of, readings_of
+from boulder_sweep.judge.evaluation import control_of, known_control, readings_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.places import RemotePath, place_of
 from boulder_sweep.report.answers import Named, answer_of
 from boulder_sweep.report.rows import read_rows, thinned
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import SolverSettings
+from boulder_sweep.settings.model import SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system
 from boulder_sweep.store.files import put_file
 from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
@@ -75,17 +75,13 @@ def write_report(
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
     identity, kept = rows.finished.identity, thinned(rows)
-    control, readings = Control(**identity["control"]), Readings(**identity["readings"])
-    notes = []
-    if identity["kernels_sha256"] != kernels_sha256():
-        notes.append(
-            "The table was computed by another version of the kernels than the one in this page, "
-            "so simulations here may differ from it."
-        )
+    notes = _notes_on_rules(rows.finished.judged_by)
     try:
+        settings, control = completed(identity["settings"]), known_control(identity["control"])
+        readings = Readings(**identity["readings"])
         text = assembled(
-            title=str(identity["settings"]["name"]),
-            settings=identity["settings"],
+            title=str(settings["name"]),
+            settings=settings,
             control=control,
             readings=readings,
             start=chosen[0]["inputs"],
@@ -96,12 +92,13 @@ def write_report(
             facts=_facts(
                 identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)
             ),
-            notes=[*notes, *_general_notes(identity["settings"], control)],
+            notes=[*notes, *_general_notes(settings, control)],
             units=units,
         )
-    except KeyError as missing:
+    except (KeyError, TypeError) as unfamiliar:
         raise ReportError(
-            f"{out} was written by another version, whose settings lack {missing}; run it again"
+            f"{out} was written by another version, whose settings are not those of this one ({unfamiliar}); "
+            "run it again"
         ) from None
     return _written(target, text)
 
@@ -191,6 +188,17 @@ def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
     inputs = {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
     return {"title": one.title, "number": one.number, "inputs": inputs}
+
+
+def _notes_on_rules(judged_by: str) -> list[str]:
+    """Return a note on the rules by which a table was judged, if they are not those of the simulator in the page."""
+    if not judged_by:
+        return []
+    return [
+        f"The verdicts of the table were {judged_by}. Simulations in this page follow the rules of version "
+        f"{versions()['boulder-sweep']} and may differ from it; settings that the table does not record have the "
+        "defaults of that version."
+    ]
 
 
 def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:

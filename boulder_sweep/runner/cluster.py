@@ -13,14 +13,12 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
-from uuid import uuid4
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
 from boulder_sweep.runner.backends import FETCH_S
 from boulder_sweep.runner.computing import Computation, failed_rows
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
 from boulder_sweep.runner.remote import Done, Work, compute, fingerprint, other_versions_text, parts_of, received
-from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 from boulder_sweep.text import one_line
 
@@ -216,7 +214,7 @@ class ClusterWorkers(threading.Thread):
         """Keep some tasks in flight until all are done."""
         manifest = self._folder.manifest
         work = Work(
-            uuid4().hex,
+            self._folder.token,
             self._computation,
             self._rows_per_block,
             manifest.rows_per_part,
@@ -296,7 +294,7 @@ class ClusterWorkers(threading.Thread):
         """Pass on the parts that a worker has written, or write those that it sent."""
         for part in done.relayed:
             done.staged.append(self._folder.stage(part.first, part.content, part.rows, part.verdicts))
-        here = [staged for staged in done.staged if (self._folder.path / hidden_name(staged.name)).exists()]
+        here = [staged for staged in done.staged if self._folder.is_staged(staged)]
         for staged in here:
             self.messages.put(Computed(staged.part.rows))
             self.messages.put(staged)

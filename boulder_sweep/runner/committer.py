@@ -134,6 +134,7 @@ class Committer(threading.Thread):
                 sources = [pa.BufferReader(content) for content in contents]
                 tables = [pq.read_table(source, page_checksum_verification=True) for source in sources]
             except (OSError, pa.ArrowException) as problem:
+                self._folder.check()
                 raise DamagedError(f"{self._folder.path} was damaged during the run: {problem}") from problem
             first = self._folder.manifest.parts[names[0]].first
             merged = self._computation.encoded(first, [judged_rows(table) for table in tables])

@@ -25,6 +25,7 @@ class Work:
     """What every task of a run has in common; sent to the cluster once."""
 
     name: str
+    """The token of the run, see `OutputFolder`."""
     computation: Computation
     rows_per_block: int
     rows_per_part: int
@@ -66,7 +67,8 @@ def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
         if relayed:
             done.relayed.append(part._replace(content=bytes(part.content)))
         else:
-            done.staged.append(stage(storage, work.table_rows, part.first, part.content, part.rows, part.verdicts))
+            staged = stage(storage, work.name, work.table_rows, part.first, part.content, part.rows, part.verdicts)
+            done.staged.append(staged)
     return done
 
 

@@ -25,7 +25,7 @@ from boulder_sweep.runner.interruption import noted_signals
 from boulder_sweep.runner.running import Report, Run
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.store.errors import NotASweepError
-from boulder_sweep.store.manifest import Manifest, load
+from boulder_sweep.store.manifest import Manifest, check_own, load
 from boulder_sweep.store.opening import claim_output
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.writer import ROWS_PER_PART
@@ -202,6 +202,7 @@ def estimate(
     if resume and folder is not None:
         try:
             there = load(folder)
+            check_own(there, folder)
             rows_there, rows_per_part = there.rows_done, there.rows_per_part
         except NotASweepError:
             pass

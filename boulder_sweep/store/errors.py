@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, BoulderSweepError
+from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError
 from boulder_sweep.places import Place
+from boulder_sweep.text import printable
+
+_LONGEST = 200
+"""Most characters of a stranger's records that a message quotes."""
 
 
 class StoreError(BoulderSweepError):
@@ -66,7 +70,7 @@ class NotASweepError(StoreError):
 
 
 class OtherVersionError(StoreError):
-    """A result is in a format that this version does not know.
+    """A result is in a format that this version does not know, or one with which its runs cannot go on.
 
     Parameters
     ----------
@@ -84,8 +88,8 @@ class OtherVersionError(StoreError):
         self.path, self.why, self.version = path, why, version
         noted = f", {version}" if version else ""
         super().__init__(
-            f"{path} was written by another version of boulder-sweep{noted} ({why}). Resume or inspect it "
-            f"with that version; pandas, Polars and DuckDB can read the parts as a table in any case. "
+            f"{path} was written by another version of boulder-sweep{noted} ({why}). Use that version to "
+            f"go on with it; pandas, Polars and DuckDB can read the parts as a table in any case. "
             f"`sweep run` with --overwrite starts again"
         )
 
@@ -96,10 +100,44 @@ class DamagedError(StoreError):
     exit_code = EXIT_INTERNAL
 
 
+class ImpossibleRecordsError(DamagedError):
+    """A manifest is intact, but holds what no sweep writes: somebody else made it."""
+
+    exit_code = EXIT_WRONG_USE
+
+    def __init__(self, path: Place, what: str):
+        super().__init__(path, what)
+        self.path, self.what = path, printable(what[:_LONGEST])
+
+    def __str__(self) -> str:
+        return (
+            f"{self.path} holds what no sweep writes ({self.what}); nothing beside it was read or changed. Get the "
+            f"folder anew from where it came, or start again with --overwrite"
+        )
+
+
 class WriteError(StoreError):
     """The folder could not be written; finished parts are intact, and the run can be resumed."""
 
     exit_code = EXIT_INTERNAL
+
+
+class LinkError(StoreError):
+    """A link lies where a file is to be written; whoever put it there would choose what is overwritten."""
+
+
+class FolderRemovedError(StoreError):
+    """The output folder was removed during the run, or moved, or is that of another run by now."""
+
+    def __init__(self, out: Place):
+        super().__init__(out)
+        self.out = out
+
+    def __str__(self) -> str:
+        return (
+            f"{self.out} was removed, moved or replaced during the run, or its file _lock was; nothing more is "
+            f"written. Run again to compute what is missing"
+        )
 
 
 class DoesNotFitError(StoreError):

@@ -10,9 +10,14 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from stat import S_ISREG
+from typing import BinaryIO
+
+from boulder_sweep.store.errors import LinkError
 
 WRITING_SUFFIX = ".writing"
 """Suffix of a file that does not have its final name yet; such names begin with ``_``, and readers skip them."""
@@ -21,8 +26,64 @@ _FATAL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 def hidden_name(name: str) -> str:
-    """Return the temporary name of a staged part, or of a merged one while the parts it replaces still exist."""
+    """Return the temporary name of a file, such as a merged part while the parts it replaces still exist."""
     return f"_{name}{WRITING_SUFFIX}"
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file of a name that is about to be written.
+
+    Raises
+    ------
+    LinkError
+        There is something else, such as a link.
+    """
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return False
+    if not S_ISREG(mode):
+        raise LinkError(f"{path} is a link or not a plain file, and would not be what is written: remove it first")
+    return True
+
+
+def created(path: Path) -> int:
+    """Create a file and return its descriptor; a file of this name, which a killed run has left, is removed.
+
+    Raises
+    ------
+    LinkError
+        Something else has this name, such as a link; nothing has changed.
+    OSError
+        It cannot be created.
+    """
+    if is_file(path):
+        path.unlink()
+    # Should a link have come since, it is not followed.
+    return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+
+
+@contextmanager
+def replacing(target: Path) -> Iterator[BinaryIO]:
+    """Give a file to write that takes the place of another when it is complete, or is removed.
+
+    Raises
+    ------
+    LinkError
+        A link has the name of the one or the other.
+    OSError
+        It cannot be written; an old file is untouched.
+    """
+    is_file(target)
+    passing = target.with_name(f".{target.name}.part")
+    with open(passing, "wb", opener=lambda path, _: created(Path(path))) as file:
+        try:
+            yield file
+            file.flush()
+            passing.replace(target)
+        except BaseException:
+            passing.unlink(missing_ok=True)
+            raise
 
 
 @contextmanager
@@ -49,15 +110,14 @@ def check_writable(folder: Path, name: str, size: int) -> None:
     OSError
         It cannot.
     """
-    with opened_folder(folder) as at:
-        try:
-            descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666, dir_fd=at)
-            try:
-                _write_all(descriptor, bytes(size))
-            finally:
-                os.close(descriptor)
-        finally:
-            _remove(at, name)
+    path = folder / name
+    descriptor = created(path)
+    try:
+        _write_all(descriptor, bytes(size))
+    finally:
+        os.close(descriptor)
+        with suppress(OSError):
+            path.unlink()
 
 
 def put_file(folder: Path, name: str, content: memoryview | bytes) -> None:
@@ -76,15 +136,19 @@ def put_file(folder: Path, name: str, content: memoryview | bytes) -> None:
     ------
     OSError
         Nothing has changed then: an old file of that name is untouched, and no temporary file is left.
+    LinkError
+        A link has this name or the temporary one.
     """
-    temporary = f"_{name}{WRITING_SUFFIX}"
+    # Two machines may stage the same bytes at the same time.
+    passing = f"{name}.{secrets.token_hex(8)}" if name.endswith(WRITING_SUFFIX) else name
+    is_file(folder / name)
     with opened_folder(folder) as at:
-        if not _put_unnamed(at, name, content, temporary):
-            _put_named(at, name, content, temporary)
+        if not _put_unnamed(at, folder / name, content, folder / hidden_name(passing)):
+            _put_named(at, folder / name, content, folder / hidden_name(passing))
         os.fsync(at)
 
 
-def _put_unnamed(at: int, name: str, content: memoryview | bytes, temporary: str) -> bool:
+def _put_unnamed(at: int, path: Path, content: memoryview | bytes, temporary: Path) -> bool:
     """Write a file that has no name until it is complete; False where the file system cannot do that."""
     flag = getattr(os, "O_TMPFILE", None)
     if flag is None:
@@ -99,15 +163,12 @@ def _put_unnamed(at: int, name: str, content: memoryview | bytes, temporary: str
         # linkat follows the link to the nameless file only if the folder is given by a descriptor.
         source = f"/proc/self/fd/{descriptor}"
         try:
-            os.link(source, name, dst_dir_fd=at, follow_symlinks=True)
+            os.link(source, path.name, dst_dir_fd=at, follow_symlinks=True)
         except FileExistsError:
-            _remove(at, temporary)
-            os.link(source, temporary, dst_dir_fd=at, follow_symlinks=True)
-            try:
-                os.rename(temporary, name, src_dir_fd=at, dst_dir_fd=at)
-            except BaseException:
-                _remove(at, temporary)
-                raise
+            if is_file(temporary):
+                temporary.unlink()
+            os.link(source, temporary.name, dst_dir_fd=at, follow_symlinks=True)
+            _rename(at, temporary, path)
     except OSError as problem:
         if problem.errno in _FATAL:
             raise
@@ -117,24 +178,28 @@ def _put_unnamed(at: int, name: str, content: memoryview | bytes, temporary: str
     return True
 
 
-def _put_named(at: int, name: str, content: memoryview | bytes, temporary: str) -> None:
+def _put_named(at: int, path: Path, content: memoryview | bytes, temporary: Path) -> None:
     """Write a file under a temporary name, then rename it."""
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666, dir_fd=at)
+    descriptor = created(temporary)
     try:
-        try:
-            _write_all(descriptor, content)
-        finally:
-            os.close(descriptor)
-        os.rename(temporary, name, src_dir_fd=at, dst_dir_fd=at)
+        _write_all(descriptor, content)
     except BaseException:
-        _remove(at, temporary)
+        with suppress(OSError):
+            temporary.unlink()
         raise
+    finally:
+        os.close(descriptor)
+    _rename(at, temporary, path)
 
 
-def _remove(at: int, name: str) -> None:
-    """Remove a file if it can be."""
-    with suppress(OSError):
-        os.unlink(name, dir_fd=at)
+def _rename(at: int, temporary: Path, path: Path) -> None:
+    """Give a file its name, or remove it."""
+    try:
+        os.rename(temporary.name, path.name, src_dir_fd=at, dst_dir_fd=at)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
 
 
 def _write_all(descriptor: int, content: memoryview | bytes) -> None:

@@ -7,16 +7,21 @@ Files never change, but a run that has all its rows replaces small parts by larg
 from __future__ import annotations
 
 import os
+import warnings
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import IO, TYPE_CHECKING, Any
 
+from boulder_sweep.columns import COLUMNS
+from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.errors import DamagedError, StoreError
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.manifest import Manifest, Part, load
+from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.verify import load_checked, wrong_bytes
 
 if TYPE_CHECKING:
@@ -39,10 +44,19 @@ class FinishedRows:
         Rows of the whole table.
     rows_done : int
         Rows that are finished.
-    more_columns : tuple of str
-        Names of the columns that not every table has.
+    columns : tuple of str
+        Names of the columns: all of today, and what else the table has.
+    lacking : frozenset of str
+        Those of them that it does not store, being of another version: they are null.
     identity : dict
         What all rows have in common, see `provenance`.
+    judged_by : str
+        By whose rules the rows were judged; empty where by those of this version.
+
+    Warns
+    -----
+    OlderRulesWarning
+        Another version wrote the table.
 
     Raises
     ------
@@ -55,10 +69,24 @@ class FinishedRows:
     def __init__(self, folder: Place):
         manifest = load(folder)
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
-        self.more_columns = manifest.more_columns
+        today = (*(spec.name for spec in COLUMNS), *manifest.more_columns)
+        self.columns = tuple(dict.fromkeys((*today, *manifest.columns)))
+        self.lacking = frozenset(self.columns) - frozenset(manifest.columns)
+        self.judged_by = judged_by(manifest.identity)
+        self._stored = manifest.columns
+        if said := [*([f"was {self.judged_by}"] if self.judged_by else []), *self._other_columns(today)]:
+            warnings.warn(f"{folder} {'; it '.join(said)}", OlderRulesWarning, stacklevel=2)
         self._folder = folder
+        self._schemas: dict[str, pa.Schema] = {}
         self._places = _Places(manifest)
         self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())
+
+    def _other_columns(self, today: Sequence[str]) -> Iterator[str]:
+        """Say which columns the table has more or less than one of this version."""
+        if self.lacking:
+            yield f"has no {', '.join(name for name in self.columns if name in self.lacking)} (null here)"
+        if more := [name for name in self.columns if name not in today]:
+            yield f"has more columns, kept as they are: {shorten(', '.join(more), 200)}"
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows in the order of the designs, about a part at a time.
@@ -142,6 +170,8 @@ class FinishedRows:
         import pyarrow as pa  # heavy, and only readers need it
         import pyarrow.parquet as pq
 
+        from boulder_sweep.store.schema import with_columns
+
         source: Any = file
         try:
             if verify:
@@ -152,10 +182,18 @@ class FinishedRows:
                 source = pa.BufferReader(content)
             # Parts are read in parallel already, and reading through a dataset would take twice as long.
             with pq.ParquetFile(source, page_checksum_verification=True) as opened:
+                if set(opened.schema_arrow.names) != set(self._stored):
+                    wrong = "its columns are not those of the manifest"
+                    raise DamagedError(_damage_text(self._folder, {name: wrong}))
+                schema = self._schemas.setdefault("of all parts", opened.schema_arrow)  # one step, as of threads
+                if opened.metadata.num_rows != part.rows or not opened.schema_arrow.equals(schema):
+                    raise DamagedError(_damage_text(self._folder, {name: "other rows or columns than recorded"}))
                 table = opened.read(columns, use_threads=False)
-        except (OSError, pa.ArrowException) as problem:
+        except (OSError, ValueError, pa.ArrowException) as problem:  # ValueError: a name that is no text
             raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
-        return table if columns is None else table.select(columns)  # in the order asked for
+        if not self.lacking and columns is None:
+            return table
+        return with_columns(table, self.columns if columns is None else columns)
 
 
 class _Places:

@@ -23,7 +23,8 @@ KEPT = 16
 Encode = Callable[[Mapping[bytes, bytes]], memoryview | bytes]
 """Gives the bytes of a manifest with some more metadata."""
 _NUMBER_KEY, _WRITER_KEY = b"boulder_sweep.generation", b"boulder_sweep.writer"
-_NAME = re.compile(r"_manifest-(\d{12})\.parquet")
+_DIGITS = 12
+_NAME = re.compile(rf"_manifest-([0-9]{{{_DIGITS}}})\.parquet")
 _ATTEMPTS = 5
 
 
@@ -40,7 +41,7 @@ class Generation(NamedTuple):
 
 def generation_name(number: int) -> str:
     """Return the name of a version."""
-    return f"_manifest-{number:012d}.parquet"
+    return f"_manifest-{number:0{_DIGITS}d}.parquet"
 
 
 def is_generation(name: str) -> bool:
@@ -111,7 +112,7 @@ class Generations:
                 if not self._only_new:
                     self._number = number  # it may arrive late, and must then not replace another
                 raise
-            if there != content and _metadata(there).get(_WRITER_KEY, b"").decode() != self._writer:
+            if there != content and _metadata(there).get(_WRITER_KEY, b"") != self._writer.encode():
                 raise OtherWriterError
             self._number = number
             if there == content:
@@ -169,7 +170,7 @@ def _version(folder: RemotePath, number: int) -> Generation | None:
 def _number(content: bytes) -> int:
     """Return the number of a version; 0 for a manifest without one."""
     text = _metadata(content).get(_NUMBER_KEY, b"")
-    return int(text) if text.isdigit() else 0
+    return int(text) if text.isdigit() and len(text) <= _DIGITS else 0
 
 
 def _metadata(content: bytes) -> Mapping[bytes, bytes]:
@@ -179,5 +180,5 @@ def _metadata(content: bytes) -> Mapping[bytes, bytes]:
 
     try:
         return pq.read_metadata(io.BytesIO(content)).metadata or {}
-    except (pa.ArrowException, OSError):
+    except (pa.ArrowException, OSError, ValueError):
         return {}

@@ -16,7 +16,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from boulder_sweep.store.errors import FolderInUseError, WriteError
+from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, LinkError, WriteError
 
 LOCK_NAME = "_lock"
 HEARTBEAT_S = 10.0
@@ -45,6 +45,8 @@ class FolderLock:
         Another run holds it.
     WriteError
         The lock file cannot be created, as in a read-only folder, or not be locked.
+    LinkError
+        A link has its name.
     """
 
     def __init__(self, folder: Path, last_host: str | None, holder: str):
@@ -54,8 +56,10 @@ class FolderLock:
         age = self._age()
         while True:
             try:
-                descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+                descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
             except OSError as problem:
+                if problem.errno == errno.ELOOP:
+                    raise LinkError(f"{self._path} is a link, where a run keeps a file: remove it first") from None
                 raise WriteError(f"cannot write into {folder}: {problem.strerror}") from problem
             try:
                 shared = _lock(descriptor)
@@ -79,11 +83,23 @@ class FolderLock:
         self._renewed = -math.inf
         self.renew()
 
+    def check(self) -> None:
+        """Look whether the lock is still that of this folder.
+
+        Raises
+        ------
+        FolderRemovedError
+            The folder was removed, or another was put in its place.
+        """
+        if self._descriptor is not None and not _is(self._path, self._descriptor):
+            raise FolderRemovedError(self._path.parent)
+
     def renew(self) -> None:
-        """Send a heartbeat if one is due; cheap, call it often."""
+        """Send a heartbeat if one is due; cheap, call it often. Errors as for `check`."""
         if self._descriptor is not None and time.monotonic() - self._renewed > HEARTBEAT_S:
             self._renewed = time.monotonic()
             with suppress(OSError):
+                self.check()
                 os.utime(self._descriptor)
 
     def release(self) -> None:
@@ -107,7 +123,7 @@ class FolderLock:
 def is_locked(folder: Path) -> bool:
     """Whether a run on this machine, or on one that shares its locks, is writing into a folder."""
     try:
-        descriptor = os.open(folder / LOCK_NAME, os.O_RDONLY | os.O_CLOEXEC)
+        descriptor = os.open(folder / LOCK_NAME, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:
         return False
     try:
@@ -143,8 +159,8 @@ def _lock(descriptor: int) -> bool:
 def _is(path: Path, descriptor: int) -> bool:
     """Whether a path still names an open file."""
     try:
-        there = path.stat()
-    except OSError:
+        there = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
         return False
     mine = os.fstat(descriptor)
     return (there.st_dev, there.st_ino) == (mine.st_dev, mine.st_ino)

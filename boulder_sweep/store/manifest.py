@@ -9,17 +9,26 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from io import BytesIO
+from itertools import pairwise
 from typing import IO, Any
 
-from boulder_sweep.columns import AT_REST, COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.settings.model import UNLOADINGS
-from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError, StoreError
-from boulder_sweep.store.files import WRITING_SUFFIX
+from boulder_sweep.settings.problems import shorten
+from boulder_sweep.store.errors import (
+    DamagedError,
+    ImpossibleRecordsError,
+    NotASweepError,
+    OtherVersionError,
+    StoreError,
+)
+from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
 from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
 from boulder_sweep.store.lock import LOCK_NAME
 from boulder_sweep.store.object_lock import is_probe
@@ -28,9 +37,17 @@ from boulder_sweep.store.storage import Storage
 
 _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
+"""Of tables, apart from the version of the package: docs/formats.md says when it must grow."""
+_IN_EVERY_TABLE = frozenset({DESIGN_ID.name, *INPUT_COLUMNS, "verdict", "reason"})
 _PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
 _DIGITS = 12
-_PART_NAME = re.compile(rf"{_PART_PREFIX}\d{{{_DIGITS},}}-\d{{{_DIGITS},}}{re.escape(_PART_SUFFIX)}")
+_PART_NAME = re.compile(rf"{_PART_PREFIX}[0-9]{{{_DIGITS},}}(-[0-9]{{{_DIGITS},}})?{re.escape(_PART_SUFFIX)}")
+"""The first tables named a part by its first row only."""
+_MOST_ROWS = 2**63 - 1
+_DEEPEST = 32
+"""Most levels of nested records; a settings file has fewer than ten."""
+_LONGEST_REASON = 200
+_TOKENS = re.compile(r"(\.[0-9a-f]{16})+$")
 
 
 @dataclass(frozen=True)
@@ -107,6 +124,10 @@ class Manifest:
         Runs into this folder, oldest first.
     merge
         The merge under way, if any.
+    columns
+        Names of the columns that are stored; of a manifest that was read.
+    differing
+        What another version wrote otherwise: such a table can be read, but no run goes on there.
     """
 
     identity: dict[str, Any]
@@ -116,6 +137,8 @@ class Manifest:
     parts: dict[str, Part] = field(default_factory=dict)
     sessions: list[Session] = field(default_factory=list)
     merge: Merge | None = None
+    columns: tuple[str, ...] = field(default=(), compare=False)
+    differing: list[str] = field(default_factory=list, compare=False)
 
     @property
     def rows_done(self) -> int:
@@ -176,10 +199,15 @@ def part_name(first: int, stop: int, table_rows: int) -> str:
     return f"{_PART_PREFIX}{first:0{digits}d}-{stop:0{digits}d}{_PART_SUFFIX}"
 
 
+def staged_name(name: str, token: str, sha256: str) -> str:
+    """Return the temporary name of a part: no other run, and no other content, has the same."""
+    return hidden_name(f"{name}.{token}.{sha256[:16]}")
+
+
 def is_ours(name: str) -> bool:
     """Whether a sweep gives its files such a name, temporary names included."""
     if name.endswith(WRITING_SUFFIX):
-        return name.startswith("_") and is_ours(name[1 : -len(WRITING_SUFFIX)])
+        return name.startswith("_") and is_ours(_TOKENS.sub("", name[1 : -len(WRITING_SUFFIX)]))
     known = is_part_name(name) or is_generation(name) or is_probe(name)
     return known or name in (MANIFEST_NAME, LOCK_NAME)
 
@@ -209,7 +237,8 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
 
     from boulder_sweep.store.schema import table_schema
 
-    text = json.dumps({"format": _FORMAT, **asdict(manifest)}, separators=(",", ":"))
+    records = {name: value for name, value in asdict(manifest).items() if name not in ("columns", "differing")}
+    text = json.dumps({"format": _FORMAT, **records}, separators=(",", ":"))
     value = hashlib.sha256(text.encode()).hexdigest() + text
     schema = table_schema({_KEY: value.encode(), **more}, manifest.more_columns)
     sink = pa.BufferOutputStream()
@@ -219,7 +248,7 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
 
 
 def load(folder: Place) -> Manifest:
-    """Read the manifest of a folder.
+    """Read the manifest of a folder, by whichever version it was written.
 
     Raises
     ------
@@ -227,8 +256,10 @@ def load(folder: Place) -> Manifest:
         There is none.
     DamagedError
         It cannot be trusted.
+    ImpossibleRecordsError
+        It is intact, but no sweep writes such names and numbers.
     OtherVersionError
-        It is intact, but not what this version writes.
+        It is intact, but of a format that this version does not know.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -241,6 +272,8 @@ def load(folder: Place) -> Manifest:
         raise NotASweepError(_no_result(folder)) from None
     except (OSError, pa.ArrowException) as problem:
         raise DamagedError(f"{path} cannot be read: {problem}") from problem
+    except ValueError as problem:  # a name that is no text
+        raise ImpossibleRecordsError(path, str(problem)) from None
     value = (found.metadata or {}).get(_KEY, b"")
     checksum, text = value[:64], value[64:]
     if hashlib.sha256(text).hexdigest().encode() != checksum:
@@ -248,14 +281,103 @@ def load(folder: Place) -> Manifest:
             f"{path} is damaged: its checksum does not match. The parts beside it can still be read as a "
             f"table, but no run can resume from them"
         )
-    content: Any = None
     try:
         content = json.loads(text)
+        if _is_deep(content):
+            raise ValueError("its records are nested too deeply")
+    except (ValueError, RecursionError) as problem:
+        raise ImpossibleRecordsError(path, str(problem)) from None
+    try:
         manifest = _from_json(content)
-        _check_columns(found.schema.names, manifest.more_columns)
+        _check_claims(path, manifest)
+        manifest.columns = tuple(found.schema.names)
+        manifest.differing = [*_differing_columns(manifest), *manifest.differing]
         return manifest
     except ValueError as unfamiliar:
-        raise OtherVersionError(path, str(unfamiliar), version_of(content)) from None
+        version = version_of(content)
+        why = shorten(str(unfamiliar), _LONGEST_REASON)
+        raise OtherVersionError(path, why, None if version is None else shorten(version)) from None
+
+
+def _is_deep(content: Any) -> bool:
+    """Whether records are nested so deeply that functions that call themselves could fail."""
+    level = [content]
+    for _ in range(_DEEPEST):
+        level = [
+            value
+            for one in level
+            if isinstance(one, dict | list)
+            for value in (one.values() if isinstance(one, dict) else one)
+        ]
+    return bool(level)
+
+
+def _check_claims(path: Place, manifest: Manifest) -> None:
+    """Check every name and number of a manifest, before any is used: the folder may be a stranger's.
+
+    Raises
+    ------
+    ImpossibleRecordsError
+        One is impossible.
+    """
+    rows, size, parts, merge = manifest.rows, manifest.rows_per_part, manifest.parts, manifest.merge
+    if not (0 <= rows <= _MOST_ROWS and 1 <= size <= _MOST_ROWS):
+        raise ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
+    for name, part in (*parts.items(), *([] if merge is None else [(merge.name, merge.part)])):
+        within = 0 <= part.first < part.stop <= rows and part.first // size == (part.stop - 1) // size
+        named = within and is_part_name(name) and [int(number) for number in re.findall("[0-9]+", name)]
+        if named not in ([part.first, part.stop], [part.first]):  # the first tables named the first row only
+            raise ImpossibleRecordsError(path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}")
+        if part.bytes < 1 or not all(type(count) is int and count >= 0 for count in part.verdicts.values()):
+            raise ImpossibleRecordsError(path, f"{name} with impossible counts")
+    for (_, stop), (first, _) in pairwise(sorted((part.first, part.stop) for part in parts.values())):
+        if first < stop:
+            raise ImpossibleRecordsError(path, f"row {first} twice")
+    if merge is not None:
+        if not all(isinstance(name, str) and name in parts for name in merge.replaced) or merge.name in parts:
+            raise ImpossibleRecordsError(path, "a merge of parts that it does not have")
+        edges = sorted(edge for name in merge.replaced for edge in (parts[name].first, parts[name].stop))
+        # Neighbours share an edge, each of which is there twice, and the ends are those of the merged part.
+        ends = [merge.part.first, merge.part.stop]
+        if [*edges[:1], *edges[-1:]] != ends or edges[1:-1:2] != edges[2:-1:2]:
+            raise ImpossibleRecordsError(path, "a merge of other rows than it replaces")
+    _check_kinds(path, "identity", manifest.identity, _IDENTITY)
+
+
+def _check_kinds(path: Place, what: str, content: Any, kinds: Any) -> None:
+    """Check the kinds of those nested entries that are looked at by name."""
+    if isinstance(kinds, type):
+        if not isinstance(content, kinds):
+            raise ImpossibleRecordsError(path, f"{what} that is {type(content).__name__}")
+        return
+    _check_kinds(path, what, content, dict)
+    for name in kinds.keys() & content.keys():
+        _check_kinds(path, f"{what}.{name}", content[name], kinds[name])
+
+
+_IDENTITY = {
+    "settings": {"name": str, "inputs": dict, "model": dict, "criterion": dict, "solver": dict, "labels": dict},
+    "readings": dict,
+    "control": dict,
+    "accuracy": dict,
+    "versions": dict,
+    "settings_sha256": str,
+    "kernels_sha256": str,
+    "rules_sha256": str,
+}
+
+
+def check_own(manifest: Manifest, folder: Place) -> None:
+    """Check that a run of this version may go on with a table.
+
+    Raises
+    ------
+    OtherVersionError
+        Another version wrote it, with other columns or records.
+    """
+    if manifest.differing:
+        why = "; ".join(manifest.differing[:3]) + ("; ..." if len(manifest.differing) > 3 else "")
+        raise OtherVersionError(folder / MANIFEST_NAME, shorten(why, 300), version_of({"identity": manifest.identity}))
 
 
 def _opened(folder: Place) -> IO[bytes]:
@@ -267,7 +389,8 @@ def _opened(folder: Place) -> IO[bytes]:
         An object store does not answer, which says nothing about the manifest.
     """
     if not isinstance(folder, RemotePath):
-        return (folder / MANIFEST_NAME).open("rb")
+        # A pipe of this name must not be waited for.
+        return open(folder / MANIFEST_NAME, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
     try:
         return BytesIO(newest(folder).content)
     except FileNotFoundError:
@@ -287,12 +410,20 @@ def _no_result(folder: Place) -> str:
     return f"{folder} is a file; the result of a sweep is a folder{inside}"
 
 
-def _check_columns(names: list[str], more: tuple[str, ...]) -> None:
-    """Raise ValueError where a table has other columns than today."""
-    expected = [*(spec.name for spec in COLUMNS), *more]
-    differing = sorted(set(names) ^ set(expected))
-    if differing:
-        raise ValueError(f"its table has other columns: {', '.join(differing)}")
+def _differing_columns(manifest: Manifest) -> list[str]:
+    """Say which columns a table has more or less than today.
+
+    Raises
+    ------
+    ValueError
+        It lacks one that every version has.
+    """
+    there, expected = set(manifest.columns), {*(spec.name for spec in COLUMNS), *manifest.more_columns}
+    lacking = expected - there
+    if lacking & _IN_EVERY_TABLE:
+        raise ValueError(f"its table lacks columns: {', '.join(sorted(lacking & _IN_EVERY_TABLE))}")
+    differing = ((lacking, "lacks"), (there - expected, "also has"))
+    return [f"its table {verb} {', '.join(sorted(names))}" for names, verb in differing if names]
 
 
 def _from_json(content: Any) -> Manifest:
@@ -307,14 +438,22 @@ def _from_json(content: Any) -> Manifest:
         raise ValueError("its records do not say their format")
     if content["format"] != _FORMAT:
         raise ValueError(f"its format is {content['format']}, and this version knows {_FORMAT} only")
-    entries = entries_of(Manifest, "the manifest", {key: value for key, value in content.items() if key != "format"})
-    parts = {
-        name: Part(**entries_of(Part, f"the record of {name}", record)) for name, record in entries["parts"].items()
-    }
-    sessions = [Session(**entries_of(Session, "the record of a run", record)) for record in entries["sessions"]]
+    differing: list[str] = []
+    known = {key: value for key, value in content.items() if key != "format"}
+    entries = entries_of(Manifest, "the manifest", known, differing)
+    parts = {name: _part(name, record, differing) for name, record in entries["parts"].items()}
+    sessions = [
+        Session(**entries_of(Session, "the record of a run", record, differing)) for record in entries["sessions"]
+    ]
     merge = None
-    if entries["merge"] is not None:
-        merging = entries_of(Merge, "the record of a merge", entries["merge"])
-        part = Part(**entries_of(Part, f"the record of {merging['name']}", merging["part"]))
-        merge = Merge(**{**merging, "part": part})
-    return Manifest(**{**entries, "parts": parts, "sessions": sessions, "merge": merge})
+    if entries.get("merge") is not None:
+        merging = entries_of(Merge, "the record of a merge", entries["merge"], differing)
+        merge = Merge(**{**merging, "part": _part(merging["name"], merging["part"], differing)})
+    return Manifest(**{**entries, "parts": parts, "sessions": sessions, "merge": merge, "differing": differing})
+
+
+def _part(name: str, record: Any, differing: list[str]) -> Part:
+    """Rebuild the record of a part; the first tables kept the size of a file, which could still grow, apart."""
+    if isinstance(record, dict) and isinstance(record.get("now"), dict):
+        record = {**record, **record["now"]}
+    return Part(**entries_of(Part, f"the record of {shorten(name)}", record, differing))

@@ -25,7 +25,7 @@ def finish_merge(manifest: Manifest, folder: Place, storage: Storage) -> None:
     # The small ones are removed first: a reader in between misses rows for a moment, but never sees any twice.
     storage.remove(merge.replaced)
     if (folder / hidden_name(merge.name)).exists():
-        storage.publish([merge.name])
+        storage.publish({hidden_name(merge.name): merge.name})
     for name in merge.replaced:
         manifest.parts.pop(name, None)
     manifest.parts[merge.name] = merge.part

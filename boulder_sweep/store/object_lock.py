@@ -158,7 +158,7 @@ def _record(path: RemotePath) -> dict[str, Any] | None:
         found = json.loads(path.read_bytes())
     except FileNotFoundError:
         return None
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
 
@@ -168,7 +168,7 @@ def _is_alive(there: dict[str, Any]) -> bool:
     if there.get("host") == socket.gethostname() and isinstance(there.get("pid"), int):
         try:
             os.kill(there["pid"], 0)
-        except ProcessLookupError:
+        except (ProcessLookupError, OverflowError):
             return False
         except OSError:
             pass  # somebody else's process
@@ -178,7 +178,10 @@ def _is_alive(there: dict[str, Any]) -> bool:
 def _age(there: dict[str, Any]) -> float:
     """Return the time since the last heartbeat [s]."""
     moment = there.get("time")
-    return abs(time.time() - moment) if isinstance(moment, int | float) else float("inf")
+    with suppress(OverflowError):
+        if isinstance(moment, int | float):
+            return abs(time.time() - moment)
+    return float("inf")
 
 
 def _in_use_text(folder: RemotePath, holder: str, there: dict[str, Any]) -> str:

@@ -13,6 +13,7 @@ from boulder_sweep.store.manifest import (
     MANIFEST_NAME,
     Manifest,
     Session,
+    check_own,
     is_ours,
     is_part_name,
     load,
@@ -171,6 +172,8 @@ def _allowed(out: Place, storage: Storage, names: list[str], resume: bool, overw
         foreign += [name for name in unknown if not _is_written_by_us(out / name)]
         if foreign:
             raise errors.ForeignFilesError(out, foreign)
+    if there is not None and not overwrite:
+        check_own(there, out)
     if there is not None and not (resume or overwrite):
         raise errors.OutputExistsError(out, there.rows_done, there.rows)
     return there

@@ -18,9 +18,11 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.manifest import Session
 
 PREFIX = "boulder_sweep."
@@ -94,6 +96,31 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
     return [f"{key}: {_shown(before, key)} -> {_shown(after, key)}" for key in changed]
 
 
+def identity_in(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
+    """Return the identity in the metadata of a file, and what else `file_metadata` wrote; empty of another file."""
+    texts = {key.decode(errors="replace"): value for key, value in (metadata or {}).items()}
+    entries = {key.removeprefix(PREFIX): value for key, value in texts.items() if key.startswith(PREFIX)}
+    parsed = ("settings", "readings", "control", "accuracy", "versions")
+    return {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
+
+
+def judged_by(there: Mapping[str, Any]) -> str:
+    """Say by whose rules a table was judged; empty where rules and kernels are those of this version.
+
+    Parameters
+    ----------
+    there
+        The identity of the table, see `identity`.
+    """
+    names = {"rules": rules_sha256, "kernels": kernels_sha256}
+    if all(there.get(f"{name}_sha256") == today() for name, today in names.items()):
+        return ""
+    versions_ = there.get("versions")
+    version_ = versions_.get("boulder-sweep", "unknown") if isinstance(versions_, Mapping) else "unknown"
+    hashes = ", ".join(f"{name} {shorten(str(there.get(f'{name}_sha256', 'unknown'))[:8])}" for name in names)
+    return f"judged by the rules of version {shorten(str(version_))} ({hashes})"
+
+
 def file_metadata(
     identity_: Mapping[str, Any], repeat: str, firmness: Mapping[str, Any] | None = None
 ) -> dict[bytes, bytes]:
@@ -156,10 +183,11 @@ def versions() -> dict[str, str]:
 
 @cache
 def kernels_sha256() -> str:
-    """Hash of the sources of the compiled kernels."""
-    from boulder_kernels import source_hash  # imports Numba
-
-    return source_hash()
+    """Hash of the sources of the compiled kernels, as `boulder_kernels.source_hash`, without the import of Numba."""
+    found = find_spec("boulder_kernels")
+    if found is None or found.origin is None:
+        raise FileNotFoundError("the sources of boulder_kernels are missing")
+    return _sources_sha256(sorted(Path(found.origin).parent.glob("*.py")))
 
 
 @cache

@@ -33,7 +33,13 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
     -------
     pandas.DataFrame
         Rows in the order of the designs. ``.attrs`` contains ``units`` and ``meanings`` by column name,
-        ``rows`` (of the whole table) and ``complete`` (whether all of them are finished).
+        ``rows`` (of the whole table), ``complete`` (whether all of them are finished) and ``judged_by`` (by whose
+        rules, if not by those of this version; else empty). Columns that a table of an earlier version lacks are null.
+
+    Warns
+    -----
+    OlderRulesWarning
+        Another version wrote the table; the text says what differs.
 
     Raises
     ------
@@ -48,7 +54,7 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
     ValueError
         The result has no such column.
     """
-    table, rows = _read(place_of(out), columns, verify)
+    table, finished = _read(place_of(out), columns, verify)
     # Split into blocks: consolidating columns of one type would copy the whole table once more.
     frame = table.to_pandas(split_blocks=True, self_destruct=True)
     for spec in OUTCOMES:
@@ -57,8 +63,9 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
     frame.attrs = {
         "units": {name: column_spec(name).unit for name in frame.columns},
         "meanings": {name: column_spec(name).meaning for name in frame.columns},
-        "rows": rows,
-        "complete": len(frame) == rows,
+        "rows": finished.rows,
+        "complete": len(frame) == finished.rows,
+        "judged_by": finished.judged_by,
     }
     return frame
 
@@ -95,18 +102,17 @@ def read_row(folder: Place, design_id: int) -> pa.Table:
     return row
 
 
-def _read(folder: Place, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, int]:
-    """Return the finished parts, in the order of the designs, and the rows of the whole table."""
+def _read(folder: Place, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, FinishedRows]:
+    """Return the finished parts, in the order of the designs, and what is known of them."""
     import pyarrow as pa  # heavy, and only readers need it
 
-    from boulder_sweep.store.schema import table_schema
+    from boulder_sweep.store.schema import table_schema, with_columns
 
     finished = FinishedRows(folder)
-    known = table_schema(more=finished.more_columns).names
+    known = finished.columns
     if unknown := [name for name in columns or () if name not in known]:
         raise ValueError(f"{folder} has no column {unknown[0]!r}; its columns are {', '.join(known)}")
     parts = list(finished.tables(columns, verify=verify))
     if not parts:
-        empty = table_schema(more=finished.more_columns).empty_table()
-        return (empty if columns is None else empty.select(list(columns))), finished.rows
-    return pa.concat_tables(parts), finished.rows
+        parts = [with_columns(table_schema().empty_table(), known if columns is None else columns)]
+    return pa.concat_tables(parts), finished

@@ -1,16 +1,17 @@
-"""Checks that records read from a file have the format of this version.
+"""Checks that records read from a file have the form that this version knows, and what of them other versions may vary.
 
-Records of another version are refused, never guessed at: their rows must not be mixed with those of this version.
+An entry that another version has more is left out, and one that was added since may be missing; both are noted, and no
+run goes on there. Anything else is refused, never guessed at. docs/formats.md says what may change between versions.
 """
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from typing import Any, get_args, get_origin, get_type_hints
 
 
-def entries_of(record: type, what: str, content: Any) -> dict[str, Any]:
-    """Return the entries of a record if they are exactly the expected ones, with values of the right type.
+def entries_of(record: type, what: str, content: Any, differing: list[str]) -> dict[str, Any]:
+    """Return the entries of a record that are known, if all that are needed are there, with values of the right type.
 
     Parameters
     ----------
@@ -20,18 +21,21 @@ def entries_of(record: type, what: str, content: Any) -> dict[str, Any]:
         What the record describes, for the message.
     content
         The parsed JSON; nested records are not checked.
+    differing
+        What another version wrote otherwise is added to these lines: entries that are unknown, or missing though they
+        have a default.
 
     Raises
     ------
     ValueError
-        An entry is unknown, missing or of another type; the text says which.
+        An entry without a default is missing, or one is of another type; the text says which.
     """
     if not isinstance(content, dict):
         raise ValueError(f"{what} has no named entries")
     types = get_type_hints(record)
-    expected = {entry.name for entry in fields(record)}
-    wrong = [f"{name} is unknown" for name in sorted(content.keys() - expected)]
-    wrong += [f"{name} is missing" for name in sorted(expected - content.keys())]
+    expected = {entry.name for entry in fields(record) if entry.compare}
+    needed = {entry.name for entry in fields(record) if entry.default is MISSING} & expected
+    wrong = [f"{name} is missing" for name in sorted(needed - content.keys())]
     wrong += [
         f"{name} is {content[name]!r:.60}"
         for name in sorted(expected & content.keys())
@@ -39,7 +43,9 @@ def entries_of(record: type, what: str, content: Any) -> dict[str, Any]:
     ]
     if wrong:
         raise ValueError(f"{what}: {', '.join(wrong)}")
-    return content
+    differing += [f"{what}: {name} is unknown" for name in sorted(content.keys() - expected)]
+    differing += [f"{what}: {name} is missing" for name in sorted(expected - needed - content.keys())]
+    return {name: value for name, value in content.items() if name in expected}
 
 
 def version_of(content: Any) -> str | None:
@@ -57,4 +63,6 @@ def _fits(value: Any, type_: Any) -> bool:
     if kinds:
         return any(_fits(value, kind) for kind in kinds)
     kind = get_origin(type_) or type_
+    if kind is int and isinstance(value, bool):
+        return False
     return isinstance(value, kind if kind in (str, int, dict, list) else dict)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.places import PlaceError, RemotePath, place_of
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import Session
 from boulder_sweep.store.object_lock import is_held
+from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.verify import load_checked
 
 
@@ -44,6 +46,8 @@ class RunStatus:
         Settings, versions and hashes that all rows share.
     resume_command
         The command that resumes the run in this folder, which may have been moved; None if it is complete.
+    judged_by
+        By whose rules the rows were judged; empty where by those of this version.
     settings_missing
         The settings file that `resume_command` names, if there is none of this name.
     """
@@ -61,6 +65,7 @@ class RunStatus:
     resume_command: str | None
     sessions: list[Session] = field(repr=False)
     identity: dict[str, Any] = field(repr=False)
+    judged_by: str = ""
     settings_missing: str | None = None
 
     @property
@@ -96,14 +101,9 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
     folder = place_of(out)
     running = is_held(folder) if isinstance(folder, RemotePath) else is_locked(folder)
     manifest, damaged = load_checked(folder, read_parts=verify)
-    missing: list[tuple[int, int]] = []
-    for start, stop in manifest.missing():
-        if missing and missing[-1][1] == start:
-            missing[-1] = (missing[-1][0], stop)
-        elif len(missing) == _MISSING_SHOWN:
-            break
-        else:
-            missing.append((start, stop))
+    there = sorted((part.first, part.stop) for part in manifest.parts.values())
+    gaps = pairwise([0, *(edge for rows in there for edge in rows), manifest.rows])
+    missing = [(start, stop) for start, stop in list(gaps)[::2] if start < stop]
     done = manifest.rows_done
     command, settings_missing = None, None
     if done != manifest.rows:
@@ -116,10 +116,11 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         running=running,
         verified=verify,
         damaged=damaged,
-        missing=missing,
+        missing=missing[:_MISSING_SHOWN],
         verdicts=manifest.verdicts,
         bytes=sum(part.bytes for part in manifest.parts.values()),
         resume_command=command,
+        judged_by=judged_by(manifest.identity),
         settings_missing=settings_missing,
         sessions=manifest.sessions,
         identity=manifest.identity,
@@ -130,10 +131,13 @@ def _into(out: str | Path, command: str) -> tuple[str, str | None]:
     """Return the command that resumes a run, as things are named now, and its settings file if there is none."""
     if command.startswith("boulder_sweep.run(sweep, "):
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)", None
-    words = shlex.split(command) if command.startswith("sweep run ") else []
-    if len(words) < 5 or words[3] != "-o":
+    try:
+        words = shlex.split(command) if command.startswith("sweep run ") else []
+        if len(words) < 5 or words[3] != "-o":
+            return command, None
+        settings = _moved_with(out, words[2], words[4])
+    except (ValueError, PlaceError):  # not what a run writes there
         return command, None
-    settings = _moved_with(out, words[2], words[4])
     here = shlex.join([*words[:2], settings, "-o", str(out), *words[5:]])
     return here, None if _exists(Path(settings)) else settings
 
@@ -157,5 +161,5 @@ def _exists(file: Path) -> bool:
     """Whether there is a file of this name; none where nobody may look."""
     try:
         return file.exists()
-    except OSError:
+    except (OSError, ValueError):
         return False

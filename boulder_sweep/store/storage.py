@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -31,6 +31,9 @@ _REQUESTS = 16
 
 class Lock(Protocol):
     """The right to write into a folder."""
+
+    def check(self) -> None:
+        """Raise StoreError if another run may have it by now, or if the folder is gone."""
 
     def renew(self) -> None:
         """Show that the run is alive; cheap, call it often."""
@@ -63,8 +66,8 @@ class Storage(Protocol):
     def put(self, name: str, content: memoryview | bytes) -> None:
         """Write a file whole or not at all, durably."""
 
-    def publish(self, names: Iterable[str]) -> None:
-        """Give staged files their final names, durably."""
+    def publish(self, names: Mapping[str, str]) -> None:
+        """Give staged files, by their temporary names, their final names, durably."""
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, durably."""
@@ -86,6 +89,7 @@ class DiskStorage:
 
     def __init__(self, path: Path):
         self._path = path
+        self._lock: FolderLock | None = None
 
     def make(self) -> bool:
         """Create the folder if it does not exist; True if it was created."""
@@ -109,7 +113,8 @@ class DiskStorage:
 
     def lock(self, last_host: str | None, holder: str) -> Lock:
         """Become the only writer."""
-        return FolderLock(self._path, last_host, holder)
+        self._lock = FolderLock(self._path, last_host, holder)
+        return self._lock
 
     def check_writable(self) -> None:
         """Raise OSError if the folder cannot be written."""
@@ -127,15 +132,17 @@ class DiskStorage:
         """Write a file whole or not at all, durably."""
         put_file(self._path, name, content)
 
-    def publish(self, names: Iterable[str]) -> None:
-        """Give staged files their final names, durably."""
+    def publish(self, names: Mapping[str, str]) -> None:
+        """Give staged files, by their temporary names, their final names, durably."""
+        self._check_lock()
         with opened_folder(self._path) as at:
-            for name in names:
-                os.rename(hidden_name(name), name, src_dir_fd=at, dst_dir_fd=at)
+            for staged, final in names.items():
+                os.rename(staged, final, src_dir_fd=at, dst_dir_fd=at)
             os.fsync(at)
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, durably."""
+        self._check_lock()
         names = sorted(names, reverse=True)  # the last rows first: no gap, wherever a run is killed
         for name in names:
             (self._path / name).unlink(missing_ok=True)
@@ -144,11 +151,18 @@ class DiskStorage:
 
     def put_manifest(self, encode: Encode) -> None:
         """Replace the manifest in one step."""
+        self._check_lock()
         put_file(self._path, MANIFEST_NAME, encode({}))
 
     def discard_manifest(self) -> None:
         """Remove the manifest."""
+        self._check_lock()
         (self._path / MANIFEST_NAME).unlink()
+
+    def _check_lock(self) -> None:
+        """Refuse to change what may belong to another run by now."""
+        if self._lock is not None:
+            self._lock.check()
 
 
 class ObjectStorage:
@@ -205,9 +219,11 @@ class ObjectStorage:
         """Write a file whole or not at all."""
         (self._path / name).put(content)
 
-    def publish(self, names: Iterable[str]) -> None:
+    def publish(self, names: Mapping[str, str]) -> None:
         """Copy staged files to their final names and remove the staged ones."""
-        self._each(self._publish, names)
+        if self._lock is not None:
+            self._lock.check()
+        self._each(lambda name: self._publish(name, names[name]), names)
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, unless they are another run's by now."""
@@ -229,14 +245,10 @@ class ObjectStorage:
         if self._generations is not None:
             self._generations.discard()
 
-    def _publish(self, name: str) -> None:
-        """Copy one staged file to its final name; right if repeated."""
-        staged, final = self._path / hidden_name(name), self._path / name
-        try:
-            staged.copy_to(final)
-        except FileNotFoundError:
-            if not final.exists():
-                raise
+    def _publish(self, staged_name: str, name: str) -> None:
+        """Copy one staged file to its final name."""
+        staged = self._path / staged_name
+        staged.copy_to(self._path / name)
         with suppress(OSError):
             staged.unlink(missing_ok=True)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.places import Place
+from boulder_sweep.store.files import is_file
 from boulder_sweep.store.generations import MANIFEST_NAME
 
 
@@ -26,6 +27,8 @@ def check_target(target: Place, refusal: type[BoulderSweepError]) -> None:
     ------
     BoulderSweepError
         Its folder does not exist, cannot be written or holds the result of a run, or a folder has its name.
+    LinkError
+        A link has its name.
     """
     if not isinstance(target, Path):
         with suppress(OSError):  # a store that does not answer, or lets nobody read: writing will tell
@@ -37,7 +40,11 @@ def check_target(target: Place, refusal: type[BoulderSweepError]) -> None:
     _check_no_result(target, folder, refusal)
     if target.is_dir():
         raise refusal(f"{target} cannot be written: {os.strerror(errno.EISDIR)}")
-    if not target.exists() and not os.access(folder, os.W_OK | os.X_OK):
+    try:
+        is_there = is_file(target)
+    except OSError as problem:
+        raise refusal(f"{target} cannot be written: {problem.strerror}") from problem
+    if not os.access(folder, os.W_OK | os.X_OK) or (is_there and not os.access(target, os.W_OK)):
         raise refusal(f"{target} cannot be written: {os.strerror(errno.EACCES)}")
 
 

@@ -2,7 +2,9 @@
 
 Whoever computes a part stages it: the file is written complete (see `files`) under a temporary name. The run
 commits staged parts in the order of their rows: they get their names and are recorded in the manifest with rows
-and checksum. A file never changes, so readers are never disturbed.
+and checksum. A file never changes, so readers are never disturbed. The temporary name holds a token of the run and
+the checksum, and the file is read again before it gets its final name: what a worker of another run stages, at any
+time, is never taken for a part of this one.
 
 A slow run writes small parts, so that its progress can be read and an interruption loses little. When all rows are
 there, small parts are merged into those a fast run would have written: the merge is announced in the manifest, the
@@ -14,18 +16,21 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import secrets
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import NamedTuple
 
 from boulder_sweep.places import Place
 from boulder_sweep.store import errors
 from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
-from boulder_sweep.store.manifest import Manifest, Merge, Part, is_ours, is_part_name, part_name, save
+from boulder_sweep.store.manifest import Manifest, Merge, Part, is_ours, is_part_name, part_name, save, staged_name
 from boulder_sweep.store.merging import finish_merge
 from boulder_sweep.store.provenance import now
 from boulder_sweep.store.storage import Lock, Storage
+from boulder_sweep.store.verify import damaged_parts
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
@@ -41,7 +46,13 @@ class StagedPart(NamedTuple):
 
 
 def stage(
-    storage: Storage, table_rows: int, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]
+    storage: Storage,
+    token: str,
+    table_rows: int,
+    first: int,
+    content: memoryview | bytes,
+    rows: int,
+    verdicts: dict[str, int],
 ) -> StagedPart:
     """Write a part under its temporary name; other machines that share the folder may do that, too.
 
@@ -49,6 +60,8 @@ def stage(
     ----------
     storage
         How the output folder is written.
+    token
+        Of the run, see `OutputFolder`.
     table_rows
         Rows of the whole table.
     first
@@ -65,9 +78,9 @@ def stage(
     OSError
         The disk is full or the folder cannot be written; nothing has changed.
     """
-    name = part_name(first, first + rows, table_rows)
-    storage.put(hidden_name(name), content)
-    return StagedPart(name, _part(first, content, rows, verdicts))
+    staged = StagedPart(part_name(first, first + rows, table_rows), _part(first, content, rows, verdicts))
+    storage.put(staged_name(staged.name, token, staged.part.sha256), content)
+    return staged
 
 
 class OutputFolder:
@@ -77,6 +90,8 @@ class OutputFolder:
         self.path = path
         self._storage = storage
         self.manifest = manifest
+        self.token = secrets.token_hex(8)
+        """New for every opening, and known to its workers only."""
         self.damaged: dict[str, str] = {}
         """Parts found damaged when the folder was opened, and what was wrong; their rows count as missing."""
         self._lock = lock
@@ -105,13 +120,17 @@ class OutputFolder:
             The disk is full or the folder cannot be written; earlier parts are unchanged.
         """
         try:
-            staged = stage(self._storage, self.manifest.rows, first, content, rows, verdicts)
+            staged = stage(self._storage, self.token, self.manifest.rows, first, content, rows, verdicts)
         except OSError as problem:
             raise self.write_error(problem) from problem
         if not self._open:  # the run was stopped meanwhile
             with suppress(OSError, errors.StoreError):
-                self._storage.remove([hidden_name(staged.name)])
+                self._storage.remove([self._temporary(staged)])
         return staged
+
+    def is_staged(self, staged: StagedPart) -> bool:
+        """Whether a part that a worker has staged is seen from here."""
+        return (self.path / self._temporary(staged)).exists()
 
     def commit(self, staged: Sequence[StagedPart]) -> None:
         """Give staged parts their names and record them; after `close` they are removed instead.
@@ -120,20 +139,32 @@ class OutputFolder:
         ------
         WriteError
             As for `stage`.
+        DamagedError
+            One is not what was staged.
+        FolderInUseError, FolderRemovedError
+            The folder is not this run's any more.
         """
-        names = [name for name, _ in staged]
+        temporary = {self._temporary(one): one for one in staged}
         with self._writing() as is_open:
             if not is_open:  # the run was stopped while these parts were written
                 with suppress(OSError, errors.StoreError):
-                    self._storage.remove(map(hidden_name, names))
+                    self._storage.remove(temporary)
                 return
-            self._storage.publish(names)
+            # An object store checks its content itself, and lets nobody see half of it.
+            parts = {name: one.part for name, one in temporary.items()}
+            for name, wrong in damaged_parts(self.path, parts, read_parts=isinstance(self.path, Path)).items():
+                self.check()
+                raise errors.DamagedError(
+                    f"{self.path / name} is not what a worker wrote there ({wrong}). "
+                    f"Resume with: {self.manifest.resume_command}"
+                )
+            self._storage.publish({name: one.name for name, one in temporary.items()})
             self.manifest.parts.update(staged)
             try:
                 save(self.manifest, self._storage)
             except (OSError, errors.StoreError):
-                for name in names:
-                    del self.manifest.parts[name]
+                for one in staged:
+                    del self.manifest.parts[one.name]
                 raise
 
     def merge(self, names: list[str], content: memoryview | bytes) -> None:
@@ -177,10 +208,14 @@ class OutputFolder:
 
         Raises
         ------
-        FolderInUseError
-            Another run has taken the folder; on object stores only.
+        FolderInUseError, FolderRemovedError
+            The folder is not this run's any more.
         """
         self._lock.renew()
+
+    def check(self) -> None:
+        """Look whether the folder is still this run's; errors as for `heartbeat`."""
+        self._lock.check()
 
     def close(self, how: str, patience_s: float = 0.2) -> None:
         """Record how the run ended and release the folder; later calls do nothing.
@@ -233,8 +268,14 @@ class OutputFolder:
                 if self._ended is not None:
                     self.close(self._ended)
 
-    def write_error(self, problem: OSError) -> errors.WriteError:
+    def _temporary(self, staged: StagedPart) -> str:
+        """Return the temporary name of a part of this run."""
+        return staged_name(staged.name, self.token, staged.part.sha256)
+
+    def write_error(self, problem: OSError) -> errors.StoreError:
         """Describe why the folder cannot be written, and how to resume."""
+        if problem.errno == errno.ENOENT and isinstance(self.path, Path) and not self.path.exists():
+            return errors.FolderRemovedError(self.path)
         done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
         advice = "free some space and resume" if problem.errno in _NO_SPACE else "resume"
         return errors.WriteError(

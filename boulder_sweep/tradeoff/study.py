@@ -25,6 +25,7 @@ from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import pool
 from boulder_sweep.settings.model import UNLOADINGS
+from boulder_sweep.store.files import replacing
 from boulder_sweep.tradeoff.points import Method, Point, mark_front
 from boulder_sweep.tradeoff.sample import Sample
 
@@ -177,8 +178,10 @@ class Tradeoff:
         if not self.points:
             return []
         files = [target / f"tradeoff.{kind}" for kind in ("parquet", "csv", "png")]
-        pq.write_table(self.table(), files[0])
-        pa_csv.write_csv(self.table(), files[1])
+        with replacing(files[0]) as file:
+            pq.write_table(self.table(), file)
+        with replacing(files[1]) as file:
+            pa_csv.write_csv(self.table(), file)
         draw("tradeoff", "draw_tradeoff", self, files[2])
         return files
 

@@ -7,11 +7,12 @@ import subprocess
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from boulder_sweep.errors import PictureError
+from boulder_sweep.store.files import replacing
 from boulder_sweep.text import script_data
 from boulder_sweep.views import figures
 from boulder_sweep.views.scene import SideView, samples_shown
@@ -59,12 +60,13 @@ def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) 
     require_samples(trajectory)
     kind = target.suffix.lower()
     try:
-        if kind == ".html":
-            target.write_text(page(trajectory), encoding="utf-8")
-        elif kind == ".gif":
-            _write_gif(trajectory, target, told)
-        else:
-            _write_mp4(trajectory, target, told)
+        with replacing(target) as file:
+            if kind == ".html":
+                file.write(page(trajectory).encode())
+            elif kind == ".gif":
+                _write_gif(trajectory, file, told)
+            else:
+                _write_mp4(trajectory, target, Path(file.name), told)
     except OSError as problem:
         raise PictureError(f"{path} cannot be written: {problem.strerror or problem}") from problem
 
@@ -123,7 +125,7 @@ def frames(trajectory: Trajectory, told: Told | None = None) -> Iterator[np.ndar
                 told(drawn, len(chosen))
 
 
-def _write_gif(trajectory: Trajectory, target: Path, told: Told | None) -> None:
+def _write_gif(trajectory: Trajectory, target: BinaryIO, told: Told | None) -> None:
     from PIL import Image  # comes with matplotlib
 
     pictures = [Image.fromarray(picture) for picture in frames(trajectory, told)]
@@ -139,18 +141,30 @@ def _write_gif(trajectory: Trajectory, target: Path, told: Told | None) -> None:
     palette = sheet.quantize(COLOURS)
     reduced = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     times = [1000 // FRAMES_PER_S] * (len(reduced) - 1) + [round(1000 * LAST_FRAME_S)]
-    reduced[0].save(target, save_all=True, append_images=reduced[1:], duration=times, loop=0, optimize=True)
+    first, *others = reduced
+    first.save(target, "GIF", save_all=True, append_images=others, duration=times, loop=0, optimize=True)
 
 
-def _write_mp4(trajectory: Trajectory, target: Path, told: Told | None) -> None:
-    """Pipe raw frames to ffmpeg."""
+def _write_mp4(trajectory: Trajectory, target: Path, passing: Path, told: Told | None) -> None:
+    """Pipe raw frames to ffmpeg, which writes a file that is there already."""
     film = frames(trajectory, told)
     first = next(film)
     height, width = first.shape[:2]
     command = [
         *("ffmpeg", "-y", "-loglevel", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(FRAMES_PER_S), "-i", "-"),
-        *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(target.absolute())),
+        *(
+            "-an",
+            "-c:v",
+            "libx264",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+            "-f",
+            "mp4",
+            str(passing.absolute()),
+        ),
     ]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import PictureError
+from boulder_sweep.store.files import replacing
 from boulder_sweep.store.targets import check_target
 from boulder_sweep.text import NO_BREAK_SPACE, printable
 
@@ -136,7 +137,8 @@ def save(fig: Figure, target: Path) -> None:
     _keep_text_plain(fig)
     undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     try:
-        fig.savefig(target, metadata=undated[target.suffix.lower()])
+        with replacing(target) as file:
+            fig.savefig(file, format=target.suffix[1:].lower(), metadata=undated[target.suffix.lower()])
     except OSError as problem:
         raise PictureError(f"{target} cannot be written: {problem.strerror or problem}") from problem
 

@@ -25,7 +25,7 @@ _RASTER = 500
 
 Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
 """Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and those
-of `boulder_sweep.columns.OPTIONAL_COLUMNS` are left out that the table does not have."""
+of `boulder_sweep.columns.OPTIONAL_COLUMNS`, and `VALIDITY`, are left out where the table does not have them."""
 
 
 def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
@@ -62,7 +62,8 @@ def finished_pieces(finished: FinishedRows) -> Pieces:
 
     def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         nonlocal verified
-        there = [name for name in columns if name not in OPTIONAL_COLUMNS or name in finished.more_columns]
+        held = set(finished.columns) - finished.lacking
+        there = [name for name in columns if name in held or name not in (*OPTIONAL_COLUMNS, VALIDITY)]
         stored = list(dict.fromkeys(own for name in there for own in ((DEPTH, HEIGHT) if name == RATIO else (name,))))
         for table in finished.tables(stored, verify=not verified):
             frame = table.to_pandas()

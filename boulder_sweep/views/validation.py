@@ -10,6 +10,7 @@ import numpy as np
 
 from boulder_sweep.crash_tests.cases import NAMES
 from boulder_sweep.crash_tests.comparison import simulated_signal
+from boulder_sweep.store.files import replacing
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, BLUE, GREY, ORANGE
 
@@ -204,7 +205,8 @@ def _write_tables(found: Validation, folder: Path) -> list[Path]:
     }
     written = []
     for name, frame in frames.items():
-        frame.to_parquet(folder / name)
+        with replacing(folder / name) as file:
+            frame.to_parquet(file)
         written.append(folder / name)
     parts = []
     for (test, preset), trajectory in found.trajectories.items():
@@ -213,5 +215,6 @@ def _write_tables(found: Validation, folder: Path) -> list[Path]:
             words = pa.array([text] * len(part)).dictionary_encode()
             part = part.add_column(0, pa.field(column, words.type, metadata={"unit": ""}), words)
         parts.append(part)
-    pq.write_table(pa.concat_tables(parts).unify_dictionaries(), folder / "trajectories.parquet", compression="zstd")
+    with replacing(folder / "trajectories.parquet") as file:
+        pq.write_table(pa.concat_tables(parts).unify_dictionaries(), file, compression="zstd")
     return [*written, folder / "trajectories.parquet"]

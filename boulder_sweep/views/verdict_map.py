@@ -155,7 +155,8 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
         style: dict[str, Any] = {"cmap": colours, "norm": norm, "linewidth": 0.35, "edgecolors": "white"}
         axes.pcolormesh(_edges(x_levels), _edges(y_levels), masked, **style)
     else:
-        axes.scatter(x, y, c=codes, cmap=colours, norm=norm, s=9, linewidths=0)
+        known = codes >= 0  # of another version's words, as in the mask above
+        axes.scatter(x[known], y[known], c=codes[known], cmap=colours, norm=norm, s=9, linewidths=0)
     return {int(code) for code in np.unique(codes) if code >= 0}
 
 

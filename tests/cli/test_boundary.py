@@ -5,6 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pyarrow.parquet as pq
+
+import boulder_sweep
+
 CONFIG = Path(__file__).parents[2] / "configs" / "site.yaml"
 HEIGHTS = ("--set", "boulder.height={from: 2.4 m, to: 3.6 m, count: 61}")
 
@@ -14,6 +18,13 @@ def test_counts_and_share(sweep, tmp_path):
     assert code == 0
     assert "saved" in out.splitlines()[-1]
     assert (tmp_path / "map.png").exists()
+    assert sweep("plot", tmp_path / "map.parquet", "-o", tmp_path / "again.png")[2] == ""
+    table = pq.read_table(tmp_path / "map.parquet")
+    metadata = {**table.schema.metadata, b"boulder_sweep.rules_sha256": b"abcdef0123456789"}
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "map.parquet")
+    err = sweep("plot", tmp_path / "map.parquet", "-o", tmp_path / "again.png")[2]
+    version = boulder_sweep.__version__
+    assert err.startswith(f"note: {tmp_path}/map.parquet was judged by the rules of version {version} (rules abcdef01,")
     found = json.loads(sweep("boundary", CONFIG, *HEIGHTS, "--json")[1])
     assert found["designs"] == 122 == sum(found["verdicts"].values())
     assert found["simulations"] < 40

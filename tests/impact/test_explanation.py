@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import boulder_sweep
+from boulder_sweep.cli.explain import why_lines
 from boulder_sweep.cli.main import execute
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.settings import load
@@ -54,6 +55,13 @@ def test_readings_and_steps_are_those_of_the_result(tmp_path: Path, readings: st
     changes = [*NARROW, f"model.readings={readings}", solver]
     boulder_sweep.run(load(CONFIGS / "m30_sizing.yaml", changes), tmp_path / "out")
     assert explain(tmp_path / "out", 9).unequal == ()
+
+
+def test_a_flag_of_another_version_is_shown_by_its_name(result: Path) -> None:
+    table = boulder_sweep.read(result)
+    found = explain(result, int(table.design_id[table.verdict == "pass"].iloc[0]))
+    other = dataclasses.replace(found, stored=found.stored | {"validity": "odd;rotation"})
+    assert why_lines(other)[-2:] == ["    odd", "    rotation: more rotation than in the test that passed"]
 
 
 def test_a_change_of_the_kernels_is_told(result: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -126,5 +126,23 @@ def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> 
     del settings["model"]["calibrated_crush_m"]
     metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
     pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
-    with pytest.raises(ReportError, match="another version, whose settings lack 'calibrated_crush_m'"):
+    write_report(tmp_path / "old.parquet", tmp_path / "page.html")  # with the default of this version
+    del settings["model"]["preset"]
+    metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
+    with pytest.raises(ReportError, match=r"another version, whose settings are not those of this one \('preset'\)"):
         write_report(tmp_path / "old.parquet", tmp_path / "page.html")
+
+
+def test_chances_by_other_rules_say_so(chances: Path, tmp_path: Path, sweep: Command) -> None:
+    table = pq.read_table(chances).drop_columns(["validity", "step_s"])  # as before these columns existed
+    metadata = {**table.schema.metadata, b"boulder_sweep.rules_sha256": b"abcdef0123456789"}
+    old = tmp_path / "old.parquet"
+    pq.write_table(table.replace_schema_metadata(metadata), old)
+    code, _, err = sweep("report", old, "-o", tmp_path / "page.html")
+    assert code == 0
+    judged = f"judged by the rules of version {boulder_sweep.__version__} (rules abcdef01, kernels "
+    assert err.startswith(f"note: {old} was {judged}")
+    assert f"The verdicts of the table were {judged}" in (tmp_path / "page.html").read_text()
+    assert sweep("report", chances, "-o", tmp_path / "page.html")[2] == ""
+    assert "The verdicts of the table were" not in (tmp_path / "page.html").read_text()

@@ -1,5 +1,6 @@
 """What a page takes from a table: every verdict, the designs worth naming, and what is left out of large ones."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -40,6 +41,14 @@ def test_passes_outside_of_what_was_tested_are_counted(rows, table):
     flagged = len(passing) - rows.flags.get("", 0)
     found = [sentence[0] for sentence in answer_of(rows).sentences if "lie outside" in str(sentence[0])]
     assert [text.split(" ")[0] for text in found] == ([str(flagged)] if flagged else [])
+
+
+def test_a_flag_of_another_version_keeps_its_name_and_a_table_without_flags_says_so(rows):
+    odd = dataclasses.replace(rows, flags={"": 0, "odd": 3})
+    assert any("3 with odd" in str(sentence[0]) for sentence in answer_of(odd).sentences)
+    without = dataclasses.replace(rows, flags={})
+    said = [str(sentence[0]) for sentence in answer_of(without).sentences]
+    assert "The table does not say which of those that pass lie outside what the model was tested on." in said
 
 
 def test_mass_and_depth_follow_from_the_axes(rows, table):

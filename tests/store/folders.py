@@ -15,12 +15,18 @@ from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner.computing import verdict_counts
 from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest
 from boulder_sweep.store.opening import open_output
-from boulder_sweep.store.provenance import file_metadata, new_session
+from boulder_sweep.store.provenance import file_metadata, kernels_sha256, new_session, rules_sha256
 from boulder_sweep.store.schema import encode, part_table
 from boulder_sweep.store.writer import OutputFolder
 from tests.runner.grids import grid, plausible
 
-IDENTITY = {"settings": {"soil": 1}, "settings_sha256": "a" * 64, "versions": {"numba": "1"}}
+IDENTITY = {
+    "settings": {"soil": 1},
+    "settings_sha256": "a" * 64,
+    "kernels_sha256": kernels_sha256(),
+    "rules_sha256": rules_sha256(),
+    "versions": {"numba": "1"},
+}
 ROWS, SIZE = 441, 100
 
 
@@ -81,26 +87,33 @@ def part_record(records: dict[str, Any]) -> dict[str, Any]:
 OTHER_FORMS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "format": (lambda records: records.update(format=2), r"its format is 2, and this version knows 1"),
     "no format": (lambda records: records.pop("format"), r"do not say their format"),
-    "part knows more": (
-        lambda records: part_record(records).update(colour="red"),
-        r"the record of rows-\d+-\d+\.parquet: colour is unknown",
-    ),
     "part knows less": (lambda records: part_record(records).pop("verdicts"), r"parquet: verdicts is missing"),
     "part by other words": (
         lambda records: part_record(records).update(rows="all of them"),
         r"parquet: rows is 'all of them'",
+    ),
+    "session without a host": (
+        lambda records: records["sessions"][0].pop("host"),
+        r"the record of a run: host is missing",
+    ),
+    "sessions by name": (lambda records: records.update(sessions={}), r"the manifest: sessions is \{\}"),
+    "no parts": (lambda records: records.pop("parts"), r"the manifest: parts is missing"),
+    "other merge": (
+        lambda records: records.update(merge={"name": "x", "part": 1, "replaced": []}),
+        r"the record of a merge: part is 1",
+    ),
+}
+"""What is not read: a change of the records, and how it is told."""
+READABLE_FORMS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "part knows more": (
+        lambda records: part_record(records).update(colour="red"),
+        r"the record of rows-\d+-\d+\.parquet: colour is unknown",
     ),
     "session knows more": (
         lambda records: records["sessions"][0].update(mood="good"),
         r"the record of a run: mood is unknown",
     ),
     "session knows less": (lambda records: records["sessions"][0].pop("how"), r"the record of a run: how is missing"),
-    "sessions by name": (lambda records: records.update(sessions={}), r"the manifest: sessions is \{\}"),
-    "no parts": (lambda records: records.pop("parts"), r"the manifest: parts is missing"),
     "no merge": (lambda records: records.pop("merge"), r"the manifest: merge is missing"),
-    "other merge": (
-        lambda records: records.update(merge={"name": "x", "part": 1, "replaced": []}),
-        r"the record of a merge: part is 1",
-    ),
 }
-"""What other versions may write: a change of the records, and how it is told."""
+"""What other versions may write and is read all the same, and how it is told where a run is to go on."""

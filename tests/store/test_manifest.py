@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import pyarrow as pa
@@ -19,6 +20,7 @@ from boulder_sweep.store.manifest import (
     Merge,
     Part,
     Session,
+    check_own,
     is_ours,
     is_part_name,
     load,
@@ -26,7 +28,7 @@ from boulder_sweep.store.manifest import (
     save,
 )
 from boulder_sweep.store.storage import DiskStorage
-from tests.store.folders import OTHER_FORMS, rewrite_records
+from tests.store.folders import OTHER_FORMS, READABLE_FORMS, rewrite_records
 
 
 def manifest_with_parts() -> Manifest:
@@ -43,7 +45,9 @@ def test_what_is_saved_is_loaded(tmp_path, merging):
     manifest = manifest_with_parts()
     if merging:
         name, part = next(iter(manifest.parts.items()))
-        manifest.merge = Merge("x", part, [name])
+        small = {part_name(first, first + 150, 1000): replace(part, first=first, rows=150) for first in (0, 150)}
+        manifest.parts = small | {key: one for key, one in manifest.parts.items() if key != name}
+        manifest.merge = Merge(name, part, [*small])
     save(manifest, DiskStorage(tmp_path))
     assert load(tmp_path) == manifest
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST_NAME]
@@ -91,14 +95,37 @@ def test_records_of_another_version_are_not_guessed_at(tmp_path, form):
     assert "--overwrite" in str(refused.value)
 
 
+@pytest.mark.parametrize("form", READABLE_FORMS)
+def test_what_another_version_may_write_is_read_but_no_run_goes_on(tmp_path, form):
+    change, words = READABLE_FORMS[form]
+    manifest = manifest_with_parts()
+    manifest.identity["versions"] = {"boulder-sweep": "7.8.9"}
+    save(manifest, DiskStorage(tmp_path))
+    check_own(load(tmp_path), tmp_path)
+    rewrite_records(tmp_path, change)
+    assert load(tmp_path) == manifest
+    with pytest.raises(OtherVersionError, match=words) as refused:
+        check_own(load(tmp_path), tmp_path)
+    assert "another version of boulder-sweep, 7.8.9" in str(refused.value)
+    assert "--overwrite" in str(refused.value)
+
+
 def test_a_table_with_other_columns_is_of_another_version(tmp_path):
     save(manifest_with_parts(), DiskStorage(tmp_path))
     path = tmp_path / MANIFEST_NAME
     schema = pq.read_schema(path)
-    for other in (schema.remove(3), schema.append(pa.field("colour", pa.string()))):
+    less = schema.remove(schema.get_field_index("overlap_m"))
+    for other, words in (
+        (less, "its table lacks overlap_m"),
+        (schema.append(pa.field("colour", pa.string())), "its table also has colour"),
+    ):
         pq.write_table(other.empty_table(), path)
-        differing = set(schema.names) ^ set(other.names)
-        with pytest.raises(OtherVersionError, match=f"other columns: {differing.pop()}"):
+        assert load(tmp_path).columns == tuple(other.names)
+        with pytest.raises(OtherVersionError, match=words):
+            check_own(load(tmp_path), tmp_path)
+    for name in ("boulder_height_m", "verdict"):
+        pq.write_table(schema.remove(schema.get_field_index(name)).empty_table(), path)
+        with pytest.raises(OtherVersionError, match=f"its table lacks columns: {name}"):
             load(tmp_path)
 
 
@@ -180,16 +207,16 @@ def test_names_sort_as_rows_do(rows, data):
 
 
 @pytest.mark.parametrize(
-    "name", ["notes.txt", "rows-1.parquet", "rows-000000000000.parquet", "data.parquet", "_x.writing", "_manifest.json",
-             "rows-000000000000-000000000100.parquet.bak", "writing", "_rows.writing"],
+    "name", ["notes.txt", "rows-1.parquet", "rows-.parquet", "rows-000000000000-.parquet", "data.parquet",
+             "_x.writing", "_manifest.json", "rows-000000000000-000000000100.parquet.bak", "writing", "_rows.writing"],
 )  # fmt: skip
 def test_foreign_names(name):
     assert not is_ours(name)
 
 
 @pytest.mark.parametrize(
-    "name", ["rows-000000000000-000000131072.parquet", "_manifest.parquet", "_lock", "__manifest.parquet.writing",
-             "_rows-000000131072-000000262144.parquet.writing"],
+    "name", ["rows-000000000000-000000131072.parquet", "rows-000000000000.parquet", "_manifest.parquet", "_lock",
+             "__manifest.parquet.writing", "_rows-000000131072-000000262144.parquet.writing"],
 )  # fmt: skip
 def test_own_names(name):
     assert is_ours(name)

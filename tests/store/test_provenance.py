@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-import boulder_kernels._jit
+import boulder_kernels
 from boulder_sweep.store import provenance
 from boulder_sweep.store.provenance import canonical, differences, file_metadata, identity, sha256_of
 
@@ -33,7 +33,8 @@ def test_an_identity_is_plain_data_and_equal_after_json():
 
 def test_kernels_are_hashed_by_content(tmp_path, monkeypatch):
     (tmp_path / "__init__.py").write_text("a = 1")
-    monkeypatch.setattr(boulder_kernels._jit, "__file__", str(tmp_path / "_jit.py"))
+    assert provenance.kernels_sha256.__wrapped__() == boulder_kernels.source_hash()
+    monkeypatch.setattr(boulder_kernels.__spec__, "origin", str(tmp_path / "__init__.py"))
     one = provenance.kernels_sha256.__wrapped__()
     (tmp_path / "__init__.py").write_text("a = 2")
     two = provenance.kernels_sha256.__wrapped__()

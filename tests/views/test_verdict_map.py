@@ -160,6 +160,15 @@ def drawn(table, monkeypatch: pytest.MonkeyPatch, path: Path, **options: Any) ->
         return draw_verdict_map(table, path, **options), numbers
 
 
+def test_a_reason_of_another_version_is_left_blank_not_drawn_as_a_pass(table, tmp_path, monkeypatch) -> None:
+    scattered = table.sample(60, random_state=1).assign(boulder_height_m=lambda t: t.boulder_height_m + t.index * 1e-4)
+    scattered = scattered.assign(verdict="fail", reason=["melts", "overturns"] * 30)
+    codes: list[np.ndarray] = []
+    monkeypatch.setattr(Axes, "scatter", lambda self, *_, c, **__: codes.append(c))
+    draw_verdict_map(scattered, tmp_path / "points.png")
+    assert set(np.concatenate(codes)) == {[key for key, _, _ in CLASSES].index("fail/overturns")}
+
+
 def in_pieces(table: pd.DataFrame, size: int) -> Pieces:
     whole = pieces_of(table)
 
