@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +15,7 @@ from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_column
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.targets import check_target
-from boulder_sweep.text import printable
+from boulder_sweep.text import printable, why
 from boulder_sweep.views.wording import NOT_A_TEST
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         rows = writer(passing, finished, units)
         passing.replace(target)
     except OSError as problem:
-        raise ReportError(f"{file} cannot be written: {problem.strerror or problem}") from problem
+        raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
     finally:
         passing.unlink(missing_ok=True)
     return rows
@@ -128,7 +129,8 @@ def _cells(values: Iterable[Any]) -> list[Any]:
 
 def _cell(text: str) -> str:
     shown = printable(text)
-    return f"'{shown}" if text.startswith(FORMULA_SIGNS) else shown
+    first = unicodedata.normalize("NFKC", shown[:1])  # some programs take a full-width sign for the plain one
+    return f"'{shown}" if first.startswith(FORMULA_SIGNS) else shown
 
 
 def _parquet(target: Path, finished: FinishedRows, units: str) -> int:
