@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from boulder_sweep.errors import QuestionError
 from boulder_sweep.places import Place, RemotePath, place_of
 from boulder_sweep.store.schema import part_table
 from boulder_sweep.store.targets import check_target
+from boulder_sweep.text import why
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -269,8 +269,7 @@ def write_parquet(table: pa.Table, path: str | Place) -> Place:
         if isinstance(target, RemotePath):
             target.put(content.getbuffer())
     except OSError as problem:
-        why = os.strerror(problem.errno) if problem.errno else str(problem)
-        raise QuestionError(f"{path} cannot be written: {why}") from problem
+        raise QuestionError(f"{path} cannot be written: {why(problem)}") from problem
     return target
 
 

@@ -99,8 +99,6 @@ class DamagedError(StoreError):
 class WriteError(StoreError):
     """The folder could not be written; finished parts are intact, and the run can be resumed."""
 
-    exit_code = EXIT_INTERNAL
-
 
 class DoesNotFitError(StoreError):
     """The result cannot fit on the disk or in memory; found before any work."""

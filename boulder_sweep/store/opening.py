@@ -23,6 +23,7 @@ from boulder_sweep.store.provenance import PREFIX, differences
 from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
 from boulder_sweep.store.writer import OutputFolder
+from boulder_sweep.text import why
 
 
 class ClaimedFolder:
@@ -68,7 +69,7 @@ class ClaimedFolder:
             folder.manifest.sessions.append(session)
             save(folder.manifest, self._storage)
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._out}: {problem.strerror}") from problem
+            raise errors.WriteError(f"cannot write into {self._out}: {why(problem)}") from problem
         return folder
 
     def release(self) -> int:
@@ -128,7 +129,7 @@ def claim_output(out: Place, *, resume: bool = False, overwrite: bool = False) -
         if created:
             storage.unmake()
         if isinstance(problem, OSError):
-            raise errors.WriteError(f"cannot write into {out}: {problem.strerror}") from problem
+            raise errors.WriteError(f"cannot write into {out}: {why(problem)}") from problem
         raise
 
 

@@ -12,7 +12,6 @@ ever seen twice, and a run killed in the middle can finish the merge.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import threading
 from collections.abc import Iterator, Sequence
@@ -26,10 +25,10 @@ from boulder_sweep.store.manifest import Manifest, Merge, Part, is_ours, is_part
 from boulder_sweep.store.merging import finish_merge
 from boulder_sweep.store.provenance import now
 from boulder_sweep.store.storage import Lock, Storage
+from boulder_sweep.text import NO_SPACE
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
 class StagedPart(NamedTuple):
@@ -236,7 +235,7 @@ class OutputFolder:
     def write_error(self, problem: OSError) -> errors.WriteError:
         """Describe why the folder cannot be written, and how to resume."""
         done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
-        advice = "free some space and resume" if problem.errno in _NO_SPACE else "resume"
+        advice = "free some space and resume" if problem.errno in NO_SPACE else "resume"
         return errors.WriteError(
             f"cannot write into {self.path}: {problem.strerror}. {done}; {advice} with: {self.manifest.resume_command}"
         )
