@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +17,13 @@ import pyarrow.parquet as pq
 from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.sensitivity import Indices
 from boulder_sweep.answers.subset import FAILING
-from boulder_sweep.columns import DESIGN_ID, INPUTS
-from boulder_sweep.errors import QuestionError
+from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
+from boulder_sweep.errors import BoulderSweepError, QuestionError
 from boulder_sweep.places import Place, RemotePath, place_of
+from boulder_sweep.store.provenance import PREFIX
 from boulder_sweep.store.schema import part_table
 from boulder_sweep.store.targets import check_target
-from boulder_sweep.text import why
+from boulder_sweep.text import one_line, why
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +35,7 @@ if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
 
+_IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
 MASS = ("boulder_mass_kg", "kg", "mass of the boulder, L W H times its density")
 
 
@@ -232,8 +236,6 @@ def boulder_mass(table: pa.Table) -> np.ndarray:
 
 def joined_tables(tables: Sequence[pa.Table], metadata: Mapping[bytes, bytes]) -> pa.Table:
     """Concatenate tables of consecutive rows, adding the metadata of a file to that for pandas."""
-    import json
-
     from boulder_sweep.store.schema import PANDAS_ATTRIBUTES
 
     table = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
@@ -271,6 +273,64 @@ def write_parquet(table: pa.Table, path: str | Place) -> Place:
     except OSError as problem:
         raise QuestionError(f"{path} cannot be written: {why(problem)}") from problem
     return target
+
+
+def read_parquet(
+    path: str | Path, columns: Iterable[str], command: str, refusal: type[BoulderSweepError]
+) -> tuple[pa.Table, dict[str, Any]]:
+    """Read a file that `write_parquet` wrote.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Names of columns that it must have.
+    command
+        The command that writes such files.
+    refusal
+        The error to raise.
+
+    Returns
+    -------
+    table : Table
+        All of it.
+    identity : dict
+        As of `boulder_sweep.store.provenance.identity`.
+
+    Raises
+    ------
+    BoulderSweepError
+        It cannot be read, is damaged, or another command wrote it.
+    """
+    try:
+        table = pq.read_table(path, page_checksum_verification=True)
+        table.validate(full=True)
+        kinds = {field.name: field.type for field in table.schema}
+        entries = {
+            key.decode().removeprefix(PREFIX): value
+            for key, value in (table.schema.metadata or {}).items()
+            if key.startswith(PREFIX.encode())
+        }
+        if not entries.keys() >= _IDENTITY or not kinds.keys() >= set(columns):
+            raise refusal(f"{path} is neither the folder of a run nor a file that `{command}` wrote")
+        odd = [name for name, kind in kinds.items() if name in BY_NAME and not _is_of(BY_NAME[name].type, kind)]
+        if odd or hashlib.sha256(entries["settings"]).hexdigest().encode() != entries["settings_sha256"]:
+            raise refusal(f"{path} is damaged; write it again with `{command}`")
+        parsed = ("settings", "readings", "control", "accuracy", "versions")
+        return table, {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
+    except BoulderSweepError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as problem:
+        # Of a damaged file, pyarrow raises almost anything; names and texts that are not Unicode are ValueErrors.
+        raise refusal(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+
+
+def _is_of(type_: str, kind: pa.DataType) -> bool:
+    """Whether a column holds what it should: words or numbers."""
+    if type_ == "dictionary":
+        return pa.types.is_dictionary(kind)
+    return pa.types.is_floating(kind) or pa.types.is_integer(kind)
 
 
 def checked_parquet(path: str | Place) -> Place:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import ReportError
-from boulder_sweep.store.provenance import PREFIX
-from boulder_sweep.text import counted, one_line
+from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -32,22 +31,10 @@ class ChanceFile:
     """
 
     def __init__(self, path: str | Path) -> None:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from boulder_sweep.answers.tables import read_parquet
 
-        try:
-            self._table = pq.read_table(path)
-        except (OSError, pa.ArrowException) as problem:
-            raise ReportError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
-        entries = {
-            key.decode().removeprefix(PREFIX): value
-            for key, value in (self._table.schema.metadata or {}).items()
-            if key.startswith(PREFIX.encode())
-        }
-        if "settings" not in entries or not set(CHANCES) <= set(self._table.column_names):
-            raise ReportError(f"{path} is neither the folder of a run nor a file that `sweep uncertainty` wrote")
-        parsed = ("settings", "readings", "control", "accuracy", "versions")
-        self.identity = {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
+        needed = (*INPUT_COLUMNS, "design_id", "verdict", "reason", "validity", *CHANCES)
+        self._table, self.identity = read_parquet(path, needed, "sweep uncertainty", ReportError)
         self.rows = self.rows_done = len(self._table)
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
