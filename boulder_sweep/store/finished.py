@@ -153,7 +153,7 @@ class FinishedRows:
             # Parts are read in parallel already, and reading through a dataset would take twice as long.
             with pq.ParquetFile(source, page_checksum_verification=True) as opened:
                 table = opened.read(columns, use_threads=False)
-        except (OSError, pa.ArrowException) as problem:
+        except (OSError, pa.ArrowException, UnicodeDecodeError) as problem:
             raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
         return table if columns is None else table.select(columns)  # in the order asked for
 

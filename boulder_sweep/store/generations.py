@@ -179,5 +179,5 @@ def _metadata(content: bytes) -> Mapping[bytes, bytes]:
 
     try:
         return pq.read_metadata(io.BytesIO(content)).metadata or {}
-    except (pa.ArrowException, OSError):
+    except (pa.ArrowException, OSError, UnicodeDecodeError):
         return {}

@@ -239,7 +239,7 @@ def load(folder: Place) -> Manifest:
             found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
         raise NotASweepError(_no_result(folder)) from None
-    except (OSError, pa.ArrowException) as problem:
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as problem:  # names of columns that are no text
         raise DamagedError(f"{path} cannot be read: {problem}") from problem
     value = (found.metadata or {}).get(_KEY, b"")
     checksum, text = value[:64], value[64:]

@@ -199,6 +199,6 @@ def _is_written_by_us(path: Place) -> bool:
     try:
         with path.open("rb") as file:
             metadata: dict[bytes, Any] = pq.read_metadata(file).metadata or {}
-    except (OSError, pa.ArrowException):
+    except (OSError, pa.ArrowException, UnicodeDecodeError):
         return False
     return any(key.startswith(PREFIX.encode()) for key in metadata)
