@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import os
 from typing import Any
 
 _LONGEST_LINE = 200
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 
 
@@ -63,3 +66,10 @@ def one_line(problem: BaseException) -> str:
     words = " ".join(str(problem).split())
     text = f"{type(problem).__name__}: {words}" if words else type(problem).__name__
     return text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 3]}..."
+
+
+def why(problem: OSError) -> str:
+    """Say why a file cannot be written, in the words of the system, and what helps where there is no space."""
+    unknown = not problem.errno or problem.errno == errno.EIO  # of a store; its own words tell more
+    words = problem.strerror or str(problem) if unknown else os.strerror(problem.errno or 0)
+    return f"{words}; free some space and try again" if problem.errno in NO_SPACE else words

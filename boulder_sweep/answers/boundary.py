@@ -11,7 +11,6 @@ verdicts beside which nothing was simulated, or such a second change along a lin
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,15 +20,14 @@ import numpy as np
 
 from boulder_sweep.answers.draws import threads
 from boulder_sweep.answers.trials import Judges, judges_of
-from boulder_sweep.columns import REASONS, VERDICTS
+from boulder_sweep.columns import INPUT_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
-from boulder_sweep.errors import OlderRulesWarning, QuestionError
+from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
 from boulder_sweep.places import Place
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import EMBEDMENT
-from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -193,21 +191,11 @@ def read_map(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any], str]:
     QuestionError
         The file is no such map, or cannot be read.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    from boulder_sweep.answers.tables import read_parquet
 
-    try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowException) as problem:
-        raise QuestionError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
-    from boulder_sweep.store.provenance import identity_in, judged_by
-
-    found = identity_in(table.schema.metadata)
-    if "settings" not in found or not {"verdict", "reason", "simulated"} <= set(table.column_names):
-        raise QuestionError(f"{path} is neither the folder of a run nor a file that `sweep boundary` wrote")
-    if judged := judged_by(found):
-        warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=2)
-    return table.to_pandas(), found["settings"], judged
+    needed = ("design_id", *INPUT_COLUMNS, "verdict", "reason", "simulated")
+    table, identity, judged = read_parquet(path, needed, "sweep boundary", QuestionError)
+    return table.replace_schema_metadata(None).to_pandas(), identity["settings"], judged
 
 
 class _Lines:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
@@ -17,12 +18,14 @@ import pyarrow.parquet as pq
 from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.sensitivity import Indices
 from boulder_sweep.answers.subset import FAILING
-from boulder_sweep.columns import DESIGN_ID, INPUTS
-from boulder_sweep.errors import QuestionError
+from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
+from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
 from boulder_sweep.places import Place, RemotePath, place_of
 from boulder_sweep.store.files import replacing
+from boulder_sweep.store.provenance import identity_in, judged_by, sha256_of
 from boulder_sweep.store.schema import part_table
 from boulder_sweep.store.targets import check_target
+from boulder_sweep.text import one_line, why
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
 
+_IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
 MASS = ("boulder_mass_kg", "kg", "mass of the boulder, L W H times its density")
 
 
@@ -234,8 +238,6 @@ def boulder_mass(table: pa.Table) -> np.ndarray:
 
 def joined_tables(tables: Sequence[pa.Table], metadata: Mapping[bytes, bytes]) -> pa.Table:
     """Concatenate tables of consecutive rows, adding the metadata of a file to that for pandas."""
-    import json
-
     from boulder_sweep.store.schema import PANDAS_ATTRIBUTES
 
     table = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
@@ -272,9 +274,65 @@ def write_parquet(table: pa.Table, path: str | Place) -> Place:
         if isinstance(target, RemotePath):
             target.put(content.getbuffer())
     except OSError as problem:
-        why = os.strerror(problem.errno) if problem.errno else str(problem)
-        raise QuestionError(f"{path} cannot be written: {why}") from problem
+        raise QuestionError(f"{path} cannot be written: {why(problem)}") from problem
     return target
+
+
+def read_parquet(
+    path: str | Path, columns: Iterable[str], command: str, refusal: type[BoulderSweepError]
+) -> tuple[pa.Table, dict[str, Any], str]:
+    """Read a file that `write_parquet` wrote, and warn where other rules than those of this version judged it.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Names of columns that it must have.
+    command
+        The command that writes such files.
+    refusal
+        The error to raise.
+
+    Returns
+    -------
+    table : Table
+        All of it.
+    identity : dict
+        As of `boulder_sweep.store.provenance.identity`.
+    judged : str
+        As of `boulder_sweep.store.provenance.judged_by`.
+
+    Raises
+    ------
+    BoulderSweepError
+        It cannot be read, is damaged, or another command wrote it.
+    """
+    try:
+        table = pq.read_table(path, page_checksum_verification=True)
+        table.validate(full=True)
+        kinds = {field.name: field.type for field in table.schema}
+        found = identity_in(table.schema.metadata)
+        if not found.keys() >= _IDENTITY or not kinds.keys() >= set(columns):
+            raise refusal(f"{path} is neither the folder of a run nor a file that `{command}` wrote")
+        odd = [name for name, kind in kinds.items() if name in BY_NAME and not _is_of(BY_NAME[name].type, kind)]
+        if odd or sha256_of(found["settings"]) != found["settings_sha256"]:
+            raise refusal(f"{path} is damaged; write it again with `{command}`")
+    except BoulderSweepError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, RecursionError) as problem:
+        # Of a damaged file, pyarrow raises almost anything; names and texts that are not Unicode are ValueErrors.
+        raise refusal(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+    if judged := judged_by(found):
+        warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=3)
+    return table, found, judged
+
+
+def _is_of(type_: str, kind: pa.DataType) -> bool:
+    """Whether a column holds what it should: words or numbers."""
+    if type_ == "dictionary":
+        return pa.types.is_dictionary(kind)
+    return pa.types.is_floating(kind) or pa.types.is_integer(kind)
 
 
 def checked_parquet(path: str | Place) -> Place:

@@ -44,6 +44,7 @@ from boulder_sweep.errors import (
     OlderRulesWarning,
 )
 from boulder_sweep.runner.interruption import noted_signals
+from boulder_sweep.text import why
 
 COMMANDS = (
     new,
@@ -182,8 +183,8 @@ def _report(error: Exception, verbose: bool) -> int:
         say("error: there is not enough memory")
         return EXIT_INTERNAL
     if isinstance(error, OSError):  # a place that cannot be read or written
-        place = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
-        say(f"error: {place}")
+        place = f"{error.filename}: " if error.filename else ""
+        say(f"error: {place}{why(error)}")
         return EXIT_WRONG_USE
     say(f"internal error: {type(error).__name__}: {error}; {REPORT}")
     return EXIT_INTERNAL

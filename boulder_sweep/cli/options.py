@@ -24,8 +24,8 @@ Start with:
 \b
 Exit codes:
   0 done (also when designs fail)
-  1 internal error, or a result that is damaged or cannot be read or written
-  2 wrong use or invalid file
+  1 internal error, or a result that is damaged
+  2 wrong use, invalid file, or a place that cannot be written
   3 some designs could not be computed
   4 the output exists already, or is of another version
   130, 143 interrupted; the run can be resumed

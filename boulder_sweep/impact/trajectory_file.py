@@ -14,6 +14,7 @@ from boulder_sweep.errors import HistoryFileError
 from boulder_sweep.impact.trajectory_columns import BY_NAME
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.targets import check_target
+from boulder_sweep.text import why
 
 _TYPES = {"float64": pa.float64(), "dictionary": pa.dictionary(pa.int32(), pa.string())}
 
@@ -55,8 +56,7 @@ def write(table: pa.Table, path: str | Path) -> None:
         with replacing(target) as file:
             pq.write_table(table, file, compression="zstd", write_page_checksum=True)
     except OSError as problem:
-        why = os.strerror(problem.errno) if problem.errno else str(problem)
-        raise HistoryFileError(f"{path} cannot be written: {why}") from problem
+        raise HistoryFileError(f"{path} cannot be written: {why(problem)}") from problem
 
 
 def checked_history(path: str | Path) -> Path:

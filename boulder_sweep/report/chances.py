@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.columns import COLUMNS
-from boulder_sweep.errors import OlderRulesWarning, ReportError
-from boulder_sweep.store.provenance import identity_in, judged_by
-from boulder_sweep.text import counted, one_line
+from boulder_sweep.columns import COLUMNS, INPUT_COLUMNS
+from boulder_sweep.errors import ReportError
+from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -33,19 +31,10 @@ class ChanceFile:
     """
 
     def __init__(self, path: str | Path) -> None:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from boulder_sweep.answers.tables import read_parquet
 
-        try:
-            self._table = pq.read_table(path)
-        except (OSError, pa.ArrowException) as problem:
-            raise ReportError(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
-        self.identity = identity_in(self._table.schema.metadata)
-        if "settings" not in self.identity or not set(CHANCES) <= set(self._table.column_names):
-            raise ReportError(f"{path} is neither the folder of a run nor a file that `sweep uncertainty` wrote")
-        self.judged_by = judged_by(self.identity)
-        if self.judged_by:
-            warnings.warn(f"{path} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
+        needed = (*INPUT_COLUMNS, "design_id", "verdict", "reason", "validity", *CHANCES)
+        self._table, self.identity, self.judged_by = read_parquet(path, needed, "sweep uncertainty", ReportError)
         self.columns = tuple(dict.fromkeys((*(spec.name for spec in COLUMNS), *self._table.column_names)))
         self.lacking = frozenset(self.columns) - frozenset(self._table.column_names)
         self.rows = self.rows_done = len(self._table)

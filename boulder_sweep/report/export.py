@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import TextIOWrapper
@@ -16,7 +17,7 @@ from boulder_sweep.settings.shown_units import Shown, check_system, shown_column
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.targets import check_target
-from boulder_sweep.text import printable
+from boulder_sweep.text import printable, why
 from boulder_sweep.views.wording import NOT_A_TEST
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         with replacing(target) as passing:
             return writer(passing, finished, units)
     except OSError as problem:
-        raise ReportError(f"{file} cannot be written: {problem.strerror or problem}") from problem
+        raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
 
 def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[str, str, str]]:
@@ -135,7 +136,8 @@ def _cells(values: Iterable[Any]) -> list[Any]:
 
 def _cell(text: str) -> str:
     shown = printable(text)
-    return f"'{shown}" if text.startswith(FORMULA_SIGNS) else shown
+    first = unicodedata.normalize("NFKC", shown[:1])  # some programs take a full-width sign for the plain one
+    return f"'{shown}" if first.startswith(FORMULA_SIGNS) else shown
 
 
 def _parquet(target: BinaryIO, finished: FinishedRows, units: str) -> int:

@@ -22,7 +22,7 @@ from boulder_sweep.settings.shown_units import check_system
 from boulder_sweep.store.files import put_file
 from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
 from boulder_sweep.store.targets import check_target
-from boulder_sweep.text import counted, printable
+from boulder_sweep.text import counted, printable, why
 from boulder_sweep.views.wording import UNLOADING_WORDS
 
 KINDS = (".html", ".htm")
@@ -243,5 +243,5 @@ def _written(page: Path, text: str) -> Path:
     try:
         put_file(page.parent, page.name, text.encode())
     except OSError as problem:
-        raise ReportError(f"{page} cannot be written: {problem.strerror}") from problem
+        raise ReportError(f"{page} cannot be written: {why(problem)}") from problem
     return page

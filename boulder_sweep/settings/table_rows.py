@@ -7,7 +7,7 @@ import re
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -17,14 +17,19 @@ from boulder_sweep.places import source_of
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.leaf import outside
 from boulder_sweep.settings.numbers import NumberError, split_number
-from boulder_sweep.settings.problems import Place, ProblemList, cell_place, shorten
+from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, cell_place, shorten
 from boulder_sweep.settings.source import refuse
 from boulder_sweep.settings.sweep import DesignList
 from boulder_sweep.settings.table_header import TableColumn, check_count, check_numbers, read_header
+from boulder_sweep.text import one_line
 
 MAX_TABLE_ROWS = 20_000_000
 MAX_UNPACKED_BYTES = 1_000_000_000
 """Largest spreadsheet once it is unpacked."""
+MAX_CELL = 32_767
+"""Longest text that spreadsheets keep in a cell, in characters."""
+_MAX_PIECE = 10 * MAX_CELL
+"""Longest stretch between two tags of a spreadsheet: a cell with every character written as ``&#x10FFFF;`` [bytes]."""
 CHUNK = 20_000
 """Rows that are converted and checked at once."""
 MAX_ALIKE = 5
@@ -269,27 +274,60 @@ def read_xlsx(path: FilePlace, problems: ProblemList) -> DesignList:
     except ImportError:
         raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
     rows = _Rows(path, problems, lambda origin, index: Place(label, origin[0], index + 1))
+    for number, cells in enumerate(_sheet_rows(path, load_workbook), 1):
+        texts = ["" if cell is None else str(cell) for cell in cells]
+        origin = (number, "")
+        if not any(text.strip() for text in texts):
+            continue
+        if rows.columns:
+            rows.take((texts + [""] * len(rows.columns))[: max(len(rows.columns), _filled(texts))], origin)
+        else:
+            rows.header([text.strip() for text in texts[: _filled(texts)]], origin)
+    if not rows.columns:
+        raise refuse(label, "is empty; the first row must hold the column names")
+    return rows.finish()
+
+
+def _sheet_rows(path: FilePlace, load_workbook: Callable[..., Any]) -> Iterator[tuple[object, ...]]:
+    """Yield the rows of the first sheet.
+
+    Raises
+    ------
+    SettingsError
+        The file is damaged, or larger than a spreadsheet can be.
+    """
+    label = str(path)
     try:
         source = source_of(path)
         with zipfile.ZipFile(source) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > MAX_UNPACKED_BYTES:
                 raise refuse(label, f"has more than {MAX_UNPACKED_BYTES / 1e9:g} GB once unpacked; save it as CSV")
+            for entry in archive.infolist():
+                if entry.filename.endswith(".xml"):
+                    _check_pieces(archive, entry, label)
         book = load_workbook(source, read_only=True, data_only=True)
-        for number, cells in enumerate(book.worksheets[0].iter_rows(values_only=True), 1):
-            texts = ["" if cell is None else str(cell) for cell in cells]
-            origin = (number, "")
-            if not any(text.strip() for text in texts):
-                continue
-            if rows.columns:
-                rows.take((texts + [""] * len(rows.columns))[: max(len(rows.columns), _filled(texts))], origin)
-            else:
-                rows.header([text.strip() for text in texts[: _filled(texts)]], origin)
+        yield from book.worksheets[0].iter_rows(values_only=True)
         book.close()
-    except (OSError, ValueError, KeyError, IndexError, SyntaxError, zipfile.BadZipFile) as error:
-        raise refuse(label, f"cannot be read as a spreadsheet ({shorten(str(error), 100)})") from None
-    if not rows.columns:
-        raise refuse(label, "is empty; the first row must hold the column names")
-    return rows.finish()
+    except (SettingsError, MemoryError):
+        raise
+    except Exception as error:  # of a damaged file, zlib, the parser of XML and openpyxl raise almost anything
+        raise refuse(label, f"cannot be read as a spreadsheet ({shorten(one_line(error), 100)})") from None
+
+
+def _check_pieces(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, label: str) -> None:
+    """Refuse a cell that no spreadsheet can hold, before the parser of XML keeps several copies of it.
+
+    Reading to the end also compares the checksum.
+    """
+    length = 0
+    with archive.open(entry) as content:
+        while chunk := content.read(_MAX_PIECE):
+            first, *others = chunk.split(b"<")
+            length += len(first)
+            if length > _MAX_PIECE:
+                raise refuse(label, f"has a cell of more than {MAX_CELL:,} characters, which no spreadsheet can hold")
+            if others:
+                length = len(others[-1])
 
 
 def _filled(texts: list[str]) -> int:

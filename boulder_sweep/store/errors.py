@@ -119,8 +119,6 @@ class ImpossibleRecordsError(DamagedError):
 class WriteError(StoreError):
     """The folder could not be written; finished parts are intact, and the run can be resumed."""
 
-    exit_code = EXIT_INTERNAL
-
 
 class LinkError(StoreError):
     """A link lies where a file is to be written; whoever put it there would choose what is overwritten."""

@@ -270,7 +270,7 @@ def load(folder: Place) -> Manifest:
             found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
         raise NotASweepError(_no_result(folder)) from None
-    except (OSError, pa.ArrowException) as problem:
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as problem:  # names of columns that are no text
         raise DamagedError(f"{path} cannot be read: {problem}") from problem
     except ValueError as problem:  # a name that is no text
         raise ImpossibleRecordsError(path, str(problem)) from None

@@ -24,6 +24,7 @@ from boulder_sweep.store.provenance import PREFIX, differences
 from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
 from boulder_sweep.store.writer import OutputFolder
+from boulder_sweep.text import why
 
 
 class ClaimedFolder:
@@ -69,7 +70,7 @@ class ClaimedFolder:
             folder.manifest.sessions.append(session)
             save(folder.manifest, self._storage)
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._out}: {problem.strerror}") from problem
+            raise errors.WriteError(f"cannot write into {self._out}: {why(problem)}") from problem
         return folder
 
     def release(self) -> int:
@@ -129,7 +130,7 @@ def claim_output(out: Place, *, resume: bool = False, overwrite: bool = False) -
         if created:
             storage.unmake()
         if isinstance(problem, OSError):
-            raise errors.WriteError(f"cannot write into {out}: {problem.strerror}") from problem
+            raise errors.WriteError(f"cannot write into {out}: {why(problem)}") from problem
         raise
 
 
@@ -201,6 +202,6 @@ def _is_written_by_us(path: Place) -> bool:
     try:
         with path.open("rb") as file:
             metadata: dict[bytes, Any] = pq.read_metadata(file).metadata or {}
-    except (OSError, pa.ArrowException):
+    except (OSError, pa.ArrowException, UnicodeDecodeError):
         return False
     return any(key.startswith(PREFIX.encode()) for key in metadata)

@@ -22,6 +22,7 @@ from boulder_sweep.store.files import check_writable, flush_folder, hidden_name,
 from boulder_sweep.store.generations import MANIFEST_NAME, Encode, Generations, OtherWriterError
 from boulder_sweep.store.lock import FolderLock
 from boulder_sweep.store.object_lock import ObjectLock, refuses_existing
+from boulder_sweep.text import why
 
 _PROBE_BYTES = 1 << 16
 """More than a first manifest takes."""
@@ -103,7 +104,7 @@ class DiskStorage:
                 raise errors.StoreError(f"{path} is a file; the output of a sweep is a folder") from None
             return False
         except OSError as problem:
-            raise errors.WriteError(f"cannot create the folder {path}: {problem.strerror}") from problem
+            raise errors.WriteError(f"cannot create the folder {path}: {why(problem)}") from problem
         return True
 
     def unmake(self) -> None:

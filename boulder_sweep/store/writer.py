@@ -31,10 +31,10 @@ from boulder_sweep.store.merging import finish_merge
 from boulder_sweep.store.provenance import now
 from boulder_sweep.store.storage import Lock, Storage
 from boulder_sweep.store.verify import damaged_parts
+from boulder_sweep.text import NO_SPACE
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
 class StagedPart(NamedTuple):
@@ -277,7 +277,7 @@ class OutputFolder:
         if problem.errno == errno.ENOENT and isinstance(self.path, Path) and not self.path.exists():
             return errors.FolderRemovedError(self.path)
         done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
-        advice = "free some space and resume" if problem.errno in _NO_SPACE else "resume"
+        advice = "free some space and resume" if problem.errno in NO_SPACE else "resume"
         return errors.WriteError(
             f"cannot write into {self.path}: {problem.strerror}. {done}; {advice} with: {self.manifest.resume_command}"
         )

@@ -13,7 +13,7 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store.files import replacing
-from boulder_sweep.text import script_data
+from boulder_sweep.text import script_data, why
 from boulder_sweep.views import figures
 from boulder_sweep.views.scene import SideView, samples_shown
 from boulder_sweep.views.shapes import STYLES, Shape
@@ -68,7 +68,7 @@ def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) 
             else:
                 _write_mp4(trajectory, target, Path(file.name), told)
     except OSError as problem:
-        raise PictureError(f"{path} cannot be written: {problem.strerror or problem}") from problem
+        raise PictureError(f"{path} cannot be written: {why(problem)}") from problem
 
 
 def checked_animation(path: str | Path) -> Path:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.targets import check_target
-from boulder_sweep.text import NO_BREAK_SPACE, printable
+from boulder_sweep.text import NO_BREAK_SPACE, printable, why
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,7 +99,7 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise PictureError(f"the folder {folder} cannot be made: {problem.strerror or problem}") from problem
+        raise PictureError(f"the folder {folder} cannot be made: {why(problem)}") from problem
 
 
 @contextmanager
@@ -140,7 +140,7 @@ def save(fig: Figure, target: Path) -> None:
         with replacing(target) as file:
             fig.savefig(file, format=target.suffix[1:].lower(), metadata=undated[target.suffix.lower()])
     except OSError as problem:
-        raise PictureError(f"{target} cannot be written: {problem.strerror or problem}") from problem
+        raise PictureError(f"{target} cannot be written: {why(problem)}") from problem
 
 
 def _keep_text_plain(fig: Figure) -> None:

@@ -46,7 +46,7 @@ def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, schedule
     with monkeypatch.context() as patch:
         patch.setattr("boulder_sweep.store.writer.save", full)
         code, out, err = sweep("run", possible_grid, *words)
-    assert (code, out) == (1, "")
+    assert (code, out) == (2, "")
     command = f"sweep run grid.yaml -o out --backend dask --scheduler {scheduler} --resume"
     assert command in err
     code, out, _ = sweep(*shlex.split(command)[1:], "-q")

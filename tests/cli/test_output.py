@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +13,8 @@ from pathlib import Path
 import pytest
 
 import boulder_sweep.cli
-from boulder_sweep.cli.output import say, show
+from boulder_sweep.cli.main import execute
+from boulder_sweep.cli.output import ready_streams, say, show
 from boulder_sweep.text import printable
 
 HOSTILE = [
@@ -110,6 +113,7 @@ def test_a_folder_with_a_hostile_name_is_shown_escaped(sweep, possible_grid):
     assert out.startswith("out\\x1b[31m\\nnext: finished")
 
 
+PULSE = Path(__file__).parents[2] / "docs" / "examples" / "rigid_wall_pulse.csv"
 COMMAND = [sys.executable, "-m", "boulder_sweep"]
 
 
@@ -149,3 +153,54 @@ def test_what_the_encoding_of_stdout_lacks_is_replaced(possible_grid, encoding):
     code, whole, _ = _with_streams("", *words, PYTHONIOENCODING="utf-8")
     assert out.decode(encoding) == whole.decode().encode(encoding, "replace").decode(encoding)
     assert "?" in out.decode(encoding)
+
+
+SHOWING = (
+    ("run", "grid.yaml", "-o", "again.sweep"),
+    ("run", "grid.yaml", "--dry-run"),
+    ("check", "grid.yaml"),
+    ("need", "grid.yaml", "--least", "friction_angle", "-q"),
+    ("uncertainty", "grid.yaml", "-q", *("--set", "soil.friction_angle={mean: 40 deg, cov: 5 %}")),
+    ("which", "grid.yaml", "-q"),
+    ("boundary", "grid.yaml", "-q"),
+    ("simulate", "grid.yaml", "-q"),
+    ("status", "out.sweep", "--verify"),
+    ("compare", "out.sweep", "out.sweep"),
+    ("explain", "out.sweep", "1"),
+    ("export", "out.sweep", "-o", "rows.csv"),
+    ("fit-vehicle", "pulse.csv", "--mass", "6800 kg"),
+    ("--help",),
+    ("check", "nothere.yaml"),
+)
+"""Commands that print tables, and one that is refused."""
+
+
+@pytest.mark.parametrize(
+    "encoding",
+    [
+        "none: both are closed",
+        "ascii",
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("latin-1", "cp1252")),
+    ],
+)
+def test_no_command_depends_on_what_its_streams_can_carry(sweep, possible_grid, monkeypatch, encoding):
+    text = possible_grid.read_text().replace("[1.6, 2.6, 3.5] m", "[2.6, 3.5] m").replace("[60, 95]", "60")
+    possible_grid.write_text(text.replace("[0.8, 1.2, 1.5] m", "1.5 m"))
+    shutil.copy(PULSE, "pulse.csv")
+    assert sweep("run", "grid.yaml", "-q", "-o", "out.sweep")[0] == 0
+    for words in SHOWING:
+        if encoding.startswith("none"):
+            out = err = None  # what Python makes of closed streams
+        else:
+            out, err = (
+                io.TextIOWrapper(io.BytesIO(), encoding, errors=errors) for errors in ("strict", "backslashreplace")
+            )
+        with monkeypatch.context() as patch:
+            patch.setattr("sys.stdout", out)
+            patch.setattr("sys.stderr", err)
+            ready_streams()
+            assert execute(words) == (2 if "nothere.yaml" in words else 0), words
+            if out is not None:
+                out.flush()
+                assert out.buffer.getvalue() or "nothere.yaml" in words, words
+        shutil.rmtree("again.sweep", ignore_errors=True)

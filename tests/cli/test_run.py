@@ -1,8 +1,11 @@
 """``sweep run`` from the command line: what it writes, prints and returns."""
 
+import errno
 import json
+import os
 import re
 import shlex
+from pathlib import Path
 
 import pytest
 
@@ -238,3 +241,42 @@ def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkey
 )
 def test_durations(seconds, text):
     assert duration_text(seconds) == text
+
+
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+
+
+@pytest.mark.parametrize("number", [*NO_SPACE, errno.EACCES, errno.EROFS, errno.EIO, errno.ECONNREFUSED])
+@pytest.mark.parametrize("when", ["opening", "writer"])
+def test_a_folder_that_the_system_refuses_to_write_is_for_the_user_to_mend(
+    sweep, possible_grid, monkeypatch, number, when
+):
+    def refused(*_):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(f"boulder_sweep.store.{when}.save", refused)
+    code, out, err = sweep("run", possible_grid, "-q", "-o", "out")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: cannot write into out: {os.strerror(number)}")
+    assert ("free some space" in err) == (number in NO_SPACE)
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "grid.yaml/out"])
+def test_a_folder_that_cannot_be_made_is_wrong_use(sweep, possible_grid, name):
+    code, out, err = sweep("run", possible_grid, "-q", "-o", name)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert name.rpartition("/")[2] in err
+
+
+@pytest.mark.parametrize(("number", "helps"), [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EACCES, False)])
+def test_what_helps_is_said_wherever_a_file_cannot_be_written(sweep, tmp_path, monkeypatch, number, helps):
+    def refused(self, *_, **__):
+        raise OSError(number, os.strerror(number), str(self))
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Path, "write_text", refused)
+    code, out, err = sweep("new", "-y", "mine.yaml")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: mine.yaml: {os.strerror(number)}")
+    assert ("free some space" in err) == helps

@@ -143,6 +143,6 @@ except WriteError as problem:
 def test_a_limit_on_the_size_of_files_stops_the_run_with_words(tmp_path):
     command = [sys.executable, "-c", _NO_LONG_FILES, str(tmp_path / "out")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 1, done.stderr
+    assert done.returncode == 2, done.stderr
     assert "File too large" in done.stdout
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["_manifest.parquet"]

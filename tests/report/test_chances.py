@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import random
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +103,51 @@ def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
         ChanceFile(one).row(9)
 
 
+def test_a_file_with_a_flipped_bit_is_refused_or_read_right(chances: Path, tmp_path: Path) -> None:
+    """Values have checksums; settings, names and types of columns stand in the last part of the file."""
+    content, file, chance = chances.read_bytes(), tmp_path / "chances.parquet", random.Random(22)
+    whole, refused = answer_of(read_rows(chances)), 0
+    for _ in range(120):
+        flipped = bytearray(content)
+        flipped[-chance.randrange(1, 34_000)] ^= 1 << chance.randrange(8)
+        file.write_bytes(flipped)
+        try:
+            assert answer_of(read_rows(file)) == whole
+        except ReportError:
+            refused += 1
+    assert refused > 40
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b'"name":"', b'"name":\xff'),
+        (b"boulder_sweep.control", b"boulder_sweep.contrxl"),
+        (b"boulder_sweep.settings", b"boulder_\xffsettings"),
+        (b'"inputs"', b'"inpvts"'),
+        (b"2.2", b"2.3"),
+    ],
+)
+def test_settings_that_are_damaged_are_told(
+    chances: Path, tmp_path: Path, sweep: Command, old: bytes, new: bytes
+) -> None:
+    table = pq.read_table(chances)
+    damaged = {key.replace(old, new): value.replace(old, new) for key, value in table.schema.metadata.items()}
+    assert damaged != table.schema.metadata
+    pq.write_table(table.replace_schema_metadata(damaged), tmp_path / "chances.parquet")
+    code, out, err = sweep("report", tmp_path / "chances.parquet")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: {tmp_path / 'chances.parquet'} ")
+
+
+def test_a_column_name_that_is_no_text_is_told(chances: Path, tmp_path: Path, sweep: Command) -> None:
+    content = chances.read_bytes().replace(b"boulder_height_m", b"boulder\xffheight_m")
+    (tmp_path / "chances.parquet").write_bytes(content)
+    code, out, err = sweep("report", tmp_path / "chances.parquet")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: {tmp_path / 'chances.parquet'} cannot be read as a Parquet file: ")
+
+
 @pytest.mark.parametrize(
     "kept", [lambda table: table.slice(1), lambda table: table.slice(0, len(table) - 1), lambda table: table[::-1]]
 )
@@ -125,6 +172,7 @@ def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> 
     settings = json.loads(metadata[b"boulder_sweep.settings"])
     del settings["model"]["calibrated_crush_m"]
     metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
+    metadata[b"boulder_sweep.settings_sha256"] = sha256(metadata[b"boulder_sweep.settings"]).hexdigest().encode()
     pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
     write_report(tmp_path / "old.parquet", tmp_path / "page.html")  # with the default of this version
     del settings["model"]["preset"]

@@ -88,7 +88,10 @@ def test_parquet_keeps_units_and_meanings(result, tmp_path):
 
 
 def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
-    (tmp_path / "designs.csv").write_text("boulder_id,boulder_height_m\n=HYPERLINK(1),2.4\n@x,3.4\nplain,3\n")
+    signs = [*"=+-@", *"＝＋－＠", *"﹦﹢﹣﹫⁼₌⁺₊"]
+    formulas = [f"{sign}HYPERLINK(1)" for sign in signs]
+    rows = [f"{text},3" for text in (*formulas, "plain", "a=b", "±3")]
+    (tmp_path / "designs.csv").write_text("\n".join(("boulder_id,boulder_height_m", *rows)), encoding="utf-8")
     (tmp_path / "list.yaml").write_text(
         "name: list\ntable: designs.csv\nboulder: {length: 1.65 m, width: 1.5 m, density: 2600 kg/m^3}\n"
         "site: {embedment_ratio: 0.6}\n"
@@ -97,8 +100,10 @@ def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
     )
     boulder_sweep.run(boulder_sweep.load(tmp_path / "list.yaml"), tmp_path / "out")
     export(tmp_path / "out", tmp_path / "out.csv")
-    with (tmp_path / "out.csv").open(newline="") as file:
-        assert [row["boulder_id"] for row in csv.DictReader(file)] == ["'=HYPERLINK(1)", "'@x", "plain"]
+    with (tmp_path / "out.csv").open(newline="", encoding="utf-8") as file:
+        shown = [row["boulder_id"] for row in csv.DictReader(file)]
+    assert [text.lstrip("'") for text in shown] == [*formulas, "plain", "a=b", "±3"]
+    assert [text.startswith("'") for text in shown] == [True] * len(formulas) + [False] * 3
     export(tmp_path / "out", tmp_path / "out.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "out.xlsx")["designs"]
     assert {cell.data_type for row in sheet.iter_rows() for cell in row} <= {"s", "inlineStr", "n"}

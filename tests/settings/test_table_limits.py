@@ -9,12 +9,14 @@ import resource
 import subprocess
 import sys
 import threading
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from openpyxl import Workbook
 
 from boulder_sweep.crash_tests.measured import PULSE_SIGNALS, TEST_SIGNALS, read_history
 from boulder_sweep.settings import SettingsError, load_text
@@ -111,6 +113,53 @@ def test_a_thousand_wrong_files_are_refused_in_words(tmp_path, seed):
 @pytest.mark.nightly
 def test_many_wrong_files_are_refused_in_words(tmp_path, seed):
     fuzz(tmp_path, 100_000, seed + 1)
+
+
+def spreadsheet(note: str = "a") -> bytes:
+    book = Workbook()
+    for row in ([HEIGHT, "note"], [2.5, note], [2.6, "b"], [3, "c"]):
+        book.active.append(row)
+    sink = io.BytesIO()
+    book.save(sink)
+    return sink.getvalue()
+
+
+def test_a_spreadsheet_with_a_flipped_bit_is_refused_or_read_right(tmp_path, seed):
+    """Of a damaged file, zlib, the parser of XML and openpyxl raise almost anything."""
+    chance, content, path = random.Random(seed), spreadsheet(), tmp_path / "table.xlsx"
+    refusals = []
+    for number in range(100):
+        flipped = bytearray(content)
+        flipped[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        path.write_bytes(flipped)
+        try:
+            sweep = load_text(SETTINGS.format(file=path.name), tmp_path / "grid.yaml")
+        except SettingsError as error:
+            refusals.append(str(error))
+        else:
+            assert sweep.table.columns[HEIGHT].tolist() == [2.5, 2.6, 3.0], number
+            assert list(sweep.table.labels) == ["note"], number
+    assert len(refusals) > 50
+    assert [text for text in refusals if "table.xlsx" not in text] == []
+
+
+def test_a_cell_longer_than_a_spreadsheet_can_hold_is_refused_unread(tmp_path, monkeypatch):
+    packed, path = io.BytesIO(), tmp_path / "table.xlsx"
+    with (
+        zipfile.ZipFile(io.BytesIO(spreadsheet("&LONG;"))) as old,
+        zipfile.ZipFile(packed, "w", zipfile.ZIP_LZMA) as new,
+    ):
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"&amp;LONG;", b"x" * 1_000_000))
+    path.write_bytes(packed.getvalue())
+    monkeypatch.setattr("openpyxl.load_workbook", lambda *_, **__: pytest.fail("the cell was read"))
+    with pytest.raises(SettingsError, match=r"table\.xlsx: has a cell of more than 32,767 characters"):
+        load_text(SETTINGS.format(file=path.name), tmp_path / "grid.yaml")
+
+
+def test_the_longest_cell_of_a_spreadsheet_is_read(tmp_path):
+    (tmp_path / "table.xlsx").write_bytes(spreadsheet("\N{GRINNING FACE}" * 16_383))
+    assert load_text(SETTINGS.format(file="table.xlsx"), tmp_path / "grid.yaml").n_designs == 3
 
 
 def test_columns_of_every_type(tmp_path):

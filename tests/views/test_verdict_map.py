@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,10 @@ import pytest
 from matplotlib.axes import Axes
 
 import boulder_sweep
+from boulder_sweep.answers.boundary import read_map
 from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import INPUT_COLUMNS
-from boulder_sweep.errors import PictureError
+from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.settings import load_text
 from boulder_sweep.views.labels import label, value_text
 from boulder_sweep.views.pieces import Kept, Pieces, pieces_of
@@ -397,6 +399,26 @@ def test_a_file_of_sweep_boundary_is_drawn_as_the_run_is(named_soils: str, capsy
     Path("text.parquet").write_text("no table")
     assert execute(["plot", "text.parquet"]) == 2
     assert "cannot be read as a Parquet file" in capsys.readouterr().err
+
+
+def test_a_damaged_file_of_sweep_boundary_is_told(named_soils: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["boundary", "named.yaml", "-q", "-o", "named.parquet"]) == 0
+    content, whole, chance = Path("named.parquet").read_bytes(), read_map("named.parquet"), random.Random(22)
+    refusals, shown = 0, whole[0].to_csv()
+    for _ in range(120):  # most of the file are names, types and settings, which have no checksums of their own
+        flipped = bytearray(content)
+        flipped[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        Path("flipped.parquet").write_bytes(flipped)
+        try:
+            frame, found = read_map("flipped.parquet")
+            assert (frame.to_csv(), found) == (shown, whole[1])
+        except QuestionError:
+            refusals += 1
+    assert refusals > 30
+    Path("flipped.parquet").write_bytes(content.replace(b"boulder_height_m", b"boulder\xffheight_m"))
+    capsys.readouterr()
+    assert execute(["plot", "flipped.parquet"]) == 2
+    assert capsys.readouterr().err.startswith("error: flipped.parquet cannot be read as a Parquet file: ")
 
 
 def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None:
