@@ -25,7 +25,8 @@ def test_intervals_hold_although_the_sample_ends_where_they_are_narrow(
     assert found.narrowest > 0.0
 
 
-def test_intervals_of_simulated_designs_hold() -> None:
+def test_intervals_of_simulated_designs_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(intervals, "REFERENCE", 1 << 15)
     found = intervals.simulated(1, 20, (0.7, 0.95))
     assert np.allclose(found.exact, (0.7, 0.95), atol=0.01), "the depths are those that were asked for"
     assert found.coverage.min() >= 0.9
