@@ -1,4 +1,4 @@
-"""Run all benchmarks and write their tables into the README: ``python -m benchmarks``; takes about six minutes.
+"""Run all benchmarks and write their tables into the README: ``python -m benchmarks``; takes about eight minutes.
 
 Some tables contain wall times, so the machine should be otherwise idle.
 """
@@ -10,12 +10,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from . import accuracy, answers, kernel, named, rates, single_precision, sweep
+from . import accuracy, answers, intervals, kernel, named, rates, single_precision, sweep
 from .designs import DESIGNS
 from .peers.__main__ import measure_with
 from .report import Table, write_between_markers
 
-NAMES = ("kernel", "rates", "accuracy", "named", "single-precision", "sweep", "answers", "peers")
+NAMES = ("kernel", "rates", "accuracy", "named", "single-precision", "sweep", "answers", "intervals", "peers")
 
 
 def _accuracy() -> list[Table]:
@@ -38,6 +38,7 @@ def main() -> None:
         "single-precision": lambda: [single_precision.measure()],
         "sweep": lambda: sweep.measure(large=arguments.large),
         "answers": lambda: [answers.measure()],
+        "intervals": lambda: [intervals.measure()[0]],
         "peers": lambda: [measure_with(arguments.peers_python, write=True)],
     }
     for name in arguments.only or works:

@@ -62,9 +62,9 @@ def held(event: Event, dimensions: int, exact: np.ndarray, seeds: int, half_widt
     return Held(exact, holds / seeds, narrowest, drawn / seeds)
 
 
-def linear(dimensions: int, seeds: int, half_width: float) -> Held:
+def linear(dimensions: int, seeds: int, half_width: float, probabilities: tuple[float, ...] = PROBABILITIES) -> Held:
     """Compare for a linear limit state, on which all inputs have the same influence."""
-    exact = np.array(PROBABILITIES)
+    exact = np.array(probabilities)
     edges = ndtri(exact) * np.sqrt(dimensions)
     return held(lambda row, z: z.sum(axis=1) <= edges[row], dimensions, exact, seeds, half_width)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
+import json
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
