@@ -51,7 +51,7 @@ _ONCE = "    out = simulate_once(table, readings, control, springs)\n"
 _SIMULATED = "        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)\n"
 _TRIES = '        reason = ""\n        for _ in range(tries):\n'
 _COMMITTED = "committer.start()\n"
-_STAGED = "    storage.put(hidden_name(name), content)\n"
+_STAGED = "    storage.put(staged_name(staged.name, token, staged.part.sha256), content)\n"
 _STEP_TWICE = (
     "        y_end, k_end = step(y_end, k_end, "
     "0.0 * field(ws, STEP, lane), load(ws, SWITCHES, lane), load(ws, CONSTANTS, lane))\n"

@@ -32,7 +32,7 @@ from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
 from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
 from boulder_sweep.store.lock import LOCK_NAME
 from boulder_sweep.store.object_lock import is_probe
-from boulder_sweep.store.records import entries_of, version_of
+from boulder_sweep.store.records import IDENTITY, check_kinds, entries_of, is_deep, version_of
 from boulder_sweep.store.storage import Storage
 
 _KEY = b"boulder_sweep.manifest"
@@ -44,8 +44,6 @@ _DIGITS = 12
 _PART_NAME = re.compile(rf"{_PART_PREFIX}[0-9]{{{_DIGITS},}}(-[0-9]{{{_DIGITS},}})?{re.escape(_PART_SUFFIX)}")
 """The first tables named a part by its first row only."""
 _MOST_ROWS = 2**63 - 1
-_DEEPEST = 32
-"""Most levels of nested records; a settings file has fewer than ten."""
 _LONGEST_REASON = 200
 _TOKENS = re.compile(r"(\.[0-9a-f]{16})+$")
 
@@ -283,7 +281,7 @@ def load(folder: Place) -> Manifest:
         )
     try:
         content = json.loads(text)
-        if _is_deep(content):
+        if is_deep(content):
             raise ValueError("its records are nested too deeply")
     except (ValueError, RecursionError) as problem:
         raise ImpossibleRecordsError(path, str(problem)) from None
@@ -297,19 +295,6 @@ def load(folder: Place) -> Manifest:
         version = version_of(content)
         why = shorten(str(unfamiliar), _LONGEST_REASON)
         raise OtherVersionError(path, why, None if version is None else shorten(version)) from None
-
-
-def _is_deep(content: Any) -> bool:
-    """Whether records are nested so deeply that functions that call themselves could fail."""
-    level = [content]
-    for _ in range(_DEEPEST):
-        level = [
-            value
-            for one in level
-            if isinstance(one, dict | list)
-            for value in (one.values() if isinstance(one, dict) else one)
-        ]
-    return bool(level)
 
 
 def _check_claims(path: Place, manifest: Manifest) -> None:
@@ -341,30 +326,7 @@ def _check_claims(path: Place, manifest: Manifest) -> None:
         ends = [merge.part.first, merge.part.stop]
         if [*edges[:1], *edges[-1:]] != ends or edges[1:-1:2] != edges[2:-1:2]:
             raise ImpossibleRecordsError(path, "a merge of other rows than it replaces")
-    _check_kinds(path, "identity", manifest.identity, _IDENTITY)
-
-
-def _check_kinds(path: Place, what: str, content: Any, kinds: Any) -> None:
-    """Check the kinds of those nested entries that are looked at by name."""
-    if isinstance(kinds, type):
-        if not isinstance(content, kinds):
-            raise ImpossibleRecordsError(path, f"{what} that is {type(content).__name__}")
-        return
-    _check_kinds(path, what, content, dict)
-    for name in kinds.keys() & content.keys():
-        _check_kinds(path, f"{what}.{name}", content[name], kinds[name])
-
-
-_IDENTITY = {
-    "settings": {"name": str, "inputs": dict, "model": dict, "criterion": dict, "solver": dict, "labels": dict},
-    "readings": dict,
-    "control": dict,
-    "accuracy": dict,
-    "versions": dict,
-    "settings_sha256": str,
-    "kernels_sha256": str,
-    "rules_sha256": str,
-}
+    check_kinds(path, "identity", manifest.identity, IDENTITY)
 
 
 def check_own(manifest: Manifest, folder: Place) -> None:

@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import Any
 
 from boulder_sweep.places import RemotePath
-from boulder_sweep.store.errors import FolderInUseError
+from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, StoreError
 from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, LOCK_NAME
 
 _PROBE = "_probe-"
@@ -47,7 +47,7 @@ class ObjectLock:
 
     def __init__(self, folder: RemotePath, token: str, only_new: bool, holder: str):
         self._folder, self._path, self._token = folder, folder / LOCK_NAME, token
-        self._lost = False
+        self._lost: StoreError | None = None
         self._released = threading.Event()
         self._beating = threading.Lock()
         there = _record(self._path)
@@ -66,10 +66,12 @@ class ObjectLock:
         ------
         FolderInUseError
             Another run has taken it, because this one was silent for long.
+        FolderRemovedError
+            It was removed, as by another run that has ended.
         OSError
             The store does not answer.
         """
-        self._lost = self._lost or (_record(self._path) or {}).get("token") != self._token
+        self._look()
         self.renew()
 
     def renew(self) -> None:
@@ -77,11 +79,11 @@ class ObjectLock:
 
         Raises
         ------
-        FolderInUseError
-            Another run has taken it.
+        FolderInUseError, FolderRemovedError
+            As for `check`.
         """
-        if self._lost:
-            raise FolderInUseError(f"{self._folder} was taken over by another run while this one was silent")
+        if self._lost is not None:
+            raise self._lost
 
     def release(self) -> None:
         """Release the lock; may be called twice."""
@@ -100,11 +102,18 @@ class ObjectLock:
             with suppress(OSError), self._beating:
                 if self._released.is_set():
                     return
-                there = _record(self._path)
-                self._lost = there is not None and there.get("token") != self._token
-                if self._lost:
+                self._look()
+                if self._lost is not None:
                     return
                 self._path.put(self._content())
+
+    def _look(self) -> None:
+        """Note if the lock is that of another run, or gone: it is not put there again, for others may have written."""
+        there = _record(self._path)
+        if there is None:
+            self._lost = FolderRemovedError(self._folder)
+        elif there.get("token") != self._token:
+            self._lost = FolderInUseError(f"{self._folder} was taken over by another run while this one was silent")
 
     def _content(self) -> bytes:
         record = {"token": self._token, "host": socket.gethostname(), "pid": os.getpid(), "time": time.time()}

@@ -9,6 +9,23 @@ from __future__ import annotations
 from dataclasses import MISSING, fields
 from typing import Any, get_args, get_origin, get_type_hints
 
+from boulder_sweep.places import Place
+from boulder_sweep.store.errors import ImpossibleRecordsError
+
+_DEEPEST = 32
+"""Most levels of nested records; a settings file has fewer than ten."""
+IDENTITY = {
+    "settings": {"name": str, "inputs": dict, "model": dict, "criterion": dict, "solver": dict, "labels": dict},
+    "readings": dict,
+    "control": dict,
+    "accuracy": dict,
+    "versions": dict,
+    "settings_sha256": str,
+    "kernels_sha256": str,
+    "rules_sha256": str,
+}
+"""Kinds of the entries of an identity that are looked at by name."""
+
 
 def entries_of(record: type, what: str, content: Any, differing: list[str]) -> dict[str, Any]:
     """Return the entries of a record that are known, if all that are needed are there, with values of the right type.
@@ -46,6 +63,36 @@ def entries_of(record: type, what: str, content: Any, differing: list[str]) -> d
     differing += [f"{what}: {name} is unknown" for name in sorted(content.keys() - expected)]
     differing += [f"{what}: {name} is missing" for name in sorted(expected - needed - content.keys())]
     return {name: value for name, value in content.items() if name in expected}
+
+
+def is_deep(content: Any) -> bool:
+    """Whether records are nested so deeply that functions that call themselves could fail."""
+    level = [content]
+    for _ in range(_DEEPEST):
+        level = [
+            value
+            for one in level
+            if isinstance(one, dict | list)
+            for value in (one.values() if isinstance(one, dict) else one)
+        ]
+    return bool(level)
+
+
+def check_kinds(path: Place, what: str, content: Any, kinds: Any) -> None:
+    """Check the kinds of those nested entries that are looked at by name.
+
+    Raises
+    ------
+    ImpossibleRecordsError
+        One is of another kind.
+    """
+    if isinstance(kinds, type):
+        if not isinstance(content, kinds):
+            raise ImpossibleRecordsError(path, f"{what} that is {type(content).__name__}")
+        return
+    check_kinds(path, what, content, dict)
+    for name in kinds.keys() & content.keys():
+        check_kinds(path, f"{what}.{name}", content[name], kinds[name])
 
 
 def version_of(content: Any) -> str | None:

@@ -16,6 +16,7 @@ import boulder_sweep.cli
 from boulder_sweep.cli.main import execute
 from boulder_sweep.cli.output import ready_streams, say, show
 from boulder_sweep.text import printable
+from tests.store.folders import rewrite_records
 
 HOSTILE = [
     "\x1b]0;title\x07",
@@ -111,6 +112,31 @@ def test_a_folder_with_a_hostile_name_is_shown_escaped(sweep, possible_grid):
     code, out, _ = sweep("status", name)
     assert code == 0
     assert out.startswith("out\\x1b[31m\\nnext: finished")
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_what_a_stranger_has_written_into_a_manifest_is_shown_escaped(sweep, possible_grid, text):
+    assert sweep("run", possible_grid, "-o", "out")[0] == 0
+
+    def change(records):
+        records["resume_command"] = f"sweep run {text} -o out --resume"
+        records["sessions"][0].update(host=text, how=None, ended=None, command=text, cpu=text)
+        records["identity"]["settings"]["name"] = records["identity"]["versions"]["numba"] = text
+        records["parts"] = {}
+
+    rewrite_records(Path("out"), change)
+    for words in (
+        ("status", "out"),
+        ("run", possible_grid, "-o", "out", "--resume"),
+        ("run", possible_grid, "-o", "out"),
+    ):
+        code, out, err = sweep(*words)
+        assert code in (0, 4)
+        assert ALLOWED.fullmatch((out + err).replace("\n", ""))
+    rewrite_records(Path("out"), lambda records: records["parts"].update({text: 1}))
+    code, out, err = sweep("status", "out")
+    assert (code, out) == (4, "")
+    assert ALLOWED.fullmatch(err.replace("\n", ""))
 
 
 PULSE = Path(__file__).parents[2] / "docs" / "examples" / "rigid_wall_pulse.csv"

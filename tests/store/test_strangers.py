@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 from io import BytesIO
+from types import SimpleNamespace
 
 import pyarrow.parquet as pq
 import pytest
@@ -125,6 +126,29 @@ def test_a_lock_that_another_run_has_taken_keeps_parts_from_being_published(monk
             asleep.commit([staged])
         assert FIRST not in out.names()
         other.close("interrupted")
+
+
+def test_a_run_does_not_lock_again_what_another_has_finished_meanwhile(monkeypatch):
+    """It would publish its parts over those of the other before it noticed."""
+    with store():
+        out = place_of("faulty://bucket/out")
+        asleep = open_folder(out, identity=OTHER)
+        staged = asleep.stage(0, *_content(0))
+        monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)
+        other = open_folder(out, overwrite=True)
+        commit(other, 0)
+        other.close("finished")
+        with monkeypatch.context() as patch:
+            ends = iter([False, True])
+            patch.setattr(asleep._lock, "_released", SimpleNamespace(wait=lambda _: next(ends), is_set=lambda: False))
+            asleep._lock._beat()
+        before = (out / FIRST).read_bytes()
+        with pytest.raises(FolderRemovedError):
+            asleep.heartbeat()
+        with pytest.raises(FolderRemovedError):
+            asleep.commit([staged])
+        assert (out / FIRST).read_bytes() == before
+        assert "_lock" not in out.names()
 
 
 def test_a_folder_removed_during_a_run_is_called_that(tmp_path):
