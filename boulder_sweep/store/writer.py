@@ -77,6 +77,8 @@ class OutputFolder:
         self.path = path
         self._storage = storage
         self.manifest = manifest
+        self.rows_safe = manifest.rows_done
+        """Rows that the manifest on the storage records; that of this run may be ahead while it is being written."""
         self.damaged: dict[str, str] = {}
         """Parts found damaged when the folder was opened, and what was wrong; their rows count as missing."""
         self._lock = lock
@@ -135,6 +137,7 @@ class OutputFolder:
                 for name in names:
                     del self.manifest.parts[name]
                 raise
+            self.rows_safe = self.manifest.rows_done
 
     def merge(self, names: list[str], content: memoryview | bytes) -> None:
         """Replace neighbouring parts by one that holds the same rows.
@@ -235,7 +238,7 @@ class OutputFolder:
 
     def write_error(self, problem: OSError) -> errors.WriteError:
         """Describe why the folder cannot be written, and how to resume."""
-        done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
+        done = f"{self.rows_safe:,} of {self.manifest.rows:,} rows are safe"
         advice = "free some space and resume" if problem.errno in _NO_SPACE else "resume"
         return errors.WriteError(
             f"cannot write into {self.path}: {problem.strerror}. {done}; {advice} with: {self.manifest.resume_command}"
