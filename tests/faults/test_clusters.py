@@ -289,6 +289,27 @@ def test_whatever_dask_opens_here_is_bound_to_loopback(tmp_path):
     assert {address for address, _ in opened} == {"0100007F"}
 
 
+def test_a_cluster_of_this_process_ends_while_its_worker_computes():
+    """Dask would wait for half a minute, and tell of it in a traceback when the process ends."""
+    _may_end.clear()
+    cluster = backend.Cluster(1, None)
+    futures = [cluster.client.submit(_wait, pure=False) for _ in range(2)]
+    try:
+        wait_until(lambda: cluster.tasks_of(cluster.threads()) == {one.key for one in futures}, "it computes")
+        cluster.close()
+        assert cluster._local.status.name == "closed"
+    finally:
+        _may_end.set()
+
+
+_may_end = threading.Event()
+
+
+def _wait() -> None:
+    """Compute until it may end."""
+    _may_end.wait(HANG_GUARD_S)  # hang guard
+
+
 def _listening() -> set[tuple[str, str]]:
     """Addresses, in hexadecimal, and ports on which this process listens."""
     own = {link.readlink().name for link in Path("/proc/self/fd").iterdir() if link.is_symlink() and link.exists()}
