@@ -278,7 +278,6 @@ class ClusterWorkers(threading.Thread):
             with suppress(queue.Empty):
                 if self._receive(self._arrived.get(timeout=_LOOK_EVERY_S / 4)):
                     result = self._clock()
-            more = more or bool(self._again) or bool(self._suspects)
             now = self._clock()
             if now - looked > _LOOK_EVERY_S:
                 looked = now
@@ -289,6 +288,7 @@ class ClusterWorkers(threading.Thread):
                     self.messages.put(
                         Note(f"no result for {_QUIET_S:.0f} s from {len(self._workers)} workers; waiting")
                     )
+            more = more or bool(self._again) or bool(self._suspects)
 
     def _only(self) -> list[str] | None:
         """Return the workers that may get a task; None for all."""

@@ -91,6 +91,8 @@ def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
         part = work.computation.encoded(begin, pieces)
         if relayed:
             done.relayed.append(part._replace(content=bytes(part.content)))
+        elif not (folder / LOCK_NAME).exists():  # this worker hung, and the run has ended without it
+            break
         else:
             done.staged.append(stage(storage, work.table_rows, part.first, part.content, part.rows, part.verdicts))
     return done

@@ -110,9 +110,9 @@ def work_off(tmp_path, monkeypatch):
     """Run to the end on a cluster whose clock goes on by five seconds each time it is read; messages that came."""
     monkeypatch.setattr(backend, "hidden_name", lambda name: "", raising=False)  # that is the folder, which exists
 
-    def work(cluster, clock=None):
-        rows = ((first, first + SIZE) for first in range(0, ROWS, SIZE))
-        clock = clock or itertools.count(step=5.0).__next__
+    def work(cluster, rows=ROWS):
+        rows = ((first, first + SIZE) for first in range(0, rows, SIZE))
+        clock = itertools.count(step=5.0).__next__
         workers = ClusterWorkers(cluster, None, rows, SIZE, Folder(tmp_path), clock)
         workers.run()
         messages = []
@@ -166,6 +166,12 @@ def test_the_tasks_of_a_silent_worker_are_given_to_others(work_off):
     assert told == f"worker b is silent for 30 s; others get {len(theirs)} tasks"
     assert all(call.cancelled() for call in theirs)
     assert cluster.shared == [None, ["a"]], "what all tasks need is not fetched from the one that is silent"
+
+
+def test_the_last_tasks_of_all_are_given_to_others_too(work_off):
+    messages, problem = work_off(Workers("a", "b", hung="b"), rows=2 * SIZE)
+    assert problem is None
+    assert rows_of(messages) == [0, SIZE]
 
 
 def test_what_comes_of_a_task_that_was_given_away_is_not_used(work_off, monkeypatch):
