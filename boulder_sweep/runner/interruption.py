@@ -66,15 +66,20 @@ class Signals:
         """
         outcome: list[Result] = []
         problem: list[BaseException] = []
-        handing_over = threading.Lock()
-        too_late = False
+        deciding = [None]
+
+        def is_first() -> bool:
+            try:
+                deciding.pop()  # in one step: either the result is handed over, or the call is abandoned
+            except IndexError:
+                return False
+            return True
 
         def work() -> None:
             try:
                 result = function()
-                with handing_over:
-                    outcome.append(result)
-                if too_late:
+                outcome.append(result)
+                if not is_first():
                     undo(result)
             except BaseException as raised:
                 problem.append(raised)
@@ -87,11 +92,11 @@ class Signals:
             thread.join(_LOOK_EVERY_S)
             waits = self.answered or self._deferred > depth
             if self.caught is not None and not waits and thread.is_alive():
-                with handing_over:
-                    too_late = not outcome
-                if too_late:
-                    self._abandoned.append(thread)
-                    raise Interrupted(self.caught)
+                if not is_first():
+                    break
+                self._abandoned.append(thread)
+                raise Interrupted(self.caught)
+        thread.join()
         if problem:
             raise problem[0]
         return outcome[0]
