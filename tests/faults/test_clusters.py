@@ -239,7 +239,7 @@ def test_a_worker_that_comes_back_after_the_run_writes_nothing(tmp_path):
         def encoded(self, first, pieces):
             return EncodedPart(first, 10, b"late", {})
 
-    work = remote.Work("a run", Stopped(None, None, {}), 10, 10, str(tmp_path), 20, remote.fingerprint())
+    work = remote.Work("a run that has ended", Stopped(None, None, {}), 10, 10, str(tmp_path), 20, remote.fingerprint())
     assert remote.compute(work, 0, 10, relayed=False) == remote.Done([], [])
     assert list(tmp_path.iterdir()) == []
 
