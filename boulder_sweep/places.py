@@ -10,12 +10,13 @@ from __future__ import annotations
 import errno
 import io
 import os
+import queue
 import re
 import stat
-import time
+import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 from urllib.parse import unquote
 
 from boulder_sweep.errors import BoulderSweepError
@@ -26,9 +27,17 @@ _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.\-]*)://([^/?#]*)([^?#]*)(.*)", re.DOTA
 _SECRET_IN_URL = re.compile(r"""://([^/\s'"]*@)|(?<=[^\s'"])\?[^\s'"]+=[^\s'"]*""")
 _SECRET_NAME = re.compile("KEY|SECRET|TOKEN|PASSW|CREDENTIAL|CONNECTION_STRING")
 _SHORTEST_SECRET = 8
+_S3 = ("s3", "s3a")
 _TRIES = 4
 FIRST_WAIT_S = 0.2
 """Wait after the first failure of a request; three times longer after each one [s]."""
+REQUEST_S = 12.0
+"""How long to wait for the answer to a request, all tries together [s]; longer where much is sent or read."""
+_SLOWEST_BYTES_PER_S = 2.5e5
+_PART_BYTES = 1 << 24
+"""What a file that is read may hold, when its size is not known; a part is smaller."""
+_TRY_S = {"connect_timeout": 3, "read_timeout": 5, "retries": {"total_max_attempts": 1}}
+"""Limits of one try, as botocore names them [s]. Without them it tries for minutes by itself."""
 _FINAL = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError, PermissionError)
 """Answers of a store, not failures: trying again does not help."""
 
@@ -122,9 +131,9 @@ class RemotePath:
         kind = stat.S_IFDIR if found.get("type") == "directory" else stat.S_IFREG
         return RemoteStat(int(found.get("size") or 0), kind)
 
-    def read_bytes(self) -> bytes:
-        """Return the content of a file."""
-        return bytes(self._request(self._filesystem.cat_file, self._path))
+    def read_bytes(self, most: int = _PART_BYTES) -> bytes:
+        """Return the content of a file, of about as many bytes at most."""
+        return bytes(self._request(self._filesystem.cat_file, self._path, size=most))
 
     def open(self, mode: str = "r", encoding: str | None = None, newline: str | None = None) -> Any:
         """Open a file for reading; its content is fetched at once."""
@@ -156,7 +165,7 @@ class RemotePath:
             The name is taken; also after a first try whose answer was lost.
         """
         how = {"mode": "create"} if only_new else {}
-        self._request(self._filesystem.pipe_file, self._path, bytes(content), **how)
+        self._request(self._filesystem.pipe_file, self._path, bytes(content), size=len(content), **how)
 
     def copy_to(self, target: RemotePath) -> None:
         """Copy a file within the store."""
@@ -170,27 +179,52 @@ class RemotePath:
             if not missing_ok:
                 raise
 
-    def _request(self, request: Callable[..., Result], *arguments: Any, **options: Any) -> Result:
-        """Send a request, again if it fails.
+    def _request(self, request: Callable[..., Result], *arguments: Any, size: int = 0, **options: Any) -> Result:
+        """Send a request in a thread of its own, and wait for the answer; not for ever, for a store may be silent.
+
+        A request that is given up may still arrive.
 
         Raises
         ------
         OSError
             What the store answered, or the last failure.
         """
-        wait = FIRST_WAIT_S
-        for left in range(_TRIES - 1, -1, -1):
+        limit_s = REQUEST_S + size / _SLOWEST_BYTES_PER_S
+        answers: queue.SimpleQueue[tuple[Result | None, OSError | None]] = queue.SimpleQueue()
+        given_up = threading.Event()
+
+        def send() -> None:
             try:
-                return request(*arguments, **options)
-            except _FINAL as answer:
-                failure = OSError(answer.errno or _NUMBERS[_kind(answer)], harmless(answer))
-                break
-            except Exception as problem:  # file systems raise whatever their libraries raise
-                failure = OSError(getattr(problem, "errno", None) or errno.EIO, harmless(problem))
-            if left:
-                time.sleep(wait)
-                wait *= 3
-        raise failure from None
+                answers.put((_tried(lambda: request(*arguments, **options), given_up), None))
+            except OSError as failure:
+                answers.put((None, failure))
+
+        threading.Thread(target=send, name="request", daemon=True).start()
+        try:
+            answer, failure = answers.get(timeout=limit_s)
+        except queue.Empty:
+            given_up.set()
+            failure = OSError(errno.ETIMEDOUT, f"the store has not answered for {limit_s:.0f} s")
+        if failure is not None:
+            raise failure from None
+        return cast(Result, answer)
+
+
+def _tried(request: Callable[[], Result], given_up: threading.Event) -> Result:
+    """Send a request, again if it fails; raises as `RemotePath._request`."""
+    wait = FIRST_WAIT_S
+    for left in range(_TRIES - 1, -1, -1):
+        try:
+            return request()
+        except _FINAL as answer:
+            failure = OSError(answer.errno or _NUMBERS[_kind(answer)], harmless(answer))
+            break
+        except Exception as problem:  # file systems raise whatever their libraries raise
+            failure = OSError(getattr(problem, "errno", None) or errno.EIO, harmless(problem))
+        if left and given_up.wait(wait):
+            break
+        wait *= 3
+    raise failure from None
 
 
 Place = Path | RemotePath
@@ -274,10 +308,12 @@ def _filesystem(scheme: str, shown: str) -> Any:
         from fsspec.asyn import AsyncFileSystem
 
         kind = fsspec.get_filesystem_class(scheme)
-        fresh = {"use_listings_cache": False} if issubclass(kind, AsyncFileSystem) else {}
-        return fsspec.url_to_fs(shown, **fresh)[0]
+        options: dict[str, Any] = {"use_listings_cache": False} if issubclass(kind, AsyncFileSystem) else {}
+        if scheme in _S3:
+            options["config_kwargs"] = {**_TRY_S, **fsspec.config.conf.get(scheme, {}).get("config_kwargs", {})}
+        return fsspec.url_to_fs(shown, **options)[0]
     except ImportError as missing:
-        extra = "pip install 'boulder-sweep[s3]'" if scheme in ("s3", "s3a", "memory") else one_line(missing)
+        extra = "pip install 'boulder-sweep[s3]'" if scheme in (*_S3, "memory") else one_line(missing)
         raise PlaceError(f"{shown}: {scheme}:// needs another package: {extra}") from None
     except ValueError as unknown:
         raise PlaceError(f"{shown} cannot be opened: {one_line(unknown)}") from None

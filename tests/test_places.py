@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import pickle
+import threading
 from pathlib import Path
 
+import fsspec
 import pytest
 
+from boulder_sweep import places
 from boulder_sweep.places import PlaceError, RemotePath, beside, place_of
+from tests.waiting import HANG_GUARD_S, wait_until
 
 
 @pytest.mark.parametrize(
@@ -77,3 +81,31 @@ def test_a_url_behaves_like_a_path_and_can_be_sent():
 def test_files_made_from_a_result_lie_beside_it_or_here():
     assert beside(Path("runs/m30.sweep"), ".png") == Path("runs/m30.png")
     assert beside(place_of("memory://x/m30.sweep"), ".html") == Path("m30.html")
+
+
+def test_a_try_at_a_store_has_limits_of_its_own_and_other_options_stay(monkeypatch):
+    """Without them botocore tries for minutes by itself."""
+    monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"signature_version": "s3v4", "read_timeout": 9}})
+    config = place_of("s3://bucket/out")._filesystem.config_kwargs
+    assert config == {
+        "connect_timeout": 3,
+        "read_timeout": 9,
+        "retries": {"total_max_attempts": 1},
+        "signature_version": "s3v4",
+    }
+
+
+def test_a_request_that_is_given_up_is_not_tried_again(monkeypatch):
+    monkeypatch.setattr(places, "REQUEST_S", 0.05)  # no answer comes, however long it is
+    monkeypatch.setattr(places, "FIRST_WAIT_S", HANG_GUARD_S)  # hang guard
+    place, asked = place_of("memory://places/out"), []
+
+    def fail(path):
+        asked.append(path)
+        raise ConnectionResetError("not now")
+
+    monkeypatch.setattr(place._filesystem, "info", fail)
+    with pytest.raises(TimeoutError, match="the store has not answered for 0 s"):
+        place.stat()
+    wait_until(lambda: not [one for one in threading.enumerate() if one.name == "request"], "no thread is left")
+    assert len(asked) == 1

@@ -8,9 +8,10 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -18,7 +19,8 @@ from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostErr
 from boulder_sweep.runner.backends import FETCH_S
 from boulder_sweep.runner.computing import Computation, failed_rows
 from boulder_sweep.runner.messages import Computed, Ended, Message, Note
-from boulder_sweep.runner.remote import Done, Work, compute, fingerprint, other_versions_text, parts_of, received
+from boulder_sweep.runner.remote import Done, Work, check_fingerprints, compute, fingerprint, parts_of, received
+from boulder_sweep.runner.silence import Silence, answers, named, seen
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 from boulder_sweep.text import one_line
 
@@ -53,6 +55,8 @@ class Cluster:
     ----------
     dashboard : str or None
         Address of the dashboard, if there is one.
+    silent : set of str
+        Workers that did not answer at the beginning.
 
     Raises
     ------
@@ -65,6 +69,7 @@ class Cluster:
         self._levels: dict[str, int] = {}
         self._local: Any = None
         self.client: Any = None
+        self.silent: set[str] = set()
         try:
             self.client = self._connected(jobs, scheduler, dashboard or _LOOPBACK)
             port = self.client.scheduler_info()["services"].get("dashboard")
@@ -98,7 +103,8 @@ class Cluster:
             raise BackendError(f"no Dask scheduler answers at {scheduler}: {one_line(problem)}") from problem
         try:
             _wait_for_a_worker(client, scheduler)
-            _check_versions(client)
+            found, self.silent = answers(client, fingerprint, CONNECT_S)
+            check_fingerprints(found)
         except TimeoutError as silence:
             client.close(timeout=2)
             raise ClusterLostError(f"the connection to the Dask scheduler at {scheduler} was lost") from silence
@@ -115,8 +121,24 @@ class Cluster:
         ClusterLostError
             The scheduler does not answer.
         """
+        return dict(self._asked(self.client.scheduler.ncores))
+
+    def last_seen(self) -> dict[str, float]:
+        """Return when the scheduler last heard of every worker, by its own clock [s]; raises as `threads`."""
+        return seen(self._asked(self.client.scheduler.identity))
+
+    def tasks_of(self, workers: Collection[str]) -> set[str]:
+        """Return the keys of the tasks that workers have, and of the results that they hold; raises as `threads`."""
+        found: set[str] = set()
+        for question in (self.client.scheduler.processing, self.client.scheduler.has_what):
+            for worker, keys in self._asked(question).items():
+                found.update(keys if worker in workers else ())
+        return found
+
+    def _asked(self, question: Callable[[], Any]) -> Any:
+        """Ask the scheduler."""
         try:
-            return dict(self.client.sync(self.client.scheduler.ncores, callback_timeout=CONNECT_S))
+            return self.client.sync(question, callback_timeout=CONNECT_S)
         except (OSError, AttributeError, TimeoutError) as problem:
             raise ClusterLostError(self.lost_text()) from problem
 
@@ -125,11 +147,15 @@ class Cluster:
         return f"the connection to the Dask scheduler at {self.address or 'this process'} was lost"
 
     def close(self) -> None:
-        """Disconnect; a cluster of this process ends."""
-        for part in (self.client, self._local):
-            if part is not None:
-                with suppress(Exception):  # a scheduler that died cannot be told
-                    part.close(timeout=2)
+        """Disconnect; a cluster of this process ends, and does not wait for what its worker computes."""
+        ends = [] if self.client is None else [partial(self.client.close, timeout=2)]
+        if self._local is not None:
+            wait = {"timeout": 2, "executor_wait": False, "callback_timeout": 2}
+            ends += [partial(self._local.sync, worker.close, **wait) for worker in self._local.workers.values()]
+            ends.append(partial(self._local.close, timeout=2))
+        for end in ends:
+            with suppress(Exception):  # a scheduler that died cannot be told
+                end()
         for name, level in self._levels.items():
             logging.getLogger(name).setLevel(level)
 
@@ -145,6 +171,8 @@ class _Task:
     """Whether no other task is in flight with it, so that it is the one that ends its worker."""
     relayed: bool = False
     """Whether the bytes come back through the scheduler, because the worker cannot write into the folder."""
+    only: frozenset[str] = frozenset()
+    """The workers that it was given to; empty for any."""
 
 
 class ClusterWorkers(threading.Thread):
@@ -162,6 +190,8 @@ class ClusterWorkers(threading.Thread):
         Rows that a worker computes at once.
     folder
         Where parts are staged, by the workers if they share it.
+    clock
+        Gives the time [s].
     """
 
     def __init__(
@@ -171,6 +201,7 @@ class ClusterWorkers(threading.Thread):
         tasks: Iterator[tuple[int, int]],
         rows_per_block: int,
         folder: OutputFolder,
+        clock: Callable[[], float] = time.monotonic,
     ):
         super().__init__(name="workers", daemon=True)
         self.messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
@@ -188,7 +219,14 @@ class ClusterWorkers(threading.Thread):
         """Futures in flight whose result was lost with its worker before it was received."""
         self._fetch_s = FETCH_S
         self._stopped = threading.Event()
+        self._clock = clock
+        self._there: dict[str, int] = {}
         self._workers: dict[str, int] = {}
+        """Those of `_there` that are not silent."""
+        self._silence = Silence(cluster)
+        self._share: Callable[[], Any] = lambda: None
+        """Sends what all tasks have in common to a worker."""
+        self._shared: Any = None
         self._without_worker_since: float | None = None
 
     def stop(self) -> None:
@@ -222,21 +260,23 @@ class ClusterWorkers(threading.Thread):
             manifest.rows,
             fingerprint(),
         )
-        shared = self._cluster.client.submit(received, work, pure=False)
-        looked = result = time.monotonic()
+        self._share = lambda: self._cluster.client.submit(received, work, workers=self._only(), pure=False)
+        looked = result = self._clock()
         self._look_at_workers()
+        self._shared = self._share()
+        if self._silence.silent:
+            self.messages.put(Note(f"{named(self._silence.silent)} silent, and not given any tasks"))
         more = True
         while (more or self._in_flight) and not self._stopped.is_set():
             if self._suspects:
-                if not self._in_flight:
-                    self._submit(shared, self._suspects.popleft())
+                if not self._in_flight and self._workers:
+                    self._submit(self._suspects.popleft())
             elif not any(task.alone for task in self._in_flight.values()):
-                more = self._submit_some(shared)
+                more = self._submit_some()
             with suppress(queue.Empty):
                 if self._receive(self._arrived.get(timeout=_LOOK_EVERY_S / 4)):
-                    result = time.monotonic()
-            more = more or bool(self._again) or bool(self._suspects)
-            now = time.monotonic()
+                    result = self._clock()
+            now = self._clock()
             if now - looked > _LOOK_EVERY_S:
                 looked = now
                 self._look_at_workers()
@@ -246,30 +286,40 @@ class ClusterWorkers(threading.Thread):
                     self.messages.put(
                         Note(f"no result for {_QUIET_S:.0f} s from {len(self._workers)} workers; waiting")
                     )
+            more = more or bool(self._again) or bool(self._suspects)
 
-    def _submit_some(self, shared: Any) -> bool:
+    def _only(self) -> list[str] | None:
+        """Return the workers that may get a task; None for all."""
+        return sorted(self._workers) if self._silence.silent else None
+
+    def _submit_some(self) -> bool:
         """Submit tasks until every thread has some; False if there are no more."""
         while len(self._in_flight) < _TASKS_PER_THREAD * sum(self._workers.values()):
             task = self._again.popleft() if self._again else next(self._tasks, None)
             if task is None:
                 return False
-            self._submit(shared, task)
+            self._submit(task)
         return True
 
-    def _submit(self, shared: Any, task: _Task) -> None:
+    def _submit(self, task: _Task) -> None:
         """Hand a task to the scheduler."""
-        future = self._cluster.client.submit(compute, shared, task.start, task.stop, task.relayed, pure=False)
-        self._in_flight[future] = task
+        only = self._only()
+        future = self._cluster.client.submit(
+            compute, self._shared, task.start, task.stop, task.relayed, workers=only, pure=False
+        )
+        self._in_flight[future] = replace(task, only=frozenset(only or ()))
         future.add_done_callback(self._arrived.put)
 
     def _expect_lost(self) -> None:
         """Wait again for lost results; Dask calls back at once for those that are still lost."""
         lost, self._lost = self._lost, []
-        for future in lost:
+        for future in self._in_flight.keys() & lost:
             future.add_done_callback(self._arrived.put)
 
     def _receive(self, future: Any) -> bool:
         """Pass a result on, or retry; False where the result has not come, and is still waited for."""
+        if future not in self._in_flight:  # submitted again meanwhile
+            return False
         if future.cancelled():  # as all are when the connection breaks
             raise ClusterLostError(self._cluster.lost_text())
         if not future.done():
@@ -330,21 +380,36 @@ class ClusterWorkers(threading.Thread):
             self._accept(task, Done([], [part]))
 
     def _look_at_workers(self) -> None:
-        """Notice workers that came and went."""
-        before, self._workers = self._workers, self._cluster.threads()
-        lost = before.keys() - self._workers.keys()
+        """Notice workers that came and went, and those that are silent."""
+        before, self._there = self._there, self._cluster.threads()
+        now = self._clock()
+        silent = self._silence.silent
+        again = self._silence.look(now, {future: task.only for future, task in self._in_flight.items()})
+        self._workers = {worker: n for worker, n in self._there.items() if worker not in self._silence.silent}
+        lost = before.keys() - self._there.keys()
         if lost:
             self.messages.put(
                 Note(f"lost worker {', '.join(sorted(lost))}; its tasks are computed again, {len(self._workers)} left")
             )
+        for note in self._silence.notes:
+            self.messages.put(Note(note))
+        if self._silence.silent != silent:
+            self._shared = (
+                self._share()
+            )  # the old one may lie on a worker that is silent, or be bound to those that were not
+            self._fetch_s = FETCH_S
+        for future in again:
+            task = self._in_flight.pop(future)
+            (self._suspects if task.alone else self._again).append(task)
+            future.release()
         if self._workers:
             self._without_worker_since = None
-            return
-        now = time.monotonic()
-        if self._without_worker_since is None:
+        elif self._without_worker_since is None:
             self._without_worker_since = now
             self.messages.put(Note(f"no worker left; waiting {NO_WORKER_S:.0f} s for another"))
         elif now - self._without_worker_since > NO_WORKER_S:
+            if self._there:
+                raise ClusterLostError(f"{named(self._there)} silent, and there is no other")
             raise ClusterLostError(_no_worker_text(self._cluster.address))
 
 
@@ -362,21 +427,6 @@ def _wait_for_a_worker(client: Any, address: str) -> None:
         work.release()
     except TimeoutError:
         raise BackendError(_no_worker_text(address)) from None
-
-
-def _check_versions(client: Any) -> None:
-    """Refuse workers whose rows could differ from those of this machine; one that leaves meanwhile does not matter."""
-    here, different = fingerprint(), []
-    # What `client.run` does, but for the limit of time: a scheduler may hang just now.
-    found = client.sync(client._run, fingerprint, on_error="return", callback_timeout=CONNECT_S)
-    for address, there in found.items():
-        if isinstance(there, Exception):
-            if not isinstance(there, OSError):
-                raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")
-        elif tuple(there) != here:
-            different.append(address)
-    if different:
-        raise BackendError(other_versions_text(f"the workers {', '.join(different)}"))
 
 
 def _no_worker_text(address: str | None) -> str:

@@ -1,4 +1,4 @@
-"""Records staged parts in the manifest, in the order of the designs, while others are computed."""
+"""Records staged parts in the manifest, if possible in the order of the designs, while others are computed."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 COMMIT_SHARE = 0.02
 """Share of one processor that writing manifests may take."""
+GAP_S = 30.0
+"""How long parts wait for the one before them, which may never come, before they are committed without it [s]."""
 
 
 class Committer(threading.Thread):
@@ -56,6 +58,9 @@ class Committer(threading.Thread):
         self._work_clock = work_clock
         self._arrived: queue.SimpleQueue[StagedPart | None] = queue.SimpleQueue()
         self._waiting: dict[int, StagedPart] = {}
+        self._early: dict[int, int] = {}
+        """First row, and the row after the last, of parts committed before those in front of them."""
+        self._gap_until = math.inf
         self._missing = folder.manifest.missing()
         self._next = self._end = -1
         self._open_next()
@@ -97,21 +102,37 @@ class Committer(threading.Thread):
         """
         while True:
             due = self._rest_until - self._clock()
+            if self._next in self._waiting:
+                self._gap_until = math.inf
+            elif self._waiting:
+                self._gap_until = min(self._gap_until, self._clock() + GAP_S)
+                due = self._gap_until - self._clock()
             try:
-                return self._arrived.get(timeout=max(due, 0.0) if self._next in self._waiting else None)
+                return self._arrived.get(timeout=max(due, 0.0) if self._waiting else None)
             except queue.Empty:
                 begun = self._work_clock()
-                self._commit()
+                all_there = self._clock() >= self._gap_until
+                self._commit(all_there)
+                if all_there:
+                    self._gap_until = math.inf
                 self._rest_until = self._clock() + (self._work_clock() - begun) / COMMIT_SHARE
 
-    def _commit(self) -> None:
-        """Commit the parts that continue the table."""
+    def _commit(self, all_there: bool = False) -> None:
+        """Commit the parts that continue the table, or all that are there."""
         ready = []
-        while (staged := self._waiting.pop(self._next, None)) is not None:
-            ready.append(staged)
-            self._next = staged.part.stop
+        while self._next in self._waiting or self._next in self._early:
+            if self._next in self._early:
+                self._next = self._early.pop(self._next)
+            else:
+                ready.append(self._waiting.pop(self._next))
+                self._next = ready[-1].part.stop
             if self._next == self._end:
                 self._open_next()
+        if all_there:
+            early = [self._waiting[first] for first in sorted(self._waiting)]
+            self._early |= {staged.part.first: staged.part.stop for staged in early}
+            self._waiting.clear()
+            ready += early
         if ready:
             self._folder.commit(ready)
 

@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -22,6 +23,8 @@ from boulder_sweep.errors import Interrupted
 Result = TypeVar("Result")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _LOOK_EVERY_S = 0.05
+LAST_S = 3.0
+"""How long a run that ends waits for what it does last, such as closing its folder [s]."""
 
 
 class Signals:
@@ -46,20 +49,38 @@ class Signals:
         if self.caught is not None:
             raise Interrupted(self.caught)
 
-    def call(self, function: Callable[[], Result]) -> Result:
+    def call(self, function: Callable[[], Result], undo: Callable[[Result], Any] = lambda result: None) -> Result:
         """Call a function in a thread of its own, and return what it returns or raise what it raises.
+
+        Parameters
+        ----------
+        function
+            What to call.
+        undo
+            What to do with a result that comes after a signal.
 
         Raises
         ------
         Interrupted
-            A signal arrived. The function goes on until the process ends, and its result is ignored.
+            A signal arrived. The function goes on until the process ends, and its result is undone.
         """
         outcome: list[Result] = []
         problem: list[BaseException] = []
+        deciding = [None]
+
+        def is_first() -> bool:
+            try:
+                deciding.pop()  # in one step: either the result is handed over, or the call is abandoned
+            except IndexError:
+                return False
+            return True
 
         def work() -> None:
             try:
-                outcome.append(function())
+                result = function()
+                outcome.append(result)
+                if not is_first():
+                    undo(result)
             except BaseException as raised:
                 problem.append(raised)
 
@@ -71,11 +92,35 @@ class Signals:
             thread.join(_LOOK_EVERY_S)
             waits = self.answered or self._deferred > depth
             if self.caught is not None and not waits and thread.is_alive():
+                if not is_first():
+                    break
                 self._abandoned.append(thread)
                 raise Interrupted(self.caught)
+        thread.join()
         if problem:
             raise problem[0]
         return outcome[0]
+
+    def attempt(self, *functions: Callable[[], object], hurry: bool) -> None:
+        """Call functions in threads of their own, and wait until they have ended, but not for ever.
+
+        Parameters
+        ----------
+        functions
+            What to call, such as what asks a store that may be silent; they must not raise.
+        hurry
+            Whether to wait for `LAST_S` only, as after a signal. They then go on until the process ends.
+        """
+        threads = [threading.Thread(target=function, name="last work", daemon=True) for function in functions]
+        for thread in threads:
+            thread.start()
+        while not hurry and self.caught is None and any(thread.is_alive() for thread in threads):
+            for thread in threads:
+                thread.join(_LOOK_EVERY_S)
+        end = time.monotonic() + LAST_S
+        for thread in threads:
+            thread.join(max(end - time.monotonic(), 0.0))
+        self._abandoned += [thread for thread in threads if thread.is_alive()]
 
     @contextmanager
     def deferred(self) -> Iterator[None]:

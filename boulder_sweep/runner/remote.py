@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from boulder_sweep.errors import BackendError
 from boulder_sweep.places import place_of
@@ -13,6 +14,7 @@ from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.store.lock import LOCK_NAME
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.writer import StagedPart, stage
+from boulder_sweep.text import one_line
 
 Fingerprint = tuple[dict[str, str], str, str]
 _prepared: set[str] = set()
@@ -48,6 +50,30 @@ def fingerprint() -> Fingerprint:
     return versions(), kernels_sha256(), rules_sha256()
 
 
+def check_fingerprints(found: Mapping[str, Any]) -> None:
+    """Refuse workers whose rows could differ from those of this machine; one that leaves meanwhile does not matter.
+
+    Parameters
+    ----------
+    found
+        What every worker has answered to `fingerprint`, or the exception.
+
+    Raises
+    ------
+    BackendError
+        Names them.
+    """
+    here, different = fingerprint(), []
+    for address, there in found.items():
+        if isinstance(there, Exception):
+            if not isinstance(there, OSError):
+                raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")
+        elif tuple(there) != here:
+            different.append(address)
+    if different:
+        raise BackendError(other_versions_text(f"the workers {', '.join(different)}"))
+
+
 def received(work: Work) -> Work:
     """Hold the work on a worker, from which the others fetch it; repeated if that worker is lost."""
     return work
@@ -66,6 +92,8 @@ def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
         part = work.computation.encoded(begin, pieces)
         if relayed:
             done.relayed.append(part._replace(content=bytes(part.content)))
+        elif not (folder / LOCK_NAME).exists():  # this worker hung, and the run has ended without it
+            break
         else:
             staged = stage(storage, work.name, work.table_rows, part.first, part.content, part.rows, part.verdicts)
             done.staged.append(staged)

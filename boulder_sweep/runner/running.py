@@ -7,6 +7,8 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import BackendError, ClusterLostError
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 Report = Callable[[Progress], None]
 """Called with the progress."""
+FINISHED = "finished"
 _LOOK_EVERY_S = 0.1
 _PATIENCE_S = 0.6
 """How long an interrupted run waits for what is being written."""
@@ -79,8 +82,8 @@ class Run:
         self.jobs = jobs
         try:
             if backend == DASK:
-                self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler, dashboard))
-                self.jobs = max(sum(self._cluster.threads().values()), 1)
+                self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler, dashboard), Cluster.close)
+                self.jobs = max(sum(self._signals.call(self._cluster.threads).values()), 1)
                 self.manifest.sessions[-1].jobs = self.jobs
             self.firmness = self._signals.call(lambda: firmness_of(self._sweep).to_dict())
             identity, command = self._folder.manifest.identity, repeat_command(self._sweep)
@@ -91,7 +94,7 @@ class Run:
                 if objections and not force:
                     raise DoesNotFitError("; ".join(objections) + ". Use --force to run anyway")
         except BaseException:
-            self._folder.discard()
+            self._discard()
             raise
 
     def compute(self, progress: Report | None, commit_every_s: float) -> None:
@@ -123,7 +126,7 @@ class Run:
             _join(committer, patience)
             without_workers = isinstance(stop, BackendError) and not isinstance(stop, ClusterLostError)
             if without_workers or start_failure(stop, self.jobs):
-                self._folder.discard()  # unless something was written, there is nothing to resume
+                self._discard()  # unless something was written, there is nothing to resume
             raise
 
     def end(self, how: str) -> int:
@@ -132,17 +135,28 @@ class Run:
         Parameters
         ----------
         how
-            ``finished``, or what stopped the run.
+            `FINISHED`, or what stopped the run.
 
         Returns
         -------
         int
             Rows that are safe.
         """
-        self._folder.close(how)
-        if self._cluster is not None:
-            self._cluster.close()
-        return self._folder.manifest.rows_done
+        last: list[Callable[[], None]] = [] if self._cluster is None else [self._cluster.close]
+        if isinstance(self._folder.path, Path):
+            self._folder.close(how)
+        else:
+            last.append(partial(self._folder.close, how))
+        if last:
+            self._signals.attempt(*last, hurry=how != FINISHED)
+        return self._folder.rows_safe
+
+    def _discard(self) -> None:
+        """Release the folder and remove all traces, but do not wait for a silent store."""
+        if isinstance(self._folder.path, Path):
+            self._folder.discard()
+        else:
+            self._signals.attempt(self._folder.discard, hurry=True)
 
     def _estimated(self) -> Estimate:
         """Estimate what the missing rows need, from a sample."""

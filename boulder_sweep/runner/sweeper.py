@@ -8,6 +8,7 @@ What the table holds depends on the settings alone, not on workers, blocks, spee
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,11 +23,11 @@ from boulder_sweep.runner.commands import repeat_command
 from boulder_sweep.runner.commands import resume_command as default_resume_command
 from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample
 from boulder_sweep.runner.interruption import noted_signals
-from boulder_sweep.runner.running import Report, Run
+from boulder_sweep.runner.running import FINISHED, Report, Run
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.store.errors import NotASweepError
 from boulder_sweep.store.manifest import Manifest, check_own, load
-from boulder_sweep.store.opening import claim_output
+from boulder_sweep.store.opening import ClaimedFolder, claim_output
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.writer import ROWS_PER_PART
 
@@ -120,11 +121,19 @@ def run(
     again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
     jobs = jobs or available_cores()
     with noted_signals() as signals, signals.deferred():
-        claimed = claim_output(out, resume=resume, overwrite=overwrite)
+        # A store may be silent, and a signal must end the run all the same: only threads of their own wait for it.
+        remote = isinstance(out, RemotePath)
+        claim = partial(claim_output, out, resume=resume, overwrite=overwrite)
+        claimed = signals.call(claim, ClaimedFolder.release) if remote else claim()
         whole: Run | None = None
 
         def ended(how: str) -> int:
-            return claimed.release() if whole is None else whole.end(how)
+            if whole is not None:
+                return whole.end(how)
+            if remote:
+                signals.attempt(claimed.release, hurry=True)
+                return claimed.rows_done
+            return claimed.release()
 
         try:
             if not force:
@@ -138,7 +147,9 @@ def run(
                 again,
             )
             session = new_session(command or "boulder_sweep.run", jobs, backend)
-            whole = Run(sweep, evaluation, claimed.open(manifest, session), signals)
+            begin = partial(claimed.open, manifest, session)
+            folder = signals.call(begin, lambda late: late.close("interrupted")) if remote else begin()
+            whole = Run(sweep, evaluation, folder, signals)
             whole.prepare(backend, jobs, scheduler, dashboard, force)
             whole.compute(progress, commit_every_s)
         except Interrupted as stop:
@@ -153,7 +164,7 @@ def run(
             if not isinstance(problem, BoulderSweepError) and (failure := start_failure(problem, jobs)):
                 raise failure from problem
             raise
-        whole.end("finished")
+        whole.end(FINISHED)
     return summary_of(
         out,
         whole.manifest,

@@ -19,8 +19,7 @@ from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, Sto
 from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, LOCK_NAME
 
 _PROBE = "_probe-"
-_PATIENCE_S = 0.3
-"""How long a run that ends waits for a heartbeat that is being sent; its lock is then that of a dead run [s]."""
+_RECORD_BYTES = 1000
 
 
 class ObjectLock:
@@ -49,7 +48,6 @@ class ObjectLock:
         self._folder, self._path, self._token = folder, folder / LOCK_NAME, token
         self._lost: StoreError | None = None
         self._released = threading.Event()
-        self._beating = threading.Lock()
         there = _record(self._path)
         if there is not None and _is_alive(there):
             raise FolderInUseError(_in_use_text(folder, holder, there))
@@ -57,7 +55,8 @@ class ObjectLock:
             self._path.put(self._content(), only_new=only_new and there is None)
         if (_record(self._path) or {}).get("token") != token:
             raise FolderInUseError(f"{folder} is being written by {holder}")
-        threading.Thread(target=self._beat, name="heartbeat", daemon=True).start()
+        self._heart = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
+        self._heart.start()
 
     def check(self) -> None:
         """Look whether the lock is still held.
@@ -86,26 +85,21 @@ class ObjectLock:
             raise self._lost
 
     def release(self) -> None:
-        """Release the lock; may be called twice."""
-        if self._released.is_set():
-            return
+        """Release the lock; may be called twice. If the store does not answer, it is that of a dead run."""
         self._released.set()
-        if not self._beating.acquire(timeout=_PATIENCE_S):
-            return  # a heartbeat is under way, and would leave a new lock behind
-        with suppress(OSError):
-            if (_record(self._path) or {}).get("token") == self._token:
-                self._path.unlink(missing_ok=True)
+        self._heart.join()
 
     def _beat(self) -> None:
-        """Renew the lock until it is released or taken."""
+        """Renew the lock until it is released or taken; remove it then, so that no late heartbeat leaves a new one."""
         while not self._released.wait(HEARTBEAT_S):
-            with suppress(OSError), self._beating:
-                if self._released.is_set():
-                    return
+            with suppress(OSError):
                 self._look()
                 if self._lost is not None:
                     return
                 self._path.put(self._content())
+        with suppress(OSError):
+            if (_record(self._path) or {}).get("token") == self._token:
+                self._path.unlink(missing_ok=True)
 
     def _look(self) -> None:
         """Note if the lock is that of another run, or gone: it is not put there again, for others may have written."""
@@ -164,7 +158,7 @@ def refuses_existing(folder: RemotePath, token: str) -> bool:
 def _record(path: RemotePath) -> dict[str, Any] | None:
     """Return what a lock says; None if there is no lock."""
     try:
-        found = json.loads(path.read_bytes())
+        found = json.loads(path.read_bytes(_RECORD_BYTES))
     except FileNotFoundError:
         return None
     except (ValueError, RecursionError):

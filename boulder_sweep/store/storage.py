@@ -8,9 +8,10 @@ temporary name and copied to the final one within the store, and the manifest is
 from __future__ import annotations
 
 import os
+import queue
+import threading
 import uuid
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from stat import S_ISREG
@@ -255,6 +256,25 @@ class ObjectStorage:
 
     def _each(self, act: Callable[[str], Any], names: Iterable[str]) -> None:
         """Send requests for several files at the same time."""
-        with ThreadPoolExecutor(_REQUESTS) as pool:
-            for _ in pool.map(act, names):
-                pass
+        waiting = queue.SimpleQueue[str]()
+        done: queue.SimpleQueue[BaseException | None] = queue.SimpleQueue()
+        for name in names:
+            waiting.put(name)
+
+        def work() -> None:
+            with suppress(queue.Empty):
+                while True:
+                    name = waiting.get_nowait()
+                    try:
+                        act(name)
+                    except BaseException as problem:
+                        done.put(problem)
+                    else:
+                        done.put(None)
+
+        count = waiting.qsize()
+        for _ in range(min(count, _REQUESTS)):  # not those of a pool: Python would wait for them at its end
+            threading.Thread(target=work, name="requests", daemon=True).start()
+        for problem in [done.get() for _ in range(count)]:
+            if problem is not None:
+                raise problem

@@ -92,6 +92,8 @@ class OutputFolder:
         self.manifest = manifest
         self.token = secrets.token_hex(8)
         """New for every opening, and known to its workers only."""
+        self.rows_safe = manifest.rows_done
+        """Rows that the manifest on the storage records; that of this run may be ahead while it is being written."""
         self.damaged: dict[str, str] = {}
         """Parts found damaged when the folder was opened, and what was wrong; their rows count as missing."""
         self._lock = lock
@@ -166,6 +168,7 @@ class OutputFolder:
                 for one in staged:
                     del self.manifest.parts[one.name]
                 raise
+            self.rows_safe = self.manifest.rows_done
 
     def merge(self, names: list[str], content: memoryview | bytes) -> None:
         """Replace neighbouring parts by one that holds the same rows.
@@ -276,7 +279,7 @@ class OutputFolder:
         """Describe why the folder cannot be written, and how to resume."""
         if problem.errno == errno.ENOENT and isinstance(self.path, Path) and not self.path.exists():
             return errors.FolderRemovedError(self.path)
-        done = f"{self.manifest.rows_done:,} of {self.manifest.rows:,} rows are safe"
+        done = f"{self.rows_safe:,} of {self.manifest.rows:,} rows are safe"
         advice = "free some space and resume" if problem.errno in NO_SPACE else "resume"
         return errors.WriteError(
             f"cannot write into {self.path}: {problem.strerror}. {done}; {advice} with: {self.manifest.resume_command}"

@@ -36,6 +36,10 @@ class S3Server:
         }
         return self
 
+    def send(self, number: int) -> None:
+        """Send a signal to it, such as one that lets it hang."""
+        self._process.send_signal(number)
+
     def __exit__(self, *_: object) -> None:
         self._process.kill()
         self._process.communicate()

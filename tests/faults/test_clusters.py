@@ -19,9 +19,10 @@ from distributed import Future, LocalCluster
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner import remote
-from boulder_sweep.runner.computing import Computation
+from boulder_sweep.runner.computing import Computation, EncodedPart
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
+from boulder_sweep.store.lock import LOCK_NAME
 from boulder_sweep.store.reader import read_table
 from tests.faults import faulty
 from tests.faults.clusters import Cluster
@@ -227,6 +228,54 @@ def test_an_adaptive_cluster_starts_workers_for_a_run(tmp_path):
     assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
 
 
+def test_a_worker_that_comes_back_after_the_run_writes_nothing(tmp_path):
+    """It was stopped while it computed."""
+    (tmp_path / LOCK_NAME).touch()
+
+    class Stopped(Computation):
+        def judged(self, start, stop, tries=1):
+            (tmp_path / LOCK_NAME).unlink()
+
+        def encoded(self, first, pieces):
+            return EncodedPart(first, 10, b"late", {})
+
+    work = remote.Work("a run that has ended", Stopped(None, None, {}), 10, 10, str(tmp_path), 20, remote.fingerprint())
+    assert remote.compute(work, 0, 10, relayed=False) == remote.Done([], [])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.nightly
+def test_a_worker_that_hangs_is_named_and_others_get_its_tasks(tmp_path):
+    """It comes back when others have computed them, and does no harm."""
+    rows, how = 40_000, {"rows_per_part": 2000, "simulate": plausible}
+    with Cluster(2, tmp_path) as cluster:
+        stopped, told = cluster.workers[0], []
+
+        def progress(now):
+            if not told:
+                stopped.send_signal(signal.SIGSTOP)
+            elif any("is silent for 30 s; others get" in note for note in now.notes):
+                stopped.send_signal(signal.SIGCONT)
+            told.append(now)
+
+        dask = {"backend": "dask", "scheduler": cluster.address}
+        run(grid_of(rows), tmp_path / "out", progress=progress, **dask, **how)
+        assert any("is silent for 30 s; others get" in note for note in told[-1].notes)
+        assert stopped.poll() is None
+    run(grid_of(rows), tmp_path / "whole", **how)
+    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+
+
+@pytest.mark.nightly
+def test_a_new_run_does_not_wait_for_a_worker_that_hangs(tmp_path, monkeypatch):
+    monkeypatch.setattr(backend, "CONNECT_S", 10.0)
+    with Cluster(2, tmp_path) as cluster:
+        cluster.workers[0].send_signal(signal.SIGSTOP)
+        dask = {"backend": "dask", "scheduler": cluster.address, "simulate": plausible}
+        summary = run(grid_of(2000), tmp_path / "out", rows_per_part=500, **dask)
+    assert any("is silent, and not given any tasks" in note for note in summary.notes)
+
+
 def test_a_worker_makes_itself_ready_once_and_refuses_other_versions():
     calls, begun = [], []
 
@@ -287,6 +336,27 @@ def test_whatever_dask_opens_here_is_bound_to_loopback(tmp_path):
         cluster.close()
     assert opened
     assert {address for address, _ in opened} == {"0100007F"}
+
+
+def test_a_cluster_of_this_process_ends_while_its_worker_computes():
+    """Dask would wait for half a minute, and tell of it in a traceback when the process ends."""
+    _may_end.clear()
+    cluster = backend.Cluster(1, None)
+    futures = [cluster.client.submit(_wait, pure=False) for _ in range(2)]
+    try:
+        wait_until(lambda: cluster.tasks_of(cluster.threads()) == {one.key for one in futures}, "it computes")
+        cluster.close()
+        assert cluster._local.status.name == "closed"
+    finally:
+        _may_end.set()
+
+
+_may_end = threading.Event()
+
+
+def _wait() -> None:
+    """Compute until it may end."""
+    _may_end.wait(HANG_GUARD_S)  # hang guard
 
 
 def _listening() -> set[tuple[str, str]]:

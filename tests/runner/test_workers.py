@@ -16,7 +16,7 @@ from boulder_sweep.judge.judged import Judged, not_computed
 from boulder_sweep.runner.admission import Admission
 from boulder_sweep.runner.assembly import Assembly
 from boulder_sweep.runner.backends import check_backend
-from boulder_sweep.runner.committer import COMMIT_SHARE, Committer
+from boulder_sweep.runner.committer import COMMIT_SHARE, GAP_S, Committer
 from boulder_sweep.runner.computing import Computation, EncodedPart
 from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.runner.messages import Computed, Ended
@@ -288,6 +288,43 @@ def test_a_large_manifest_is_written_seldom():
     assert commits.get() == 10
     assert commits.empty()
     assert writer.problem is None
+
+
+@pytest.mark.parametrize("first_comes", [True, False])
+def test_parts_do_not_wait_for_ever_for_the_one_before_them(first_comes):
+    """As where it is with a worker that hangs. What has come is committed, and the rest when it comes."""
+    folder, commits, now = Folder(100, 10), queue.SimpleQueue(), [0.0]
+    folder.commit = lambda staged: (Folder.commit(folder, staged), commits.put([one.part.first for one in staged]))
+    writer = Committer(folder, Recorder(good, Rows, {}), Admission(10**9), tuple, lambda: now[0], lambda: 0.0)
+
+    def put(*firsts):
+        for first in firsts:
+            writer.put(folder.stage(first, b"", 10, {"pieces": []}))
+
+    writer.start()
+    put(0)
+    assert commits.get(timeout=HANG_GUARD_S) == [0]  # hang guard
+    put(30, 20, 60)
+    wait_until(lambda: len(writer._waiting) == 3, "all have arrived")
+    now[0] = 0.99 * GAP_S
+    put(40)
+    wait_until(lambda: len(writer._waiting) == 4, "it has arrived")
+    assert commits.empty()
+    now[0] = 1.01 * GAP_S
+    put(90)
+    assert commits.get(timeout=HANG_GUARD_S) == [20, 30, 40, 60, 90]  # hang guard
+    if first_comes:
+        put(50, 10)
+        assert commits.get(timeout=HANG_GUARD_S) == [10, 50]  # hang guard
+        put(80, 70)
+    else:
+        put(50, 70, 80)
+    writer.finish()
+    writer.join(HANG_GUARD_S)  # hang guard
+    assert writer.problem is None
+    assert sorted(part.first for part in folder.manifest.parts.values()) == [
+        first for first in range(0, 100, 10) if first_comes or first not in (10, 50, 70, 80)
+    ]
 
 
 @pytest.mark.parametrize(("started", "jobs"), [(0, 3000), (2, 3000), (2, 1_000_000)])

@@ -1,0 +1,49 @@
+"""An S3 server that hangs while a run writes into it."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+from s3fs import S3FileSystem
+
+from boulder_sweep.places import place_of
+from boulder_sweep.runner.sweeper import run
+from boulder_sweep.store.reader import read_table
+from tests.faults.processes import Driver
+from tests.faults.s3_server import BUCKET, S3Server
+from tests.runner.grids import grid_of, plausible, same_bits
+
+pytestmark = [pytest.mark.faults, pytest.mark.nightly]
+
+OUT, ROWS = f"s3://{BUCKET}/out", 200_000
+HOW = ("--rows", str(ROWS), "--simulate", "slowly", "--rows-per-part", "2000")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, None])
+def test_a_run_ends_while_the_store_hangs_and_goes_on_to_the_same_table(tmp_path, monkeypatch, number):
+    """At the first signal, or by itself when a request was not answered in time."""
+    with S3Server() as server:
+        for name, value in server.environment.items():
+            monkeypatch.setenv(name, value)
+        driver = Driver(OUT, *HOW)
+        try:
+            driver.wait_for_rows(10_000)
+            server.send(signal.SIGSTOP)
+            if number is not None:
+                driver.signal(number)
+            code, told, complaints = driver.end()
+        finally:
+            driver.process.kill()
+            server.send(signal.SIGCONT)
+        assert complaints == ""
+        assert "of 200,000 rows are safe" in told["problem"]
+        assert "--resume" in told["problem"] or "resume=True" in told["problem"]
+        if number is None:
+            assert "has not answered for" in told["problem"]
+        else:
+            assert code == 128 + number
+        S3FileSystem.clear_instance_cache()  # it knows the address of an earlier server
+        run(grid_of(ROWS), OUT, resume=True, rows_per_part=2000, simulate=plausible)
+        run(grid_of(ROWS), tmp_path / "whole", rows_per_part=2000, simulate=plausible)
+        assert same_bits(read_table(place_of(OUT)), read_table(tmp_path / "whole"))
