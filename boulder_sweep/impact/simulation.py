@@ -44,10 +44,7 @@ __all__ = ["Trajectory", "simulate"]
 SAMPLE_S = 0.0005
 """Time between two samples of a trajectory [s]."""
 MOST_SAMPLES = 1_000_000
-_DECIDED = (
-    *("verdict", "reason", "margin", "rating", "time_to_limit_s", "time_to_limit_error_s", "overlap_m", "validity"),
-    "step_s",
-)
+_DECIDED = ("verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s")
 """Columns that are those of a row of ``sweep run``, which stops at the limit."""
 BEFORE_THE_END = 1.0 - 1e-14
 """The last sample is taken this close to the end, so that rounding cannot place it after the end."""

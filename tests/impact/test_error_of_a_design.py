@@ -64,5 +64,4 @@ def test_a_limit_between_two_solutions_is_decided_by_finer_ones() -> None:
     found = simulate(between)
     assert found.verdict == VERDICTS[row.verdict[0]] == "fail"
     assert row["step_s"][0] < 0.004
-    assert row["time_to_limit_error_s"][0] == found.judged["time_to_limit_error_s"][0]
     assert 0.0 < row["time_to_limit_error_s"][0] < 1e-4
