@@ -328,6 +328,8 @@ class ClusterWorkers(threading.Thread):
         try:
             done: Done = future.result(timeout=self._fetch_s)
         except Exception as problem:
+            if future.cancelled():
+                raise ClusterLostError(self._cluster.lost_text()) from problem
             if future.status == "error":
                 self._retry(self._in_flight.pop(future), problem)
             elif isinstance(problem, TimeoutError):
@@ -394,9 +396,7 @@ class ClusterWorkers(threading.Thread):
         for note in self._silence.notes:
             self.messages.put(Note(note))
         if self._silence.silent != silent:
-            self._shared = (
-                self._share()
-            )  # the old one may lie on a worker that is silent, or be bound to those that were not
+            self._shared = self._share()  # the old one may lie on a silent worker, or be bound to the others
             self._fetch_s = FETCH_S
         for future in again:
             task = self._in_flight.pop(future)
