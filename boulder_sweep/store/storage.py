@@ -68,7 +68,7 @@ class Storage(Protocol):
     def put(self, name: str, content: memoryview | bytes) -> None:
         """Write a file whole or not at all, durably."""
 
-    def publish(self, names: Mapping[str, str]) -> None:
+    def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Give staged files, by their temporary names, their final names, durably."""
 
     def remove(self, names: Iterable[str]) -> None:
@@ -134,7 +134,7 @@ class DiskStorage:
         """Write a file whole or not at all, durably."""
         put_file(self._path, name, content)
 
-    def publish(self, names: Mapping[str, str]) -> None:
+    def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Give staged files, by their temporary names, their final names, durably."""
         self._check_lock()
         with opened_folder(self._path) as at:
@@ -221,11 +221,12 @@ class ObjectStorage:
         """Write a file whole or not at all."""
         (self._path / name).put(content)
 
-    def publish(self, names: Mapping[str, str]) -> None:
+    def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Copy staged files to their final names and remove the staged ones."""
         if self._lock is not None:
             self._lock.check()
-        self._each(lambda name: self._publish(name, names[name]), names)
+        for_size = sizes or {}
+        self._each(lambda name: self._publish(name, names[name], for_size.get(name)), names)
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, unless they are another run's by now."""
@@ -247,9 +248,11 @@ class ObjectStorage:
         if self._generations is not None:
             self._generations.discard()
 
-    def _publish(self, staged_name: str, name: str) -> None:
+    def _publish(self, staged_name: str, name: str, size: int | None) -> None:
         """Copy one staged file to its final name."""
         staged = self._path / staged_name
+        if size is not None and staged.stat().st_size != size:
+            raise errors.DamagedError(f"{staged} is not what a worker wrote there: it has another size")
         staged.copy_to(self._path / name)
         with suppress(OSError):
             staged.unlink(missing_ok=True)

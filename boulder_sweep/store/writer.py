@@ -152,15 +152,17 @@ class OutputFolder:
                 with suppress(OSError, errors.StoreError):
                     self._storage.remove(temporary)
                 return
-            # An object store checks its content itself, and lets nobody see half of it.
+            # An object store checks its content itself, and lets nobody see half of it: sizes are enough there.
             parts = {name: one.part for name, one in temporary.items()}
-            for name, wrong in damaged_parts(self.path, parts, read_parts=isinstance(self.path, Path)).items():
+            on_disk = isinstance(self.path, Path)
+            for name, wrong in damaged_parts(self.path, parts if on_disk else {}, read_parts=True).items():
                 self.check()
                 raise errors.DamagedError(
                     f"{self.path / name} is not what a worker wrote there ({wrong}). "
                     f"Resume with: {self.manifest.resume_command}"
                 )
-            self._storage.publish({name: one.name for name, one in temporary.items()})
+            sizes = {name: part.bytes for name, part in parts.items()}
+            self._storage.publish({name: one.name for name, one in temporary.items()}, sizes)
             self.manifest.parts.update(staged)
             try:
                 save(self.manifest, self._storage)
