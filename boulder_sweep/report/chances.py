@@ -6,13 +6,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.columns import COLUMNS, INPUT_COLUMNS
+from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+LATER = {"time_to_limit_error_s"}
+"""Columns that came after the first such files; one that lacks another column is damaged."""
 CHANCES = ("p_pass", "p_pass_low", "p_pass_high", "p_pass_driver")
 
 
@@ -33,7 +35,7 @@ class ChanceFile:
     def __init__(self, path: str | Path) -> None:
         from boulder_sweep.answers.tables import read_parquet
 
-        needed = (*INPUT_COLUMNS, "design_id", "verdict", "reason", "validity", *CHANCES)
+        needed = ({spec.name for spec in COLUMNS} - LATER) | {*CHANCES}
         self._table, self.identity, self.judged_by = read_parquet(path, needed, "sweep uncertainty", ReportError)
         self.columns = tuple(dict.fromkeys((*(spec.name for spec in COLUMNS), *self._table.column_names)))
         self.lacking = frozenset(self.columns) - frozenset(self._table.column_names)
@@ -55,4 +57,6 @@ class ChanceFile:
         """
         if not 0 <= number < self.rows:
             raise IndexError(f"the file has {counted(self.rows, 'design')}, numbered from 0; there is no {number}")
-        return self._table.slice(number, 1)
+        from boulder_sweep.store.schema import with_columns
+
+        return with_columns(self._table.slice(number, 1), self.columns)

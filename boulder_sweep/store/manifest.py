@@ -268,9 +268,9 @@ def load(folder: Place) -> Manifest:
             found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
         raise NotASweepError(_no_result(folder)) from None
-    except (OSError, pa.ArrowException, UnicodeDecodeError) as problem:  # names of columns that are no text
+    except (OSError, pa.ArrowException) as problem:
         raise DamagedError(f"{path} cannot be read: {problem}") from problem
-    except ValueError as problem:  # a name that is no text
+    except ValueError as problem:  # a name of a column that is no text
         raise ImpossibleRecordsError(path, str(problem)) from None
     value = (found.metadata or {}).get(_KEY, b"")
     checksum, text = value[:64], value[64:]

@@ -271,11 +271,15 @@ def test_a_folder_that_cannot_be_made_is_wrong_use(sweep, possible_grid, name):
 
 @pytest.mark.parametrize(("number", "helps"), [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EACCES, False)])
 def test_what_helps_is_said_wherever_a_file_cannot_be_written(sweep, tmp_path, monkeypatch, number, helps):
-    def refused(self, *_, **__):
-        raise OSError(number, os.strerror(number), str(self))
+    opened = Path.open
+
+    def refused(self, mode="r", *others, **named):
+        if mode == "x":
+            raise OSError(number, os.strerror(number), str(self))
+        return opened(self, mode, *others, **named)
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(Path, "write_text", refused)
+    monkeypatch.setattr(Path, "open", refused)
     code, out, err = sweep("new", "-y", "mine.yaml")
     assert (code, out) == (2, "")
     assert err.startswith(f"error: mine.yaml: {os.strerror(number)}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from boulder_sweep.report.answers import Quantity, answer_of
 from boulder_sweep.report.chances import ChanceFile
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
+from boulder_sweep.store.provenance import sha256_of
 from tests.answers.designs import DEFAULTS, SITE, site
 from tests.conftest import Command
 
@@ -172,18 +172,19 @@ def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> 
     settings = json.loads(metadata[b"boulder_sweep.settings"])
     del settings["model"]["calibrated_crush_m"]
     metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
-    metadata[b"boulder_sweep.settings_sha256"] = sha256(metadata[b"boulder_sweep.settings"]).hexdigest().encode()
+    metadata[b"boulder_sweep.settings_sha256"] = sha256_of(settings).encode()
     pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
     write_report(tmp_path / "old.parquet", tmp_path / "page.html")  # with the default of this version
     del settings["model"]["preset"]
     metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
+    metadata[b"boulder_sweep.settings_sha256"] = sha256_of(settings).encode()
     pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
     with pytest.raises(ReportError, match=r"another version, whose settings are not those of this one \('preset'\)"):
         write_report(tmp_path / "old.parquet", tmp_path / "page.html")
 
 
 def test_chances_by_other_rules_say_so(chances: Path, tmp_path: Path, sweep: Command) -> None:
-    table = pq.read_table(chances).drop_columns(["validity", "step_s"])  # as before these columns existed
+    table = pq.read_table(chances).drop_columns(["time_to_limit_error_s"])  # as before this column existed
     metadata = {**table.schema.metadata, b"boulder_sweep.rules_sha256": b"abcdef0123456789"}
     old = tmp_path / "old.parquet"
     pq.write_table(table.replace_schema_metadata(metadata), old)

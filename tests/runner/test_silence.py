@@ -7,7 +7,6 @@ import itertools
 import pytest
 
 from boulder_sweep.errors import BackendError, ClusterLostError
-from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.cluster import ClusterWorkers
 from boulder_sweep.runner.messages import Computed, Ended, Note
 from boulder_sweep.runner.remote import Done, received
@@ -97,6 +96,7 @@ class Folder:
     """Stands for an output folder in which everything is that was staged."""
 
     manifest = Manifest({}, ROWS, SIZE, "")
+    token = "0" * 16
 
     def __init__(self, path):
         self.path = path
@@ -108,7 +108,6 @@ class Folder:
 @pytest.fixture
 def work_off(tmp_path, monkeypatch):
     """Run to the end on a cluster whose clock goes on by five seconds each time it is read; messages that came."""
-    monkeypatch.setattr(backend, "hidden_name", lambda name: "", raising=False)  # that is the folder, which exists
 
     def work(cluster, rows=ROWS):
         rows = ((first, first + SIZE) for first in range(0, rows, SIZE))

@@ -53,14 +53,6 @@ def test_what_is_saved_is_loaded(tmp_path, merging):
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST_NAME]
 
 
-def test_a_name_of_a_column_that_is_no_text_is_damage(tmp_path):
-    save(manifest_with_parts(), DiskStorage(tmp_path))
-    path = tmp_path / MANIFEST_NAME
-    path.write_bytes(path.read_bytes().replace(b"boulder_height_m", b"boulder\xffheight_m"))
-    with pytest.raises(DamagedError, match="cannot be read"):
-        load(tmp_path)
-
-
 def test_counts(tmp_path):
     manifest = manifest_with_parts()
     assert manifest.rows_done == 350

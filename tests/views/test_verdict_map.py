@@ -410,7 +410,7 @@ def test_a_damaged_file_of_sweep_boundary_is_told(named_soils: str, capsys: pyte
         flipped[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
         Path("flipped.parquet").write_bytes(flipped)
         try:
-            frame, found = read_map("flipped.parquet")
+            frame, found, _ = read_map("flipped.parquet")
             assert (frame.to_csv(), found) == (shown, whole[1])
         except QuestionError:
             refusals += 1
