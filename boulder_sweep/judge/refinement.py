@@ -26,7 +26,7 @@ FACTOR = 0.25
 LAST_RESORT_STEPS = 2_000
 """Steps to the horizon of the last attempt, where nothing asks for shorter ones."""
 MOST_STEPS = 20_000
-"""Steps to the horizon at which it ends, with the soil in closed form; fewer with many soil elements."""
+"""It ends with at least so many steps to the horizon, with the soil in closed form; fewer with many soil elements."""
 
 SAME_ANGLE, SAME_WAY = 1e-6, 1e-4
 """Solutions of a late row agree if what they reach differs by no more than the error estimated for the coarser, or by
@@ -44,12 +44,13 @@ def finer_controls(control: Control) -> Iterator[Control]:
     Notes
     -----
     The budget of a row is the last of these controls; sums over soil elements are too slow for it. It
-    depends on the settings alone, so a row is the same whatever rows are simulated beside it.
+    depends on the settings alone, so a row is the same whatever rows are simulated beside it. Where errors are
+    estimated there is at least one, however slow: a late row needs another solution.
     """
     finest = control.horizon / MOST_STEPS * max(1.0, control.elements / ELEMENTS_AS_FAST)
     h = control.h
-    while h > finest:
-        h = max(FACTOR * h, finest)
+    while h > finest or (h == control.h and control.error_estimate):
+        h *= FACTOR
         yield control._replace(h=h, locate_yield=True)
     if control.elements == 0:
         h = min(control.h, control.horizon / LAST_RESORT_STEPS)

@@ -227,6 +227,8 @@ class ClusterWorkers(threading.Thread):
         self._share: Callable[[], Any] = lambda: None
         """Sends what all tasks have in common to a worker."""
         self._shared: Any = None
+        self._shared_with: frozenset[str] | None = None
+        """The workers that it was given to; empty for any, None where it must be sent again."""
         self._without_worker_since: float | None = None
 
     def stop(self) -> None:
@@ -263,7 +265,6 @@ class ClusterWorkers(threading.Thread):
         self._share = lambda: self._cluster.client.submit(received, work, workers=self._only(), pure=False)
         looked = result = self._clock()
         self._look_at_workers()
-        self._shared = self._share()
         if self._silence.silent:
             self.messages.put(Note(f"{named(self._silence.silent)} silent, and not given any tasks"))
         more = True
@@ -396,7 +397,11 @@ class ClusterWorkers(threading.Thread):
         for note in self._silence.notes:
             self.messages.put(Note(note))
         if self._silence.silent != silent:
-            self._shared = self._share()  # the old one may lie on a silent worker, or be bound to the others
+            self._shared_with = None  # it may lie on a silent worker, or be bound to the others
+        elif self._shared_with and self._workers and not self._shared_with & self._workers.keys():
+            self._shared_with, again = None, list(self._in_flight)  # all that it is bound to are gone
+        if self._shared_with is None and (self._workers or not self._silence.silent):
+            self._shared, self._shared_with = self._share(), frozenset(self._only() or ())
             self._fetch_s = FETCH_S
         for future in again:
             task = self._in_flight.pop(future)

@@ -76,7 +76,7 @@ class Committer(threading.Thread):
         self._arrived.put(None)
 
     def stop(self) -> None:
-        """Commit what is ready in order, and end."""
+        """Commit what is there, and end."""
         self._stopped.set()
         self._arrived.put(None)
 
@@ -88,7 +88,7 @@ class Committer(threading.Thread):
                 self._admission.release(item.part.rows)
             if self._stopped.is_set():
                 self._waiting |= {item.part.first: item for item in self._flush()}
-            self._commit()
+            self._commit(self._stopped.is_set())
             self._merge()
         except BaseException as problem:
             self.problem = problem

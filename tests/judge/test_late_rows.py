@@ -22,10 +22,14 @@ two overturn at 7.0313 s and 6.769 s, the third stands for 10 s and overturns la
 deg."""
 
 
-def sweep_of(folder: Path, accuracy: str = "balanced") -> boulder_sweep.Sweep:
+def sweep_file(folder: Path, accuracy: str = "balanced") -> Path:
     grid = folder / "grid.yaml"
     grid.write_text(f"name: shallow\ntable: {SHALLOW}\nsolver: {{accuracy: {accuracy}}}\n")
-    return boulder_sweep.load(grid)
+    return grid
+
+
+def sweep_of(folder: Path, accuracy: str = "balanced") -> boulder_sweep.Sweep:
+    return boulder_sweep.load(sweep_file(folder, accuracy))
 
 
 def designs_in(sweep: boulder_sweep.Sweep) -> Designs:
@@ -92,6 +96,15 @@ def test_a_late_pass_needs_a_finer_solution_that_agrees(tmp_path: Path) -> None:
     found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1)}, asked)
     assert found.verdict[0] == PASS
     assert len(asked) == 2
+    assert asked[1] == pytest.approx(FACTOR * asked[0])
+
+
+def test_there_are_finer_steps_however_many_soil_elements(tmp_path: Path) -> None:
+    asked: list[float] = []
+    sweep = boulder_sweep.load(sweep_file(tmp_path), ["model.soil.elements=5000"])
+    evaluation = replace(evaluation_of(sweep, accuracy_of(sweep)), simulate=stand_in({0: (Status.SETTLED, 0.1)}, asked))
+    found = evaluation.judged(designs_in(sweep).rows(slice(3, 4)))
+    assert found.verdict[0] == PASS
     assert asked[1] == pytest.approx(FACTOR * asked[0])
 
 

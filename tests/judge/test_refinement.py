@@ -12,7 +12,7 @@ from boulder_sweep.columns import OUTCOME_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.evaluation import Evaluation, by_kernels
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.refinement import LAST_RESORT_STEPS, MOST_STEPS, finer_controls, reported_step_s
+from boulder_sweep.judge.refinement import FACTOR, LAST_RESORT_STEPS, MOST_STEPS, finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import Limits
 from tests.judge.plain import plain_designs
 
@@ -27,12 +27,14 @@ def evaluation(control: Control = CONTROL, limits: Limits = LIMITS, simulate=by_
 def test_steps_get_shorter_down_to_the_budget() -> None:
     *finer, last = finer_controls(CONTROL)
     steps = [control.h for control in finer]
-    assert steps == sorted(steps, reverse=True)
-    assert steps[-1] == pytest.approx(CONTROL.horizon / MOST_STEPS)
+    assert np.allclose(np.divide(steps, [CONTROL.h, *steps[:-1]]), FACTOR, rtol=1e-12), "late rows compare such steps"
+    assert FACTOR < steps[-1] * MOST_STEPS / CONTROL.horizon <= 1.0
     assert all(control.locate_yield and not control.last_resort for control in finer)
     assert last.last_resort
     assert last.h == CONTROL.horizon / LAST_RESORT_STEPS
-    assert list(finer_controls(CONTROL._replace(h=1e-6))) == [last._replace(h=1e-6)]
+    alone = CONTROL._replace(h=1e-6, error_estimate=False)
+    assert list(finer_controls(alone)) == [last._replace(h=1e-6, error_estimate=False)]
+    assert len(list(finer_controls(CONTROL._replace(h=0.012, elements=100_000, error_estimate=True)))) == 1
     sums = list(finer_controls(CONTROL._replace(elements=5000)))
     assert len(sums) < len(steps)
     assert not any(control.last_resort for control in sums)

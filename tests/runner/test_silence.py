@@ -246,3 +246,42 @@ def test_workers_that_hang_are_not_waited_for_when_a_run_begins():
 def test_where_no_worker_answers_that_is_told():
     with pytest.raises(BackendError, match="no worker of the Dask scheduler answers: look whether they hang"):
         answers(Asked("ab", {"a": 100.0, "b": 99.0}), lambda: 7, 10.0)
+
+
+def test_what_all_tasks_need_is_sent_again_where_those_that_had_it_are_gone(work_off, monkeypatch):
+    """Worker a is silent, so only b may have it; b is lost, and c comes."""
+    cluster = Workers("a", "b", hung="a", silent="a")
+    submit, homes = cluster.submit, set()
+
+    def submit_where_it_is(function, *arguments, workers=None, pure=True):
+        if function is received:
+            homes.update(workers)
+        if len(cluster.calls) == 3:
+            cluster.names = ["a", "c"]
+        if homes & set(cluster.names):
+            return submit(function, *arguments, workers=workers, pure=pure)
+        cluster.calls.append(Call(None, arguments[1:3]))
+        return cluster.calls[-1]
+
+    monkeypatch.setattr(cluster, "submit", submit_where_it_is)
+    messages, problem = work_off(cluster)
+    assert problem is None
+    assert rows_of(messages) == list(range(0, ROWS, SIZE))
+    assert cluster.shared == [["b"], ["c"]]
+
+
+def test_nothing_is_sent_while_all_workers_are_silent(work_off, monkeypatch):
+    """Dask would take no worker for any; what tasks need goes to the first that comes."""
+    cluster = Workers("a", hung="a", silent="a")
+    threads, looks = cluster.threads, itertools.count()
+
+    def another_comes():
+        if next(looks) == 2:
+            cluster.names.append("b")
+        return threads()
+
+    monkeypatch.setattr(cluster, "threads", another_comes)
+    messages, problem = work_off(cluster)
+    assert problem is None
+    assert rows_of(messages) == list(range(0, ROWS, SIZE))
+    assert cluster.shared == [["b"]]

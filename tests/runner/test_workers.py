@@ -327,6 +327,17 @@ def test_parts_do_not_wait_for_ever_for_the_one_before_them(first_comes):
     ]
 
 
+def test_parts_behind_a_gap_are_not_lost_where_a_run_is_stopped():
+    folder = Folder(100, 10)
+    writer = Committer(folder, Recorder(good, Rows, {}), Admission(10**9), tuple, lambda: 0.0, lambda: 0.0)
+    for first in (0, 20, 30, 70):
+        writer.put(folder.stage(first, b"", 10, {"pieces": []}))
+    writer.stop()
+    writer.run()
+    assert writer.problem is None
+    assert [staged.part.first for staged in folder.committed] == [0, 20, 30, 70]
+
+
 @pytest.mark.parametrize(("started", "jobs"), [(0, 3000), (2, 3000), (2, 1_000_000)])
 def test_threads_that_the_system_does_not_start_end_the_run(no_more_threads, started, jobs):
     no_more_threads(started)
