@@ -33,6 +33,9 @@ FIRST_WAIT_S = 0.2
 """Wait after the first failure of a request; three times longer after each one [s]."""
 REQUEST_S = 12.0
 """How long to wait for the answer to a request, all tries together [s]; longer where much is sent or read."""
+_LIST_TIMES = 5
+"""How many times longer to wait for a list: it comes in pages of a thousand names, one after the other, and a sweep of
+billions of rows has ten thousands of them."""
 _SLOWEST_BYTES_PER_S = 2.5e5
 _PART_BYTES = 1 << 24
 """What a file that is read may hold, when its size is not known; a part is smaller."""
@@ -137,13 +140,13 @@ class RemotePath:
 
     def open(self, mode: str = "r", encoding: str | None = None, newline: str | None = None) -> Any:
         """Open a file for reading; its content is fetched at once."""
-        content = io.BytesIO(self.read_bytes())
+        content = io.BytesIO(self.read_bytes(max(self.stat().st_size, _PART_BYTES)))
         return content if "b" in mode else io.TextIOWrapper(content, encoding=encoding, newline=newline)
 
     def names(self) -> list[str]:
         """Return the names in a folder, those of folders with a slash at the end; none if there is no folder."""
         try:
-            found = self._request(self._filesystem.ls, self._path, detail=True)
+            found = self._request(self._filesystem.ls, self._path, times=_LIST_TIMES, detail=True)
         except FileNotFoundError:
             return []
         here = ((entry["name"].rstrip("/").rpartition("/")[2], entry["type"]) for entry in found)
@@ -164,7 +167,7 @@ class RemotePath:
         FileExistsError
             The name is taken; also after a first try whose answer was lost.
         """
-        how = {"mode": "create"} if only_new else {}
+        how: dict[str, Any] = {"mode": "create"} if only_new else {}
         self._request(self._filesystem.pipe_file, self._path, bytes(content), size=len(content), **how)
 
     def copy_to(self, target: RemotePath) -> None:
@@ -179,7 +182,9 @@ class RemotePath:
             if not missing_ok:
                 raise
 
-    def _request(self, request: Callable[..., Result], *arguments: Any, size: int = 0, **options: Any) -> Result:
+    def _request(
+        self, request: Callable[..., Result], *arguments: Any, size: int = 0, times: int = 1, **options: Any
+    ) -> Result:
         """Send a request in a thread of its own, and wait for the answer; not for ever, for a store may be silent.
 
         A request that is given up may still arrive.
@@ -189,7 +194,7 @@ class RemotePath:
         OSError
             What the store answered, or the last failure.
         """
-        limit_s = REQUEST_S + size / _SLOWEST_BYTES_PER_S
+        limit_s = times * REQUEST_S + size / _SLOWEST_BYTES_PER_S
         answers: queue.SimpleQueue[tuple[Result | None, OSError | None]] = queue.SimpleQueue()
         given_up = threading.Event()
 

@@ -109,3 +109,21 @@ def test_a_request_that_is_given_up_is_not_tried_again(monkeypatch):
         place.stat()
     wait_until(lambda: not [one for one in threading.enumerate() if one.name == "request"], "no thread is left")
     assert len(asked) == 1
+
+
+def test_a_file_of_any_size_has_the_time_to_be_read(monkeypatch):
+    place, limits = place_of("memory://places/design.csv"), []
+    monkeypatch.setattr(RemotePath, "read_bytes", lambda self, most=None: limits.append(most) or b"")
+    for size in (10**9, 5):
+        monkeypatch.setattr(place._filesystem, "info", lambda path, size=size: {"size": size, "type": "file"})
+        place.open("rb")
+    assert limits == [10**9, 1 << 24]
+
+
+def test_a_list_of_many_pages_has_more_time_than_one_answer(monkeypatch):
+    monkeypatch.setattr(places, "REQUEST_S", 0.2)  # no answer comes, however long it is
+    place, end = place_of("memory://places/out"), threading.Event()
+    monkeypatch.setattr(place._filesystem, "ls", lambda path, detail: end.wait(HANG_GUARD_S))  # hang guard
+    with pytest.raises(TimeoutError, match="the store has not answered for 1 s"):
+        place.names()
+    end.set()

@@ -22,6 +22,8 @@ from boulder_sweep.store.errors import LinkError
 WRITING_SUFFIX = ".writing"
 """Suffix of a file that does not have its final name yet; such names begin with ``_``, and readers skip them."""
 _PIECE = 8 << 20
+_SHOWN = 40
+"""Characters of a name that are repeated in a temporary one: four bytes each, and 255 bytes are a name's limit."""
 _FATAL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
@@ -75,7 +77,8 @@ def replacing(target: Path) -> Iterator[BinaryIO]:
         It cannot be written; an old file is untouched.
     """
     is_file(target)
-    passing = target.with_name(f".{target.name}.part")
+    # No other process that writes the same file has this name.
+    passing = target.with_name(f".{target.name[:_SHOWN]}.{secrets.token_hex(8)}.part")
     with open(passing, "wb", opener=lambda path, _: created(Path(path))) as file:
         try:
             yield file

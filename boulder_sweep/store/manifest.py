@@ -170,7 +170,7 @@ class Manifest:
     def mergeable(self) -> list[list[str]]:
         """Return groups of names of parts, in order, that together make one full part of the table."""
         groups: dict[int, list[str]] = {}
-        for name in sorted(self.parts):
+        for name in sorted(self.parts, key=lambda name: self.parts[name].first):
             groups.setdefault(self.parts[name].first // self.rows_per_part, []).append(name)
         whole = []
         for place, names in groups.items():
@@ -310,8 +310,9 @@ def _check_claims(path: Place, manifest: Manifest) -> None:
         raise ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
     for name, part in (*parts.items(), *([] if merge is None else [(merge.name, merge.part)])):
         within = 0 <= part.first < part.stop <= rows and part.first // size == (part.stop - 1) // size
-        named = within and is_part_name(name) and [int(number) for number in re.findall("[0-9]+", name)]
-        if named not in ([part.first, part.stop], [part.first]):  # the first tables named the first row only
+        own = part_name(part.first, part.stop, rows) if within else ""
+        # The first tables named the first row only. More zeros would sort otherwise than the rows do.
+        if not within or name not in (own, own.rpartition("-")[0] + _PART_SUFFIX):
             raise ImpossibleRecordsError(path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}")
         if part.bytes < 1 or not all(type(count) is int and count >= 0 for count in part.verdicts.values()):
             raise ImpossibleRecordsError(path, f"{name} with impossible counts")

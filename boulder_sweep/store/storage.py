@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 from boulder_sweep.places import Place, RemotePath
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import check_writable, flush_folder, hidden_name, opened_folder, put_file
+from boulder_sweep.store.files import check_writable, flush_folder, hidden_name, is_file, opened_folder, put_file
 from boulder_sweep.store.generations import MANIFEST_NAME, Encode, Generations, OtherWriterError
 from boulder_sweep.store.lock import FolderLock
 from boulder_sweep.store.object_lock import ObjectLock, refuses_existing
@@ -120,6 +120,7 @@ class DiskStorage:
 
     def check_writable(self) -> None:
         """Raise OSError if the folder cannot be written."""
+        is_file(self._path / MANIFEST_NAME)  # a link would be refused only when old parts are gone
         check_writable(self._path, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
 
     def names(self) -> list[str]:

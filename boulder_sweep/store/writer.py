@@ -131,8 +131,11 @@ class OutputFolder:
         return staged
 
     def is_staged(self, staged: StagedPart) -> bool:
-        """Whether a part that a worker has staged is seen from here."""
-        return (self.path / self._temporary(staged)).exists()
+        """Whether a part that a worker has staged is seen from here; raises as `stage`."""
+        try:
+            return (self.path / self._temporary(staged)).exists()
+        except OSError as problem:
+            raise self.write_error(problem) from problem
 
     def commit(self, staged: Sequence[StagedPart]) -> None:
         """Give staged parts their names and record them; after `close` they are removed instead.
@@ -255,7 +258,7 @@ class OutputFolder:
             return
         self._open = False
         self._remove_staged()
-        with suppress(OSError):
+        with suppress(OSError, errors.StoreError):  # a folder that is gone must not hide why the run was refused
             self._storage.discard_manifest()
         self._lock.release()
         if self._created:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from boulder_sweep.store import files
+
+TOKEN = "0123456789abcdef"
 CASE = Path(__file__).parents[2] / "configs" / "rwg.yaml"
 WRITING = [
     ("export", "out.sweep", "-o", "table.csv"),
@@ -31,10 +35,11 @@ def result(sweep, possible_grid):
     assert outside.read_text() == "precious"
 
 
-def test_no_command_writes_through_a_link(sweep, result):
+def test_no_command_writes_through_a_link(sweep, result, monkeypatch):
+    monkeypatch.setattr(files, "secrets", SimpleNamespace(token_hex=lambda _: TOKEN))
     for words in WRITING:
         name = Path(words[-1])
-        passing = Path(f"_{name}.writing" if name.suffix == ".html" and words[0] == "report" else f".{name}.part")
+        passing = Path(f"_{name}.writing" if words[0] == "report" else f".{name}.{TOKEN}.part")
         name.write_text("an earlier one")
         for planted in (passing, name):
             planted.unlink(missing_ok=True)

@@ -6,12 +6,13 @@ import hashlib
 import os
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import boulder_sweep
 from boulder_sweep.errors import PictureError
-from boulder_sweep.store import status
+from boulder_sweep.store import files, status
 from boulder_sweep.store.errors import DamagedError, LinkError
 from boulder_sweep.store.files import hidden_name, put_file, replacing
 from boulder_sweep.store.lock import is_locked
@@ -19,6 +20,7 @@ from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, part_name, stag
 from boulder_sweep.store.targets import check_target
 from tests.store.folders import ROWS, SIZE, finished_folder, open_folder, part_bytes
 
+TOKEN = "0123456789abcdef"
 FIRST = part_name(0, SIZE, ROWS)
 
 
@@ -61,6 +63,17 @@ def test_a_link_in_the_folder_of_a_run_is_refused(tmp_path, outside, name, how):
     assert not is_locked(out)
 
 
+@pytest.mark.parametrize("how", ["overwrite", "resume"])
+def test_a_linked_manifest_is_refused_before_a_part_is_removed(tmp_path, how):
+    out = finished_folder(tmp_path / "out")
+    (out / MANIFEST_NAME).rename(tmp_path / "elsewhere")
+    (out / MANIFEST_NAME).symlink_to(tmp_path / "elsewhere")
+    before = names(out)
+    with pytest.raises(LinkError, match=f"{MANIFEST_NAME} is a link"):
+        open_folder(out, **{how: True})
+    assert names(out) == before
+
+
 @pytest.mark.parametrize("name", [MANIFEST_NAME, hidden_name(MANIFEST_NAME)])
 def test_a_link_that_comes_later_is_refused(way, tmp_path, outside, name):
     folder = open_folder(tmp_path / "out")
@@ -93,8 +106,9 @@ def test_no_file_is_put_through_a_link(way, tmp_path, outside, name):
         put_file(tmp_path / "folder", "page.html", b"new")
 
 
-@pytest.mark.parametrize("name", ["map.png", ".map.png.part"])
-def test_no_output_is_written_through_a_link(tmp_path, outside, name):
+@pytest.mark.parametrize("name", ["map.png", f".map.png.{TOKEN}.part"])
+def test_no_output_is_written_through_a_link(tmp_path, outside, monkeypatch, name):
+    monkeypatch.setattr(files, "secrets", SimpleNamespace(token_hex=lambda _: TOKEN))
     (tmp_path / name).symlink_to(outside)
     with pytest.raises(LinkError, match="is a link"), replacing(tmp_path / "map.png"):
         pytest.fail("nothing may be written")
@@ -121,12 +135,26 @@ def test_a_pipe_in_place_of_a_manifest_is_not_waited_for(tmp_path):
         status(out)
 
 
-def test_what_a_killed_process_left_of_an_output_is_replaced(tmp_path):
-    (tmp_path / ".map.png.part").write_bytes(b"half of a longer one")
+def test_what_a_killed_process_left_of_an_output_does_not_matter(tmp_path):
+    """It stays: another process may be writing it."""
+    left = tmp_path / f".map.png.{TOKEN}.part"
+    left.write_bytes(b"half of a longer one")
     with replacing(tmp_path / "map.png") as file:
         file.write(b"whole")
-    assert names(tmp_path) == ["map.png"]
+    assert names(tmp_path) == [left.name, "map.png"]
     assert (tmp_path / "map.png").read_bytes() == b"whole"
+
+
+@pytest.mark.parametrize("name", ["map.png", "é" * 125 + ".png"])
+def test_two_that_write_one_output_leave_it_whole(tmp_path, name):
+    target = tmp_path / name
+    with replacing(target) as first:
+        first.write(b"of the first")
+        with replacing(target) as second:
+            second.write(b"of the second")
+        assert target.read_bytes() == b"of the second"
+    assert target.read_bytes() == b"of the first"
+    assert names(tmp_path) == [name]
 
 
 def test_an_output_that_cannot_be_completed_changes_nothing(tmp_path):

@@ -190,6 +190,13 @@ def test_small_parts_are_mergeable_only_when_they_make_a_whole_one():
     assert manifest.mergeable()[0] == [part_name(*rows, manifest.rows) for rows in ((100, 150), (150, 199), (199, 200))]
 
 
+def test_parts_are_merged_in_the_order_of_their_rows_whatever_their_names():
+    manifest = Manifest({}, 20, 20, "")
+    for first, name in ((0, "rows-0000000000000"), (5, "rows-1"), (10, "rows-00"), (15, "rows-2")):
+        manifest.parts[name] = Part(first, 5, 1, "", {}, "")
+    assert manifest.mergeable() == [["rows-0000000000000", "rows-1", "rows-00", "rows-2"]]
+
+
 def test_missing_ranges_of_a_huge_table_come_one_by_one():
     manifest = Manifest({}, 10**15, 131_072, "")
     missing = manifest.missing()

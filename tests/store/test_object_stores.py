@@ -275,6 +275,17 @@ def test_a_store_that_does_not_answer_is_not_taken_for_damaged(out, monkeypatch,
     assert names(out) == before
 
 
+def test_a_store_that_does_not_say_whether_a_part_is_there_is_told_of_with_what_is_safe(out, monkeypatch):
+    folder = folders.open_folder(out)
+    content, verdicts = folders.part_bytes(0, folders.SIZE)
+    staged = folder.stage(0, content, folders.SIZE, verdicts)
+    with monkeypatch.context() as patch:
+        patch.setattr(FaultyFileSystem, "_may_fail", lambda self: (_ for _ in ()).throw(PermissionError("not yours")))
+        with pytest.raises(WriteError, match=r"not yours\. 0 of 441 rows are safe; resume with: "):
+            folder.is_staged(staged)
+    folder.close("stopped")
+
+
 def test_a_refused_run_leaves_no_trace(out):
     folders.open_folder(out).discard()
     assert names(out) == []

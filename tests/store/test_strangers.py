@@ -15,7 +15,7 @@ import pytest
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.places import place_of
 from boulder_sweep.store import object_lock, read, status
-from boulder_sweep.store.errors import DamagedError, FolderRemovedError, ImpossibleRecordsError
+from boulder_sweep.store.errors import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, load, part_name, staged_name
@@ -49,8 +49,14 @@ def out(tmp_path):
     return finished_folder(tmp_path / "out")
 
 
-@pytest.mark.parametrize("place", ["disk", "object store"])
-def test_what_a_worker_of_another_run_stages_is_never_published(tmp_path, place):
+@pytest.mark.parametrize(
+    ("place", "error", "words"),
+    [
+        ("disk", DamagedError, r"is not what a worker wrote there \(missing"),
+        ("object store", WriteError, "cannot write into faulty://bucket/out: FileNotFoundError"),
+    ],
+)
+def test_what_a_worker_of_another_run_stages_is_never_published(tmp_path, place, error, words):
     with store():
         out = tmp_path / "out" if place == "disk" else place_of("faulty://bucket/out")
         killed = open_folder(out, identity=OTHER)
@@ -61,7 +67,7 @@ def test_what_a_worker_of_another_run_stages_is_never_published(tmp_path, place)
         assert late.name == own[0].name == FIRST
         folder.commit(own)
         assert (out / FIRST).read_bytes() == part_bytes(0, SIZE)[0]
-        with pytest.raises((DamagedError, OSError, BoulderSweepError)):
+        with pytest.raises(error, match=words):
             folder.commit([late])  # nor if it were reported
         assert (out / FIRST).read_bytes() == part_bytes(0, SIZE)[0]
         folder.close("interrupted")
@@ -233,6 +239,8 @@ HOSTILE = {
     "part anywhere": _renamed("VICTIM"),
     "part in a folder": _renamed(f"./{FIRST}"),
     "part with other digits": _renamed("rows-" + 12 * "\u0660" + "-000000000100.parquet"),
+    "part with more digits": _renamed(f"rows-{0:013d}-{SIZE:013d}.parquet"),
+    "part with more digits, by its first row": _renamed(f"rows-{0:013d}.parquet"),
     "part under another name": _renamed(part_name(0, SIZE - 1, ROWS)),
     "part that is no part": _renamed("_lock"),
     "part twice": lambda records: records["parts"].update({f"./{FIRST}": part_record(records)}),

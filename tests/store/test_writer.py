@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 from contextlib import suppress
 
 import pandas as pd
@@ -255,6 +256,13 @@ def test_a_run_that_was_refused_leaves_no_trace(tmp_path):
     finished_folder(tmp_path / "done")
     open_folder(tmp_path / "done", resume=True).discard()
     assert read_table(tmp_path / "done").num_rows == ROWS
+
+
+def test_a_refused_run_whose_folder_is_gone_releases_it(tmp_path):
+    folder = open_folder(tmp_path / "out")
+    shutil.rmtree(tmp_path / "out")
+    folder.discard()
+    assert folder._lock._descriptor is None
 
 
 def test_what_is_written_after_closing_is_dropped(tmp_path):
