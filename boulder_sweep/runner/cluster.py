@@ -284,9 +284,8 @@ class ClusterWorkers(threading.Thread):
                 self._expect_lost()
                 if now - result > _QUIET_S and self._workers:
                     result = now
-                    self.messages.put(
-                        Note(f"no result for {_QUIET_S:.0f} s from {len(self._workers)} workers; waiting")
-                    )
+                    quiet = f"no result for {_QUIET_S:.0f} s from {len(self._workers)} workers; waiting"
+                    self.messages.put(Note(quiet))
             more = more or bool(self._again) or bool(self._suspects)
 
     def _only(self) -> list[str] | None:
