@@ -17,7 +17,7 @@ import pandas as pd
 
 import boulder_sweep
 
-from .processes import HANG_S, Changes, Cluster, Parts, Run, Store, Time, Watch, Writes, data_files, meets
+from .processes import HANG_S, Changes, Cluster, Parts, Run, Store, Time, Watch, Writes, data_files, ended, meets
 from .store_server import BUCKET
 
 GRID = """\
@@ -326,10 +326,11 @@ def without_a_worker(trial: Trial, aim: Aim, usual: Usual, cluster: Cluster, num
     """Kill or stop one worker of a cluster in the middle of a run, which must finish."""
     options = ["--backend", "dask", "--scheduler", cluster.address]
     run = trial.run(*options)
+    worker = cluster.workers[number % len(cluster.workers)]
     if meets(run, Parts(trial.local, 1 + int(aim.share * TASKS))):
         time.sleep(aim.pause_s)
         if not run.has_ended():
-            cluster.workers[number % len(cluster.workers)].send_signal(aim.signal)
+            worker.send_signal(aim.signal)
             run.since = time.monotonic()
             trial.found.disturbed = 1
     trial.look()
@@ -341,6 +342,8 @@ def without_a_worker(trial: Trial, aim: Aim, usual: Usual, cluster: Cluster, num
         if code not in INTERRUPTED:  # it hung, or failed: is what it has written safe?
             options = []
         trial.wait(trial.run("--resume", *options))
+    if trial.found.disturbed:
+        ended(worker)  # one that is stopped would be there for the next run
     return trial.finish()
 
 

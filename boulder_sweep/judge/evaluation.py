@@ -20,7 +20,7 @@ from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, PASS, Judged, joined, not_computed, with_rows
-from boulder_sweep.judge.refinement import agree, finer_controls, is_late, is_open, reported_step_s
+from boulder_sweep.judge.refinement import AGREEING, agree, finer_controls, is_late, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 
@@ -135,25 +135,25 @@ class Evaluation:
         """
         found, outcomes = self._once(designs, self.control)
         steps_s = np.full(designs.size, reported_step_s(self.control))
-        late = is_late(found, outcomes, self.control)
+        wanting = AGREEING * is_late(found, outcomes, self.control)
         for control in finer_controls(self.control):
-            again = np.flatnonzero(is_open(found, control) | (late & (not control.last_resort)))
+            again = np.flatnonzero(is_open(found, control) | ((wanting > 0) & (not control.last_resort)))
             if not len(again):
                 break
             some = designs.rows(again)
             finer, solution = self._once(some, control)
-            confirmed = late[again] & (finer.verdict == found.verdict[again])
+            confirmed = (wanting[again] > 0) & (finer.verdict == found.verdict[again])
             confirmed &= agree(_rows_of(outcomes, again), solution, some.table.v_0)
-            late[again[confirmed]] = False
+            wanting[again[confirmed]] -= 1
             taken = (finer.verdict != ERROR) & ~confirmed
             places = again[taken]
-            late[places] = is_late(finer, solution, control)[taken]
+            wanting[places] = AGREEING * is_late(finer, solution, control)[taken]
             found = with_rows(found, places, finer.rows(taken))
             steps_s[places] = reported_step_s(control)
             for values, new in zip(outcomes, solution, strict=True):
                 values[places] = new[taken]
-        if late.any():
-            found = self._doubted(found, np.flatnonzero(late), designs, outcomes, steps_s)
+        if wanting.any():
+            found = self._doubted(found, np.flatnonzero(wanting), designs, outcomes, steps_s)
         found = joined([found])
         return self._margins_proved(found, designs) if self.least_margin > 0.0 else found
 

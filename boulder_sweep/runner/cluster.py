@@ -218,6 +218,8 @@ class ClusterWorkers(threading.Thread):
         self._lost: list[Any] = []
         """Futures in flight whose result was lost with its worker before it was received."""
         self._fetch_s = FETCH_S
+        self._late: dict[Any, Done | Exception] = {}
+        """What came of futures whose results did not come at once."""
         self._stopped = threading.Event()
         self._clock = clock
         self._there: dict[str, int] = {}
@@ -325,8 +327,14 @@ class ClusterWorkers(threading.Thread):
         if not future.done():
             self._lost.append(future)
             return False
+        if self._fetch_s > FETCH_S and future not in self._late and future.status == "finished":
+            # It may lie on a worker that is silent: others go on meanwhile.
+            threading.Thread(target=self._fetch, args=(future, self._fetch_s), daemon=True).start()
+            return False
         try:
-            done: Done = future.result(timeout=self._fetch_s)
+            done = self._late.pop(future, None) or future.result(timeout=FETCH_S)
+            if isinstance(done, Exception):
+                raise done
         except Exception as problem:
             if future.cancelled():
                 raise ClusterLostError(self._cluster.lost_text()) from problem
@@ -341,6 +349,14 @@ class ClusterWorkers(threading.Thread):
         else:
             self._accept(self._in_flight.pop(future), done)
         return True
+
+    def _fetch(self, future: Any, limit_s: float) -> None:
+        """Wait longer for a result."""
+        try:
+            self._late[future] = future.result(timeout=limit_s)
+        except Exception as problem:
+            self._late[future] = problem
+        self._arrived.put(future)
 
     def _accept(self, task: _Task, done: Done) -> None:
         """Pass on the parts that a worker has written, or write those that it sent."""

@@ -18,6 +18,8 @@ SILENT_S = 30.0
 """Time without a heartbeat after which a worker gets no more tasks, and others get those that it has [s]."""
 _LOOK_EVERY_S = 5.0
 _LOOKS = round(SILENT_S / _LOOK_EVERY_S)
+_DOUBT_S = 10.0
+"""How long a task that may wait for something on a silent worker has to end, before it is given to others, too [s]."""
 _LAG_S = 5.0
 """How far the last heartbeat of a worker that does not answer is behind those of others [s]."""
 
@@ -96,7 +98,7 @@ class Silence:
         if fallen:
             theirs = self._cluster.tasks_of(fallen)
             again = [future for future in in_flight if future.key in theirs]
-            self._doubtful, self._doubtful_until = [one for one in in_flight if one not in again], now + SILENT_S
+            self._doubtful, self._doubtful_until = [one for one in in_flight if one not in again], now + _DOUBT_S
             self.notes.append(f"{named(fallen)} silent for {SILENT_S:.0f} s; others get {counted(len(again), 'task')}")
         elif now >= self._doubtful_until:
             again, self._doubtful_until = [future for future in self._doubtful if future in in_flight], math.inf

@@ -12,7 +12,14 @@ from boulder_sweep.columns import OUTCOME_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.evaluation import Evaluation, by_kernels
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.refinement import FACTOR, LAST_RESORT_STEPS, MOST_STEPS, finer_controls, reported_step_s
+from boulder_sweep.judge.refinement import (
+    AGREEING,
+    FACTOR,
+    LAST_RESORT_STEPS,
+    MOST_STEPS,
+    finer_controls,
+    reported_step_s,
+)
 from boulder_sweep.judge.verdict import Limits
 from tests.judge.plain import plain_designs
 
@@ -34,7 +41,7 @@ def test_steps_get_shorter_down_to_the_budget() -> None:
     assert last.h == CONTROL.horizon / LAST_RESORT_STEPS
     alone = CONTROL._replace(h=1e-6, error_estimate=False)
     assert list(finer_controls(alone)) == [last._replace(h=1e-6, error_estimate=False)]
-    assert len(list(finer_controls(CONTROL._replace(h=0.012, elements=100_000, error_estimate=True)))) == 1
+    assert len(list(finer_controls(CONTROL._replace(h=0.012, elements=100_000, error_estimate=True)))) == AGREEING
     sums = list(finer_controls(CONTROL._replace(elements=5000)))
     assert len(sums) < len(steps)
     assert not any(control.last_resort for control in sums)
