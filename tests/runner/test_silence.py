@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import threading
 
 import pytest
 
 from boulder_sweep.errors import BackendError, ClusterLostError
+from boulder_sweep.runner.backends import FETCH_S
 from boulder_sweep.runner.cluster import ClusterWorkers
 from boulder_sweep.runner.messages import Computed, Ended, Note
 from boulder_sweep.runner.remote import Done, received
@@ -285,3 +287,29 @@ def test_nothing_is_sent_while_all_workers_are_silent(work_off, monkeypatch):
     assert problem is None
     assert rows_of(messages) == list(range(0, ROWS, SIZE))
     assert cluster.shared == [["b"]]
+
+
+def test_nobody_waits_long_for_a_result_that_a_silent_worker_holds(work_off, monkeypatch):
+    """Worker b hangs after its tasks have ended: a longer wait for them is not where workers are looked at."""
+    cluster = Workers("a", "b", hung="b")
+    submit, result, asked = cluster.submit, Call.result, []
+
+    def submit_to_the_end(*arguments, **options):
+        call = submit(*arguments, **options)
+        if call.worker == "b":
+            call.end()
+        return call
+
+    def held(self, timeout):
+        if self.worker != "b":
+            return result(self, timeout)
+        asked.append((timeout, threading.current_thread() is threading.main_thread()))
+        raise TimeoutError
+
+    monkeypatch.setattr(cluster, "submit", submit_to_the_end)
+    monkeypatch.setattr(Call, "result", held)
+    messages, problem = work_off(cluster)
+    assert problem is None
+    assert rows_of(messages) == list(range(0, ROWS, SIZE))
+    assert {seconds for seconds, is_here in asked if is_here} == {FETCH_S}
+    assert max(seconds for seconds, is_here in asked if not is_here) > FETCH_S
