@@ -1,19 +1,20 @@
 """The lightest boulder that passes, found by a search over its dimensions and depth.
 
 For given other sides the lightest boulder has the least height that passes; each height is tried at several depths. The
-other sides are searched on a lattice that is refined around the best candidate of each row.
+other sides are searched on a lattice that is refined around the best candidate of each row. A lattice passes over
+boulders that pass in narrow stretches only, so random ones around its answer are tried at last, until none is lighter.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boulder_sweep.answers.keys import Key, sweep_ranges
 from boulder_sweep.answers.questions import Answers, replaced
-from boulder_sweep.answers.search import ALWAYS, BEYOND, FAILS, FOUND, HOLDS, NEVER, Search, search
+from boulder_sweep.answers.search import ALWAYS, BEYOND, FAILS, FOUND, HOLDS, NEVER, Search, last_before, search
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
 from boulder_sweep.errors import QuestionError
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 SHARE = "share"
 """Depth between the shallowest (0) and the deepest (1) that a boulder may have, searched like a side."""
+SCALE = "scale"
+"""Scale of all sides together, searched where the file gives a single boulder."""
 SIDES = ("boulder_length_m", "boulder_width_m", "boulder_height_m")
 HEIGHT, DEPTH, RATIO = "boulder_height_m", "embedment_depth_m", "embedment_ratio"
 MILLIMETRES = 1000
@@ -37,9 +40,18 @@ ROUNDS = 8
 """Number of finer lattices, each half as wide as the one before."""
 CELLS = 8
 """Pieces that the range of the height is cut into by the scan."""
+NEIGHBOURS = 8192
+"""Random boulders around the lightest so far that are drawn at a time."""
+NEAREST, FARTHEST = 1e-3, 0.1
+"""How far they are from it in each side [m], in scale and in depth (as a share): scales between these."""
+UNLUCKY = 3
+"""Draws in a row without a lighter boulder after which none is looked for any more."""
+WORTH = 1e-4
+"""Share of the mass by which a boulder must be lighter to be worth another draw."""
 
 Sides = dict[str, np.ndarray]
-"""Sides of boulders [m] by the names of their columns, and `SHARE` of those whose depth is searched."""
+"""Sides of boulders [m] by the names of their columns, `SHARE` of those whose depth is searched, `SCALE` of those that
+are scaled."""
 
 
 class LightestQuestion:
@@ -81,9 +93,9 @@ class LightestQuestion:
 
     @property
     def searched(self) -> dict[str, tuple[float, float]]:
-        """Bounds of what is searched: the free sides, and `SHARE` if the depth is free."""
+        """Bounds of what is searched: the free sides or the scale, and `SHARE` if the depth is free."""
         low, high = self.bounds[RATIO if RATIO in self.bounds else DEPTH]
-        bounds = {side: self.bounds[side] for side in self.free}
+        bounds = {side: self.bounds[side] for side in self.free} or {SCALE: SCALES}
         return bounds | {SHARE: (0.0, 1.0)} if low < high else bounds
 
     def answered(self, start: int, stop: int) -> Answers:
@@ -92,15 +104,13 @@ class LightestQuestion:
         n = stop - start
         # If the lightest boulder is as long, wide or high as it may be, a search for this side has no way to vary the
         # others at that end; the search for another side has.
-        trials = [_Boulders(self, rows, side) for side in reversed(self.free)] or [_Boulders(self, rows, None)]
-        others = [trial.lightest() for trial in trials]
-        found = [trial.certified(own) for trial, own in zip(trials, others, strict=True)]
+        trials = [_Boulders(self, rows, side) for side in reversed(self.free or [SCALE])]
+        found = [trial.certified(trial.lightest()) for trial in trials]
         best = _lightest(found)
-        sizes = {name: _taken((own.block.columns[name].to_numpy() for own in found), best) for name in SIDES}
-        if SHARE in others[0]:
-            sizes[SHARE] = _taken((own[SHARE] for own in others), best)
+        sizes = {name: _taken((own.sizes[name] for own in found), best) for name in self.searched}
+        sizes = trials[0].lighter(sizes, np.isfinite(_taken((own.passes for own in found), best)))
         # A side that is as small as it may be has no bracket; the same boulder has one by another side.
-        found += [trial.certified(sizes) for trial in trials]
+        found += [trial.bracketed(sizes) for trial in trials]
         best = _lightest(found)
         kind, fails, passes = (
             _taken((getattr(own, name) for own in found), best) for name in ("kind", "fails", "passes")
@@ -113,6 +123,29 @@ class LightestQuestion:
         return Answers(block, self.judges.own(block), kind, fails, passes, [None] * n, simulated)
 
 
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What a search found for n rows.
+
+    Attributes
+    ----------
+    sizes : dict of ndarray, shape (n,)
+        What is searched, of the boulders that pass or were tried last.
+    block : DesignBlock
+        Their designs.
+    kind : ndarray of int8, shape (n,)
+        Kind of answer, codes of `boulder_sweep.answers.search.WORDS`.
+    fails, passes : ndarray, shape (n,)
+        The bracket of the mass [kg]; NaN where there is none.
+    """
+
+    sizes: Sides
+    block: DesignBlock
+    kind: np.ndarray
+    fails: np.ndarray
+    passes: np.ndarray
+
+
 class _Boulders:
     """Tries boulders for some rows and counts the simulations.
 
@@ -123,13 +156,13 @@ class _Boulders:
     rows
         The other inputs.
     side
-        The side that is searched for, given the others and the depth; None if the boulder is scaled.
+        The side that is searched for, given the others and the depth, or `SCALE`.
     """
 
-    def __init__(self, asked: LightestQuestion, rows: Rows, side: str | None) -> None:
+    def __init__(self, asked: LightestQuestion, rows: Rows, side: str) -> None:
         self.asked, self.judges, self.rows, self.side = asked, asked.judges, rows, side
         self.simulated = 0
-        low, high = asked.bounds[side] if side else SCALES
+        low, high = asked.searched[side]
         self.first, self.last = round(low * MILLIMETRES), round(high * MILLIMETRES)
 
     def lightest(self) -> Sides:
@@ -184,7 +217,7 @@ class _Boulders:
     def sides(self, places: np.ndarray, others: Sides) -> Sides:
         """Return all sides [m] from the lattice place of the one searched for (or of the scale) and the others."""
         fixed = {side: np.full(len(places), self.asked.bounds[side][0]) for side in SIDES}
-        if self.side is None:
+        if self.side == SCALE:
             return {side: _millimetres(values * places / MILLIMETRES) for side, values in fixed.items()}
         return fixed | {side: others[side] for side in SIDES if side in others} | {self.side: places / MILLIMETRES}
 
@@ -195,7 +228,8 @@ class _Boulders:
         if np.array_equal(low, high):
             return _millimetres(np.broadcast_to(low, height.shape))
         deepest = np.clip(self._deepest(height, self.rows["bumper_height_m"][index]), low, high)
-        return _millimetres(low + (deepest - low) * share)
+        ends = np.ceil(low * MILLIMETRES - 1e-6) / MILLIMETRES, np.floor(deepest * MILLIMETRES + 1e-6) / MILLIMETRES
+        return np.clip(_millimetres(low + (deepest - low) * share), *ends)
 
     def _deepest(self, height: np.ndarray, bumper: np.ndarray) -> np.ndarray:
         """Return the greatest depth [m], in whole millimetres, at which the boulder's top overlaps the truck enough."""
@@ -210,8 +244,8 @@ class _Boulders:
         sides = self.sides(places, others)
         return np.prod([sides[side] for side in SIDES], axis=0) * self.rows["boulder_density_kg_m3"][index]
 
-    def certified(self, others: Sides) -> Answers:
-        """Return the answers for some other sides and depths, one for each row, judged with the sweep's accuracy."""
+    def certified(self, others: Sides) -> _Found:
+        """Return what the search finds for other sides and depths, one for each row, with the sweep's accuracy."""
         n = len(next(iter(self.rows.values())))
         index = np.arange(n)
         found = self.least(index, others, quick=True)
@@ -222,25 +256,89 @@ class _Boulders:
             wrong = np.flatnonzero(~agrees)
             part = self.least(wrong, {name: values[wrong] for name, values in others.items()}, quick=False)
             found = replaced(found, wrong, part)
-        at_least = found.holds == self.first
-        sides = self.sides(found.holds, others)
+        return self.found(others, found.shown, found.has_holds, found.fails, found.has_fails)
+
+    def bracketed(self, sizes: Sides) -> _Found:
+        """Return boulders with the last lighter ones that fail, by the side that is searched for."""
+        places = self.places(sizes)
+        index = np.arange(len(places))
+
+        def predicate(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
+            return self.codes(rows, places, {name: values[rows] for name, values in sizes.items()}, quick=False)
+
+        has_holds = predicate(index, places) == HOLDS
+        first = np.where(has_holds, self.first, places)
+        fails, holds, has_fails = last_before(predicate, places, first)
+        return self.found(sizes, holds, has_holds, fails, has_fails)
+
+    def found(
+        self, others: Sides, places: np.ndarray, passes: np.ndarray, fails: np.ndarray, has_fails: np.ndarray
+    ) -> _Found:
+        """Return what was found for all rows, from places of the side and whether boulders of this side pass."""
+        index = np.arange(len(places))
+        sides = self.sides(places, others)
+        at_least = places == self.first
         for side in self.asked.free:
             at_least &= sides[side] <= self.asked.bounds[side][0]
-        kind = np.where(found.has_holds, np.where(at_least, ALWAYS, FOUND), NEVER).astype(np.int8)
-        shown = self.block(index, found.shown, others)
-        self.simulated += n
-        return Answers(
-            shown,
-            self.judges.own(shown),
-            kind,
-            np.where(found.has_fails, self.mass(index, found.fails, others), np.nan),
-            np.where(found.has_holds, self.mass(index, found.holds, others), np.nan),
-            [None] * n,
-            self.simulated,
+        return _Found(
+            others | {self.side: places / MILLIMETRES},
+            self.block(index, places, others),
+            np.where(passes, np.where(at_least, ALWAYS, FOUND), NEVER).astype(np.int8),
+            np.where(has_fails, self.mass(index, fails, others), np.nan),
+            np.where(passes, self.mass(index, places, others), np.nan),
         )
 
+    def lighter(self, sizes: Sides, passing: np.ndarray) -> Sides:
+        """Return lighter boulders that pass than those of some rows, tried at random around the lightest so far."""
+        sizes = {name: values.copy() for name, values in sizes.items()}
+        mass = self.mass(np.arange(len(passing)), self.places(sizes), sizes)
+        unlucky = np.where(passing, 0, UNLUCKY)
+        draw = 0
+        while (rows := np.flatnonzero(unlucky < UNLUCKY)).size:
+            index, tried, masses = self.neighbours(rows, sizes, mass, draw)
+            # With the sweep's accuracy: the quick evaluation misses some that pass in a narrow stretch.
+            kept = self.codes(index, self.places(tried), tried, quick=False) == HOLDS
+            index, masses = index[kept], masses[kept]
+            tried = {name: values[kept] for name, values in tried.items()}
+            order = np.argsort(masses, kind="stable")
+            lucky, first = np.unique(index[order], return_index=True)
+            chosen = order[first]
+            better = {name: values[chosen] for name, values in tried.items()}
+            unlucky[rows] += 1
+            unlucky[lucky[masses[chosen] < (1.0 - WORTH) * mass[lucky]]] = 0
+            mass[lucky] = masses[chosen]
+            for name, values in better.items():
+                sizes[name][lucky] = values
+            draw += 1
+        return sizes
 
-def _lightest(found: Sequence[Answers]) -> np.ndarray:
+    def neighbours(
+        self, rows: np.ndarray, sizes: Sides, mass: np.ndarray, draw: int
+    ) -> tuple[np.ndarray, Sides, np.ndarray]:
+        """Return rows, sizes and masses of random boulders that are lighter than those of some rows."""
+        # The same for every row, so that an answer does not depend on the rows that are searched with it.
+        rng = np.random.default_rng(draw)
+        reach = NEAREST * (FARTHEST / NEAREST) ** rng.random(NEIGHBOURS)
+        index = np.repeat(rows, NEIGHBOURS)
+        tried = {}
+        for name, ends in self.asked.searched.items():
+            values = np.clip(sizes[name][rows][:, None] + reach * rng.uniform(-1.0, 1.0, NEIGHBOURS), *ends)
+            if name == SHARE:
+                # What passes by sliding may do so at any depth.
+                values = np.where(rng.random(NEIGHBOURS) < 0.5, values, rng.random(NEIGHBOURS)).ravel()
+                tried[name] = values
+            else:
+                tried[name] = _millimetres(values).ravel()
+        masses = self.mass(index, self.places(tried), tried)
+        kept = masses < mass[index]
+        return index[kept], {name: values[kept] for name, values in tried.items()}, masses[kept]
+
+    def places(self, sizes: Sides) -> np.ndarray:
+        """Return the places of the side that is searched for."""
+        return np.rint(sizes[self.side] * MILLIMETRES).astype(np.int64)
+
+
+def _lightest(found: Sequence[_Found]) -> np.ndarray:
     """Return the place of the lightest of several answers, one after the other, for each row; rather with a bracket."""
     n = len(found[0].passes)
     masses = [np.where(np.isnan(own.passes), np.inf, own.passes) + 1e-6 * np.isnan(own.fails) for own in found]

@@ -112,6 +112,42 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     return Search(kind, fails, held, has_fails, ~none, shown, changes)
 
 
+def last_before(
+    predicate: Predicate, holds: np.ndarray, first: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find where the predicate begins to hold, backwards from places at which it does.
+
+    Parameters
+    ----------
+    predicate
+        Evaluated at rows and places.
+    holds : ndarray of int64, shape (n,)
+        Places at which it holds.
+    first : ndarray of int64, shape (n,)
+        Places before which there is nothing to try, at most `holds`.
+
+    Returns
+    -------
+    fails, holds : ndarray of int64, shape (n,)
+        Adjacent places: the next place before at which it does not hold, or nearly the next if it changes often.
+    has_fails : ndarray of bool, shape (n,)
+        Whether there is such a place; else `holds` is `first`.
+    """
+    low, high = holds.copy(), holds.copy()
+    open_, stride = holds > first, 1
+    while open_.any():
+        rows = np.flatnonzero(open_)
+        places = np.maximum(high[rows] - stride, first[rows])
+        held = predicate(rows, places) == HOLDS
+        high[rows[held]], low[rows[~held]] = places[held], places[~held]
+        open_[rows] = held & (places > first[rows])
+        stride *= 2
+    has_fails = low < high
+    rows = np.flatnonzero(has_fails)
+    low[rows], high[rows] = _bisected(predicate, rows, low[rows], high[rows], np.ones(len(rows), dtype=bool))
+    return low, high, has_fails
+
+
 def _scanned(predicate: Predicate, places: np.ndarray) -> np.ndarray:
     """Return `FAILS`, `HOLDS` or `BEYOND` for some places of n rows, shape (n, cells + 1)."""
     n, cells = places.shape[0], places.shape[1] - 1
