@@ -20,7 +20,7 @@ from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, PASS, Judged, joined, not_computed, with_rows
-from boulder_sweep.judge.refinement import AGREEING, agree, finer_controls, is_late, is_open, reported_step_s
+from boulder_sweep.judge.refinement import AGREEING, FACTOR, agree, finer_controls, is_late, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 
@@ -136,16 +136,24 @@ class Evaluation:
         found, outcomes = self._once(designs, self.control)
         steps_s = np.full(designs.size, reported_step_s(self.control))
         wanting = AGREEING * is_late(found, outcomes, self.control)
+        compared_h = np.full(designs.size, self.control.h)
+        given_up = np.zeros(designs.size, dtype=bool)
         for control in finer_controls(self.control):
-            again = np.flatnonzero(is_open(found, control) | ((wanting > 0) & (not control.last_resort)))
+            # The last resort begins with longer steps than the usual ones end with.
+            is_finer = control.h <= FACTOR * compared_h
+            again = np.flatnonzero((is_open(found, control) & ~given_up) | ((wanting > 0) & is_finer))
             if not len(again):
-                break
+                if not wanting.any():
+                    break
+                continue
             some = designs.rows(again)
             finer, solution = self._once(some, control)
+            given_up[again] = control.last_resort & (finer.verdict == ERROR)
             confirmed = (wanting[again] > 0) & (finer.verdict == found.verdict[again])
             confirmed &= agree(_rows_of(outcomes, again), solution, some.table.v_0)
             wanting[again[confirmed]] -= 1
             taken = (finer.verdict != ERROR) & ~confirmed
+            compared_h[again[taken | confirmed]] = control.h
             places = again[taken]
             wanting[places] = AGREEING * is_late(finer, solution, control)[taken]
             found = with_rows(found, places, finer.rows(taken))

@@ -6,7 +6,8 @@ not see it. So a late row passes or overturns only if `AGREEING` others agree wi
 long as those before over the whole motion; until they do it is simulated again by finer steps, and is undecided where
 even the finest differ.
 
-What is still refused by the finest steps is simulated a last time by `boulder_kernels.last_resort`.
+What is still refused by the finest steps is simulated by `boulder_kernels.last_resort`, whose late rows need finer
+solutions of the same kind.
 """
 
 from __future__ import annotations
@@ -59,7 +60,8 @@ def finer_controls(control: Control) -> Iterator[Control]:
         yield control._replace(h=h, locate_yield=True)
     if control.elements == 0:
         h = min(control.h, control.horizon / LAST_RESORT_STEPS)
-        yield control._replace(h=h, locate_yield=True, last_resort=True)
+        for finer in range(1 + AGREEING if control.error_estimate else 1):
+            yield control._replace(h=h * FACTOR**finer, locate_yield=True, last_resort=True)
 
 
 def reported_step_s(control: Control) -> float:

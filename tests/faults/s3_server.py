@@ -10,6 +10,8 @@ import subprocess
 import sys
 from typing import Self
 
+from s3fs import S3FileSystem
+
 from tests.faults.processes import ROOT
 
 BUCKET, SECRET = "sweeps", "no-one-may-read-this"
@@ -19,6 +21,7 @@ class S3Server:
     """A server, and the environment that leads there."""
 
     def __enter__(self) -> Self:
+        S3FileSystem.clear_instance_cache()  # file systems of this process lead to an earlier server
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.faults.s3_server"],
             cwd=ROOT,

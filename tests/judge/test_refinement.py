@@ -32,13 +32,15 @@ def evaluation(control: Control = CONTROL, limits: Limits = LIMITS, simulate=by_
 
 
 def test_steps_get_shorter_down_to_the_budget() -> None:
-    *finer, last = finer_controls(CONTROL)
+    controls = list(finer_controls(CONTROL))
+    finer, (last, *confirming) = controls[: -1 - AGREEING], controls[-1 - AGREEING :]
     steps = [control.h for control in finer]
     assert np.allclose(np.divide(steps, [CONTROL.h, *steps[:-1]]), FACTOR, rtol=1e-12), "late rows compare such steps"
     assert FACTOR < steps[-1] * MOST_STEPS / CONTROL.horizon <= 1.0
     assert all(control.locate_yield and not control.last_resort for control in finer)
     assert last.last_resort
     assert last.h == CONTROL.horizon / LAST_RESORT_STEPS
+    assert confirming == [last._replace(h=last.h * FACTOR**n) for n in range(1, 1 + AGREEING)]
     alone = CONTROL._replace(h=1e-6, error_estimate=False)
     assert list(finer_controls(alone)) == [last._replace(h=1e-6, error_estimate=False)]
     assert len(list(finer_controls(CONTROL._replace(h=0.012, elements=100_000, error_estimate=True)))) == AGREEING
