@@ -43,7 +43,7 @@ CELLS = 8
 NEIGHBOURS = 8192
 """Random boulders around the lightest so far that are drawn at a time."""
 NEAREST, FARTHEST = 1e-3, 0.1
-"""How far they are from it in each side [m], in scale and in depth (as a share): scales between these."""
+"""How far they are from it in each side [m], in scale and in depth (as a share): log-uniform between these."""
 UNLUCKY = 3
 """Draws in a row without a lighter boulder after which none is looked for any more."""
 WORTH = 1e-4
@@ -300,15 +300,12 @@ class _Boulders:
             kept = self.codes(index, self.places(tried), tried, quick=False) == HOLDS
             index, masses = index[kept], masses[kept]
             tried = {name: values[kept] for name, values in tried.items()}
-            order = np.argsort(masses, kind="stable")
-            lucky, first = np.unique(index[order], return_index=True)
-            chosen = order[first]
-            better = {name: values[chosen] for name, values in tried.items()}
+            lucky, chosen = _least_of_each(index, masses)
             unlucky[rows] += 1
             unlucky[lucky[masses[chosen] < (1.0 - WORTH) * mass[lucky]]] = 0
             mass[lucky] = masses[chosen]
-            for name, values in better.items():
-                sizes[name][lucky] = values
+            for name, values in tried.items():
+                sizes[name][lucky] = values[chosen]
             draw += 1
         return sizes
 
@@ -343,6 +340,13 @@ def _lightest(found: Sequence[_Found]) -> np.ndarray:
     n = len(found[0].passes)
     masses = [np.where(np.isnan(own.passes), np.inf, own.passes) + 1e-6 * np.isnan(own.fails) for own in found]
     return np.argmin(masses, axis=0) * n + np.arange(n)
+
+
+def _least_of_each(index: np.ndarray, masses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows that an index names, and the place of the least mass of each; the first of equal ones."""
+    order = np.argsort(masses, kind="stable")
+    rows, first = np.unique(index[order], return_index=True)
+    return rows, order[first]
 
 
 def _taken(values: Iterable[np.ndarray], places: np.ndarray) -> np.ndarray:

@@ -1,14 +1,21 @@
-"""Sweeps that questions are put to."""
+"""Sweeps that questions are put to, and how their answers are judged again."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
+from boulder_sweep.answers.need import Need
+from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
 
+DEPTH = "embedment_depth_m"
 SITE = """
 name: site
 boulder:  {{length: {length}, width: {width}, height: {height}, density: 2600 kg/m^3}}
@@ -57,3 +64,11 @@ def random_designs(count: int, seed: int = 1) -> Sweep:
     columns = {name: rng.uniform(*pair, count) for name, pair in ends.items()}
     constants = {"bumper_height_m": 0.5, "hood_height_m": 1.4, "bed_offset_m": 2.9}
     return Sweep("random", None, (), constants, DesignList("random.csv", columns))
+
+
+def passes(found: Need, frame: pd.DataFrame, values: pd.Series, column: str) -> np.ndarray:
+    """Judge the designs of some answers with a value in a column, as `sweep run` judges a list of designs."""
+    listed = {name: frame[name].to_numpy(dtype=float) for name in INPUT_COLUMNS if name != "impact_height_m"}
+    listed[column] = values.to_numpy(dtype=float)
+    sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed), model=found.sweep.model)
+    return evaluation_of(sweep, accuracy_of(sweep), proved=False)(sweep.block(0, sweep.n_designs)).verdict == PASS

@@ -15,6 +15,7 @@ from boulder_sweep.answers.search import (
     NEVER,
     NOT_MONOTONE,
     Predicate,
+    last_before,
     search,
 )
 
@@ -113,3 +114,41 @@ def test_a_range_of_one_place() -> None:
 def test_no_rows() -> None:
     nothing = np.zeros(0, dtype=np.int64)
     assert len(search(stretches(), nothing, nothing).kind) == 0
+
+
+def test_the_last_before_is_that_of_a_loop() -> None:
+    """Random rows, some of which hold from their first place on."""
+    rng = np.random.default_rng(8)
+    first = rng.integers(-50, 50, 300)
+    holds = first + rng.integers(0, 600, 300)
+    begins = np.minimum(rng.integers(-100, 700, 300), holds)
+
+    def predicate(index: np.ndarray, places: np.ndarray) -> np.ndarray:
+        assert (places >= first[index]).all()
+        return np.where(places >= begins[index], HOLDS, FAILS)
+
+    fails, found, has_fails = last_before(predicate, holds, first)
+    for row in range(300):
+        place = holds[row]
+        while place > first[row] and place > begins[row]:
+            place -= 1
+        assert found[row] == place
+        assert has_fails[row] == (place > first[row])
+        assert fails[row] == place - 1 or not has_fails[row]
+
+
+def test_before_a_gap_that_is_stepped_over_the_last_is_of_the_next_one() -> None:
+    """From 100 backwards by 1, 2, 4, ... the places 99, 97, 93, 85, 69 are tried."""
+    narrow = stretches([(69, 86, HOLDS), (89, 100, HOLDS)], [(0, 60, HOLDS), (90, 100, HOLDS)])
+    fails, holds, has_fails = last_before(narrow, np.array([100, 100]), np.array([0, 0]))
+    assert (fails.tolist(), holds.tolist(), has_fails.all()) == ([68, 89], [69, 90], True)
+
+
+def test_at_the_first_place_there_is_none_before() -> None:
+    _, holds, has_fails = last_before(stretches([(5, 9, HOLDS)]), np.array([5]), np.array([5]))
+    assert (holds[0], has_fails[0]) == (5, False)
+
+
+def test_what_cannot_be_tried_does_not_hold() -> None:
+    fails, holds, _ = last_before(stretches([(0, 40, BEYOND), (41, 99, HOLDS)]), np.array([99]), np.array([0]))
+    assert (fails[0], holds[0]) == (40, 41)

@@ -6,6 +6,7 @@ import hashlib
 import json
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -79,12 +80,18 @@ def test_every_flipped_byte_of_the_records_is_noticed(tmp_path):
             load(tmp_path)
 
 
+def saved_by_another_version(folder: Path) -> Manifest:
+    """Save a manifest that names version 7.8.9."""
+    manifest = manifest_with_parts()
+    manifest.identity["versions"] = {"boulder-sweep": "7.8.9"}
+    save(manifest, DiskStorage(folder))
+    return manifest
+
+
 @pytest.mark.parametrize("form", OTHER_FORMS)
 def test_records_of_another_version_are_not_guessed_at(tmp_path, form):
     change, words = OTHER_FORMS[form]
-    manifest = manifest_with_parts()
-    manifest.identity["versions"] = {"boulder-sweep": "7.8.9"}
-    save(manifest, DiskStorage(tmp_path))
+    manifest = saved_by_another_version(tmp_path)
     rewrite_records(tmp_path, lambda records: None)
     assert load(tmp_path) == manifest
     rewrite_records(tmp_path, change)
@@ -98,9 +105,7 @@ def test_records_of_another_version_are_not_guessed_at(tmp_path, form):
 @pytest.mark.parametrize("form", READABLE_FORMS)
 def test_what_another_version_may_write_is_read_but_no_run_goes_on(tmp_path, form):
     change, words = READABLE_FORMS[form]
-    manifest = manifest_with_parts()
-    manifest.identity["versions"] = {"boulder-sweep": "7.8.9"}
-    save(manifest, DiskStorage(tmp_path))
+    manifest = saved_by_another_version(tmp_path)
     check_own(load(tmp_path), tmp_path)
     rewrite_records(tmp_path, change)
     assert load(tmp_path) == manifest
