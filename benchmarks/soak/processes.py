@@ -171,7 +171,8 @@ def data_files(folder: Path) -> list[str]:
 def names_in(folder: Path) -> list[str]:
     """Return the names in a folder, none where there is no folder."""
     try:
-        return sorted(os.listdir(folder))  # noqa: PTH208  # a thousand times a second
+        with os.scandir(folder) as entries:  # a thousand times a second
+            return sorted(entry.name for entry in entries)
     except FileNotFoundError:
         return []
 
