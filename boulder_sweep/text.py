@@ -1,4 +1,4 @@
-"""Numbers and problems as short text, and text of users' files made harmless where it is shown."""
+"""Numbers, progress and problems as short text, and text of users' files made harmless where it is shown."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import errno
 import json
 import math
 import os
+from collections.abc import Callable
 from typing import Any
 
 _LONGEST_LINE = 200
+ProgressCallback = Callable[[int, int], None]
+"""Called with how much is done, and of how much."""
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 

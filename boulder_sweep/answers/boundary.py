@@ -25,7 +25,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import FAIL, HORIZON, NO_CONTACT, NUMERICAL_ERROR, OVERRIDE, PASS, UNDECIDED
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import EMBEDMENT
 
@@ -99,7 +99,7 @@ class Boundary:
         columns["reason"] = pd.Categorical.from_codes(self.reason, list(REASONS))
         return pd.DataFrame(columns | {"simulated": self.simulated})
 
-    def write(self, path: str | Place) -> Place:
+    def write(self, path: str | Location) -> Location:
         """Write the map to a Parquet file.
 
         Raises
@@ -113,7 +113,7 @@ class Boundary:
         from boulder_sweep.store.provenance import file_metadata, identity
 
         judges = judges_of(self.sweep)
-        own = judges.own
+        own = judges.final
         found = identity(self.sweep.resolved(), *own.settings(), judges.accuracy.to_dict())
         table = pa.Table.from_pandas(self.frame, preserve_index=False)
         metadata = (table.schema.metadata or {}) | file_metadata(found, MAP)
@@ -153,7 +153,7 @@ def boundary(sweep: Sweep, *, jobs: int | None = None) -> Boundary:
         raise QuestionError(f"a map of {sweep.n_designs:,} designs is too large; at most {MOST_CELLS:,}")
     # Too little overlap is known from the inputs alone and ends the passing stretch of a line, so it is added last.
     judges = judges_of(replace(sweep, criterion=replace(sweep.criterion, min_overlap_m=0.0)))
-    judges.own.warm_up()
+    judges.final.warm_up()
     lines = _Lines(sweep, judges, threads(jobs))
     lines.fill()
     return _without_overlap(lines.map())
@@ -269,7 +269,7 @@ class _Lines:
                 for axis in source.axes:
                     place = place * self.shape[axis] + at[axis]
                 given[name] = source.to_numpy()[place]
-        judged = self.judges.own(block_of(given))
+        judged = self.judges.final(block_of(given))
         return judged.verdict.astype(np.int8), judged.reason.astype(np.int8)
 
     def located(self, lines: np.ndarray) -> np.ndarray:

@@ -110,6 +110,6 @@ def parted(margins: np.ndarray) -> list[Doubt]:
 def _numerical(sweep: Sweep, spread: Spread, rows: Rows, z: np.ndarray, judges: Judges, margins: np.ndarray) -> float:
     """Return the mean square of the estimated error of the margin as a share of the variance."""
     given = spread.filled({name: np.repeat(values, len(z)) for name, values in rows.items()}, z)
-    error = judges.own(block_of(given))["rotation_error_deg"] / sweep.criterion.max_rotation_deg
+    error = judges.final(block_of(given))["rotation_error_deg"] / sweep.criterion.max_rotation_deg
     error = error[np.isfinite(error)]
     return float((error**2).mean() / margins.var()) if len(error) and margins.var() > 0.0 else 0.0

@@ -82,7 +82,7 @@ class Draws:
         return self._measured(index, z, inputs)
 
     def reserve(self, index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the reserve of designs, positive where they pass, shape (m,); arguments as of `distance`.
+        """Return the reserve of designs, positive where they pass, shape (m,); arguments: see `distance`.
 
         Notes
         -----
@@ -109,7 +109,7 @@ class Draws:
         return np.concatenate(list(pieces)) if len(ends) else np.empty(0)
 
     def passes(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
-        """Return whether designs pass; arguments as of `distance`."""
+        """Return whether designs pass; arguments: see `distance`."""
         return self.distance(index, z, **inputs) > 0.0
 
     def given(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> Rows:
@@ -131,13 +131,13 @@ class Draws:
 
     def _each(self, given: Rows, judges: Judges, reserve: bool) -> np.ndarray:
         block = block_of(given)
-        judged = judges.quick(block)
+        judged = judges.coarse(block)
         found = _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)
-        if judges.quick is not judges.own:
+        if judges.coarse is not judges.final:
             near = np.flatnonzero(np.abs(judged["margin"] - judges.least_margin) < NEAR)
             if len(near):
                 closer = block_of({name: values[near] for name, values in given.items()})
-                again = judges.own(closer)
+                again = judges.final(closer)
                 found[near] = _reserve_of(again, judges, closer) if reserve else _distance_of(again, judges)
         return found
 
@@ -157,7 +157,7 @@ def _reserve_of(judged: Judged, judges: Judges, block: DesignBlock) -> np.ndarra
     margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
     parts = (
         np.where(np.isnan(margin), -FAST_OVERTURN_S / time, margin),
-        (height - depth - bumper - judges.own.limits.min_overlap) / OVERLAP_M,
+        (height - depth - bumper - judges.final.limits.min_overlap) / OVERLAP_M,
         1.0 - judged["vehicle_crush_m"] / np.maximum(bed, np.finfo(float).tiny),
     )
     # What is not known of a design neither helps nor harms it.

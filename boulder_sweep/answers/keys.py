@@ -12,7 +12,7 @@ from boulder_sweep.answers.moving import narrowed
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.leaf import LeafError, outside, read_single
-from boulder_sweep.settings.problems import Place, did_you_mean
+from boulder_sweep.settings.problems import Position, did_you_mean
 from boulder_sweep.settings.tree import Scalar
 
 if TYPE_CHECKING:
@@ -76,20 +76,20 @@ class Key:
         """Column of the answer: ``least_embedment_depth_m``."""
         return f"{'most' if self.most else 'least'}_{self.name}"
 
-    def values(self, places: np.ndarray) -> np.ndarray:
-        """Return the values at some places (whole numbers) of the search lattice."""
+    def values(self, positions: np.ndarray) -> np.ndarray:
+        """Return the values at some positions (whole numbers) of the search lattice."""
         per_unit = round(1.0 / self.tolerance)
         if per_unit > 1 and math.isclose(per_unit * self.tolerance, 1.0, rel_tol=1e-12):
-            return places / per_unit  # the float nearest to 1.234, as a file would give it
-        return places * self.tolerance
+            return positions / per_unit  # the float nearest to 1.234, as a file would give it
+        return positions * self.tolerance
 
     def ends(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the outermost lattice places within a range; the next one above its start where none is within."""
+        """Return the outermost lattice positions within a range; the next one above its start where none is within."""
         first, last = self.within(low, high)
         return first, np.maximum(first, last)
 
     def within(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the outermost lattice places within a range, the first behind the last where there is none."""
+        """Return the outermost lattice positions within a range, the first behind the last where there is none."""
         first = np.ceil(low / self.tolerance - 1e-6).astype(np.int64)
         return first, np.floor(high / self.tolerance + 1e-6).astype(np.int64)
 
@@ -154,7 +154,7 @@ def quantity(text: str | float, unit: str, option: str) -> float:
     if not isinstance(text, str):
         return float(text)
     try:
-        return float(read_quantity(Scalar(Place(option), text), unit).value)
+        return float(read_quantity(Scalar(Position(option), text), unit).value)
     except NumberError as problem:
         raise QuestionError(f"{option} {text}: {problem}") from None
 
@@ -193,7 +193,7 @@ def bound(text: str | float, field: fields.Field) -> float:
             raise QuestionError(f"{option}: {problem}")
         return float(text)
     try:
-        return read_single(Scalar(Place(option), text), field)
+        return read_single(Scalar(Position(option), text), field)
     except LeafError as problem:
         raise QuestionError(f"{option} {text}: {problem}") from None
 
@@ -239,7 +239,7 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
 def _whole_range(
     sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the search range, whatever the distribution of the input; arguments as of `range_of`."""
+    """Return the search range, whatever the distribution of the input; arguments: see `range_of`."""
     one = np.ones(len(next(iter(given.values()))))
     if between is not None:
         low, high = (bound(end, key.field) for end in between)

@@ -120,7 +120,7 @@ class LightestQuestion:
         }
         block = replace(taken(rows, np.arange(n), **columns), labels=self.open.labels(start, stop))
         simulated = sum(trial.simulated for trial in trials) + n
-        return Answers(block, self.judges.own(block), kind, fails, passes, [None] * n, simulated)
+        return Answers(block, self.judges.final(block), kind, fails, passes, [None] * n, simulated)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +205,7 @@ class _Boulders:
         """Return the predicate of `search`."""
         block = self.block(index, places, others)
         self.simulated += len(block)
-        judged = (self.judges.quick if quick else self.judges.own)(block)
+        judged = (self.judges.coarse if quick else self.judges.final)(block)
         return np.where(beyond_reach(block, judged), BEYOND, np.where(self.judges.holds(judged), HOLDS, FAILS))
 
     def block(self, index: np.ndarray, places: np.ndarray, others: Sides) -> DesignBlock:

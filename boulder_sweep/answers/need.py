@@ -7,7 +7,7 @@ run`` would judge them. If that disagrees, the row is searched again with the ac
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,11 +23,12 @@ from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
 from boulder_sweep.columns import OPTIONAL_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import pool
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.settings.model import ReadingChoice
+from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 
     from boulder_sweep.settings import Sweep
 
-Told = Callable[[int, int], None]
 """Called with the number of rows done and the total."""
 
 
@@ -117,7 +117,7 @@ class Need:
             "rows": self.arrow.to_pylist(),
         }
 
-    def write(self, path: str | Place) -> Place:
+    def write(self, path: str | Location) -> Location:
         """Write the answers to a Parquet file.
 
         Raises
@@ -155,7 +155,7 @@ def need(
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,
-    told: Told | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Need:
     """Find the smallest value of an input that passes, for every combination of the others.
 
@@ -185,7 +185,7 @@ def need(
         Threads; all cores by default. The answers do not depend on it.
     backend, scheduler
         Where to search: ``threading``, or ``dask`` and the address of a scheduler, as for `boulder_sweep.run`.
-    told
+    progress
         Called as the search progresses.
 
     Returns
@@ -229,9 +229,9 @@ def need(
     variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep)) if open_readings else ()
     sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings else [sweep]
     asked = [_question(one, key, between, judges_of(one, least_margin), probability, seed, variants) for one in sweeps]
-    asked[0].judges.own.warm_up()
-    if told is not None:
-        told(0, asked[0].count)
+    asked[0].judges.final.warm_up()
+    if progress is not None:
+        progress(0, asked[0].count)
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
     tables, simulated, done = [], 0, 0
     with pool(jobs, backend, scheduler) as workers:
@@ -239,8 +239,8 @@ def need(
             tables.append(table)
             simulated += count
             done += len(table)
-            if told is not None:
-                told(done, asked[0].count)
+            if progress is not None:
+                progress(done, asked[0].count)
     from boulder_sweep.answers.tables import joined_tables
 
     table = joined_tables(tables, _metadata(asked[0], least_margin))
@@ -295,7 +295,7 @@ def _metadata(asked: Question | LightestQuestion, least_margin: float) -> dict[b
     """Return the metadata of a file of answers."""
     from boulder_sweep.store.provenance import file_metadata, identity
 
-    own = asked.judges.own
+    own = asked.judges.final
     accuracy = asked.judges.accuracy.to_dict()
     found = identity(asked.sweep.resolved(), own.readings._asdict(), own.control._asdict(), accuracy)
     question = {"asked": asked.key.answer, "tolerance": asked.key.tolerance, "margin": least_margin}

@@ -96,7 +96,7 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES, units: st
 def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
     """Return probabilities as lines: varying inputs, verdict at the means, probability, most influential input.
 
-    Parameters as of `need_lines`. For a single design, its Sobol indices follow.
+    Parameters: see `need_lines`. For a single design, its Sobol indices follow.
     """
     count = len(found)
     rows = _shown_rows(found.arrow, most, units)

@@ -104,13 +104,13 @@ class Question:
         rows = uncertain_rows(self.open.sweep, self.open.rows(start, stop), start, stop)
         first, last = self.lattice(rows)
         trial = self.trial(rows)
-        found = search(trial.quick, first, last, self.cells)
+        found = search(trial.coarse, first, last, self.cells)
         every = np.arange(stop - start)
         block, judged = trial.judged(every, found.shown)
         wrong = trial.contradicted(found, block, judged)
         if len(wrong):
             ends = first[wrong], last[wrong]
-            part = search(lambda index, places: trial.own(wrong[index], places), *ends, self.cells)
+            part = search(lambda index, places: trial.final(wrong[index], places), *ends, self.cells)
             found = replaced(found, wrong, part)
             judged = with_rows(judged, wrong, trial.judged(wrong, part.shown)[1])
             block = trial.block(every, found.shown)
@@ -201,11 +201,11 @@ class Trial:
         self.key, self.judges, self.rows = key, judges, rows
         self.simulated = 0
 
-    def quick(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def coarse(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Predicate of the search, without an error estimate."""
         return self._codes(index, places, quick=True)
 
-    def own(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def final(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Predicate of the search, with the accuracy of the sweep."""
         return self._codes(index, places, quick=False)
 
@@ -213,7 +213,7 @@ class Trial:
         """Return the designs with these values, and their verdicts."""
         block = self.block(index, places)
         self.simulated += len(index)
-        return block, (self.judges.quick if quick else self.judges.own)(block)
+        return block, (self.judges.coarse if quick else self.judges.final)(block)
 
     def block(self, index: np.ndarray, places: np.ndarray) -> DesignBlock:
         """Return the designs with these values."""
@@ -231,7 +231,7 @@ class Trial:
         """
         wrong = (self.codes(block, judged) == HOLDS) != found.has_holds
         bracketed = np.flatnonzero(found.has_holds & found.has_fails)
-        wrong[bracketed] |= self.own(bracketed, found.fails[bracketed]) == HOLDS
+        wrong[bracketed] |= self.final(bracketed, found.fails[bracketed]) == HOLDS
         # Rows that are not monotone have several brackets, all of which must be certified.
         return np.flatnonzero(wrong | (found.kind == NOT_MONOTONE))
 

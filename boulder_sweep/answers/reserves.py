@@ -18,7 +18,8 @@ from boulder_sweep.answers.questions import Trial, replaced
 from boulder_sweep.answers.search import FAILS, HOLDS, Search, search
 from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
 from boulder_sweep.designs import block_of
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
+from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,7 +39,6 @@ ISO_MASS_KG = 7200.0
 CLASS_TOLERANCE = 0.02
 """A class applies to a truck of one mass; none is named if the mass differs by more than this share."""
 
-Told = Callable[[int, int], None]
 """Called with the number of rows done and the total."""
 
 
@@ -92,7 +92,7 @@ class Reserves:
         """Return everything as plain data."""
         return {"name": self.sweep.name, "rows": self.arrow.to_pylist()}
 
-    def write(self, path: str | Place) -> Place:
+    def write(self, path: str | Location) -> Location:
         """Write the table to a Parquet file.
 
         Raises
@@ -105,7 +105,7 @@ class Reserves:
         return write_parquet(self.arrow, path)
 
 
-def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None) -> Reserves:
+def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallback | None = None) -> Reserves:
     """Find what every design of a sweep withstands.
 
     Parameters
@@ -114,7 +114,7 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None)
         The sweep.
     jobs
         Threads; all cores by default.
-    told
+    progress
         Called as the search progresses.
 
     Returns
@@ -135,17 +135,17 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, told: Told | None = None)
 
     sweep.require_values()
     judges = judges_of(sweep)
-    judges.own.warm_up()
-    if told is not None:
-        told(0, sweep.n_designs)
+    judges.final.warm_up()
+    if progress is not None:
+        progress(0, sweep.n_designs)
     tables, done = [], 0
     pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
     for table in threads(jobs)(joblib.delayed(_table)(sweep, judges, start, stop) for start, stop in pieces):
         tables.append(table)
         done += len(table)
-        if told is not None:
-            told(done, sweep.n_designs)
-    own = judges.own
+        if progress is not None:
+            progress(done, sweep.n_designs)
+    own = judges.final
     found = identity(sweep.resolved(), own.readings._asdict(), own.control._asdict(), judges.accuracy.to_dict())
     return Reserves(sweep, joined_tables(tables, file_metadata(found, "boulder_sweep.answers.reserves")))
 
@@ -188,10 +188,10 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
         return changed
 
     every = np.arange(len(first))
-    found = search(predicate(trial.quick, every), first, last)
+    found = search(predicate(trial.coarse, every), first, last)
     wrong = np.flatnonzero(~_certified(trial, found, passes))
     if len(wrong):
-        part = search(predicate(trial.own, wrong), first[wrong], last[wrong])
+        part = search(predicate(trial.final, wrong), first[wrong], last[wrong])
         found = replaced(found, wrong, part)
     # `fails` is the last place before the change; for a design that passes, that is the withstood value.
     at = np.where(passes, np.where(found.has_holds, found.fails, last), found.holds)
@@ -205,7 +205,7 @@ def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
     agrees = np.ones(len(passes), dtype=bool)
     for has, places, changed in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
         rows = np.flatnonzero(has)
-        agrees[rows] &= (trial.own(rows, places[rows]) == HOLDS) == (passes[rows] != changed)
+        agrees[rows] &= (trial.final(rows, places[rows]) == HOLDS) == (passes[rows] != changed)
     return agrees
 
 
@@ -236,7 +236,7 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
 
     rows = sweep.plan.given_rows(start, stop)
     block = block_of(rows)
-    judged = judges.own(block)
+    judged = judges.final(block)
     passes = judges.holds(judged)
     columns: list[tuple[str, str, str, Any]] = []
     values = {}

@@ -20,7 +20,7 @@ from boulder_sweep.answers.sensitivity import Indices
 from boulder_sweep.answers.subset import FAILING
 from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
-from boulder_sweep.places import Place, RemotePath, place_of
+from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.provenance import identity_in, judged_by, sha256_of
 from boulder_sweep.store.schema import part_table
@@ -249,7 +249,7 @@ def joined_tables(tables: Sequence[pa.Table], metadata: Mapping[bytes, bytes]) -
     return table.replace_schema_metadata({PANDAS_ATTRIBUTES: json.dumps(attributes).encode(), **metadata})
 
 
-def write_parquet(table: pa.Table, path: str | Place) -> Place:
+def write_parquet(table: pa.Table, path: str | Location) -> Location:
     """Write a table to a Parquet file, by path or URL.
 
     Raises
@@ -335,7 +335,7 @@ def _is_of(type_: str, kind: pa.DataType) -> bool:
     return pa.types.is_floating(kind) or pa.types.is_integer(kind)
 
 
-def checked_parquet(path: str | Place) -> Place:
+def checked_parquet(path: str | Location) -> Location:
     """Check and return the path or URL of a Parquet file to be written.
 
     Raises
@@ -343,7 +343,7 @@ def checked_parquet(path: str | Place) -> Place:
     QuestionError
         The name has another ending, or its folder does not exist or holds the result of a run.
     """
-    target = place_of(path)
+    target = location_of(path)
     if target.suffix.lower() != ".parquet":
         raise QuestionError(f"{path}: answers are a Parquet file; its name must end in .parquet")
     check_target(target, QuestionError)

@@ -80,11 +80,11 @@ def taken(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> DesignBlock:
 
 @dataclasses.dataclass(frozen=True)
 class Judges:
-    """Two evaluations of designs: a quick one to search, and that of the sweep to certify.
+    """Two evaluations of designs: a coarse one to search, and that of the sweep to certify.
 
     Parameters
     ----------
-    quick, own
+    coarse, final
         A single solution without an error estimate; the accuracy of the sweep.
     accuracy
         The sweep's own accuracy.
@@ -92,8 +92,8 @@ class Judges:
         Margin that a design must have to count as passing. Both evaluations prove that it lasts.
     """
 
-    quick: Evaluation
-    own: Evaluation
+    coarse: Evaluation
+    final: Evaluation
     accuracy: Accuracy
     least_margin: float = 0.0
 
@@ -110,12 +110,12 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
     horizon.
     """
     accuracy = accuracy_of(sweep)
-    own = dataclasses.replace(evaluation_of(sweep, accuracy, proved=False), least_margin=least_margin)
-    quick = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False), proved=False)
-    quick = dataclasses.replace(quick, only=SEARCHED, least_margin=least_margin)
-    if not accuracy.error_estimate and accuracy.steps.step_s >= quick.control.h:
-        quick = own
-    return Judges(quick, own, accuracy, least_margin)
+    final = dataclasses.replace(evaluation_of(sweep, accuracy, proved=False), least_margin=least_margin)
+    coarse = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False), proved=False)
+    coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin)
+    if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
+        coarse = final
+    return Judges(coarse, final, accuracy, least_margin)
 
 
 def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,9 +18,10 @@ from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import Pool, pool
+from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +37,6 @@ SAMPLES = 4096
 OUTPUTS = ("passes", "margin")
 """Outputs of the indices: whether a design passes, and its distance from failing."""
 
-Told = Callable[[int, int], None]
 """Called with the number of rows done and the total."""
 
 
@@ -85,7 +84,7 @@ class Uncertainty:
             "indices": self.indices.to_pylist(),
         }
 
-    def write(self, path: str | Place) -> list[Place]:
+    def write(self, path: str | Location) -> list[Location]:
         """Write the table to a Parquet file, with indices and samples next to it; return the paths.
 
         Raises
@@ -125,7 +124,7 @@ def uncertainty(
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,
-    told: Told | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Uncertainty:
     """Estimate the probability of passing for every design of a sweep with uncertain inputs.
 
@@ -150,7 +149,7 @@ def uncertainty(
         Threads; all cores by default.
     backend, scheduler
         Where to sample: ``threading``, or ``dask`` and the address of a scheduler, as for `boulder_sweep.run`.
-    told
+    progress
         Called as the sampling progresses.
 
     Raises
@@ -171,9 +170,9 @@ def uncertainty(
     if rare and sweep.n_designs > MOST_INDEXED:
         raise QuestionError(f"--rare takes up to {MOST_INDEXED} designs; this file has {sweep.n_designs:,}")
     asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most, rare)
-    asked.judges.own.warm_up()
-    if told is not None:
-        told(0, sweep.n_designs)
+    asked.judges.final.warm_up()
+    if progress is not None:
+        progress(0, sweep.n_designs)
     points = Points(len(asked.spread.names), seed)
     tables, done = [], 0
     few = sweep.n_designs <= MOST_INDEXED
@@ -181,8 +180,8 @@ def uncertainty(
         for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE):
             tables.append(_rows(asked, points, workers, start, stop))
             done += stop - start
-            if told is not None:
-                told(done, sweep.n_designs)
+            if progress is not None:
+                progress(done, sweep.n_designs)
         drawn = [_sensitivity(asked, points, workers, row) for row in range(sweep.n_designs if few else 0)]
     from boulder_sweep.answers.tables import index_table, joined_tables, sample_table
 
@@ -216,7 +215,7 @@ class _Asked:
         """Return the metadata of a file."""
         from boulder_sweep.store.provenance import file_metadata, identity
 
-        own = self.judges.own
+        own = self.judges.final
         found = identity(
             self.sweep.resolved(), own.readings._asdict(), own.control._asdict(), self.judges.accuracy.to_dict()
         )
@@ -250,7 +249,7 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     driver = drivers(z, first[0])
     failing = rare_failing(asked, draws, found) if asked.rare else None
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
-    return chance_table(start, block, asked.judges.own(block), found, driver, asked.spread.words, failing)
+    return chance_table(start, block, asked.judges.final(block), found, driver, asked.spread.words, failing)
 
 
 def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Failing:

@@ -11,7 +11,7 @@ from boulder_sweep.columns import BY_NAME, VERDICTS
 from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:
-    from boulder_sweep.places import Place
+    from boulder_sweep.locations import Location
     from boulder_sweep.runner.estimate import Estimate
     from boulder_sweep.runner.summary import Summary
     from boulder_sweep.settings import Sweep
@@ -118,7 +118,7 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
     return [found, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
-def dry_run_lines(sweep: Sweep, out: Place, effort: Estimate) -> list[str]:
+def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:
     """Return what a run would do, and the time and space it needs."""
     return [
         *grid_lines(sweep),

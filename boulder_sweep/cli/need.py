@@ -78,7 +78,7 @@ def need(
     refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out, picture)
-    with working(quiet, kernels_for(sweep)) as told:
+    with working(quiet, kernels_for(sweep)) as progress:
         found = find(
             sweep,
             least,
@@ -92,7 +92,7 @@ def need(
             jobs=jobs,
             backend=backend,
             scheduler=scheduler,
-            told=told,
+            progress=progress,
         )
     if as_json:
         show(json.dumps(found.to_dict()))

@@ -11,7 +11,7 @@ import click
 
 from boulder_sweep.cli.options import OUTPUT, units_option
 from boulder_sweep.cli.output import say, show
-from boulder_sweep.places import beside, place_of
+from boulder_sweep.locations import beside, location_of
 
 EXAMPLES = """\b
 Examples:
@@ -55,7 +55,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
 
     require_matplotlib()
     source = _of_map(out) if _is_map(Path(out)) else _of_run(out)
-    target = checked_kind(picture or beside(place_of(out.removesuffix(".parquet")), ".png"))
+    target = checked_kind(picture or beside(location_of(out.removesuffix(".parquet")), ".png"))
     if source.rows_done == 0:
         raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
     settings = source.settings
@@ -96,7 +96,7 @@ def _of_run(out: str) -> _Source:
     from boulder_sweep.store.finished import FinishedRows
     from boulder_sweep.views.pieces import finished_pieces
 
-    finished = FinishedRows(place_of(out))
+    finished = FinishedRows(location_of(out))
     settings, done = finished.identity["settings"], finished.rows_done
     return _Source(finished_pieces(finished), settings, finished.judged_by, done, finished.rows)
 

@@ -101,7 +101,7 @@ def working(
 
         begun = time.monotonic()
 
-        def told(done: int, total: int) -> None:
+        def update(done: int, total: int) -> None:
             nonlocal begun
             now = time.monotonic()
             if done == 0:  # what went before was compiling, and does not count as simulation
@@ -112,7 +112,7 @@ def working(
             left = seconds / done * (total - done) if done else None
             shown(Progress(done, total, seconds, done / seconds, left))
 
-        yield told
+        yield update
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import click
 
 from boulder_sweep.cli.options import OUTPUT, units_option
 from boulder_sweep.cli.output import show
-from boulder_sweep.places import beside, place_of
+from boulder_sweep.locations import beside, location_of
 
 EXAMPLES = """\b
 Examples:
@@ -42,8 +42,8 @@ def report(out: str, page: str | None, designs: tuple[int, ...], units: str) -> 
     """
     from boulder_sweep.report import checked_page, write_report
 
-    folder = place_of(out)
-    target = checked_page(page) if page else beside(place_of(out.removesuffix(".parquet")), ".html")
+    folder = location_of(out)
+    target = checked_page(page) if page else beside(location_of(out.removesuffix(".parquet")), ".html")
     command = shlex.join(["sweep", *sys.argv[1:]])
     written = write_report(folder, target, designs=designs, units=units, command=command)
     show(f"{written}: {written.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")

@@ -14,7 +14,7 @@ from boulder_sweep.cli.loading import load_sweep
 from boulder_sweep.cli.options import RUN_EXAMPLES, cluster_options, json_option, run_options, set_option, talk_options
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.places import Place, place_of
+from boulder_sweep.locations import Location, location_of
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def run(
     if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
         raise click.UsageError("--dashboard needs --backend dask, without --scheduler, which has its own dashboard")
     sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
-    target = place_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
+    target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
         return _dry_run(sweep, target, options, as_json)
     if verbose:
@@ -83,7 +83,7 @@ def run(
     return summary.exit_code
 
 
-def _dry_run(sweep: Sweep, out: Place, options: dict[str, Any], as_json: bool) -> int:
+def _dry_run(sweep: Sweep, out: Location, options: dict[str, Any], as_json: bool) -> int:
     """Show what a run would do."""
     from boulder_sweep.cli import console
     from boulder_sweep.runner.sweeper import estimate
@@ -98,7 +98,7 @@ def _dry_run(sweep: Sweep, out: Place, options: dict[str, Any], as_json: bool) -
 
 
 def _resume_command(
-    grid: str, out: Place, overrides: Sequence[str], accuracy: str | None, options: dict[str, Any]
+    grid: str, out: Location, overrides: Sequence[str], accuracy: str | None, options: dict[str, Any]
 ) -> str:
     """Return the command that resumes this run."""
     words = ["sweep", "run", grid, "-o", str(out)]

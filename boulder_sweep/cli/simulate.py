@@ -75,8 +75,8 @@ def simulate(
     if energy is not None:
         result.plot_energy(energy, units=units)
     if animate is not None:
-        with working(quiet, None, f"drawing {animate}", "frames") as told:
-            result.animate(animate, told)
+        with working(quiet, None, f"drawing {animate}", "frames") as progress:
+            result.animate(animate, progress)
     for file in (plot, trajectory, energy, animate):
         if file is not None and not quiet:
             say(f"written  {file}")

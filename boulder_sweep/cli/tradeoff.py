@@ -79,8 +79,10 @@ def tradeoff(
         require_matplotlib()
         make_folder(Path(out))
     with working(quiet, doing="measuring"):
-        tell = None if quiet else say
-        found = measure(sweep, designs=designs, seconds=seconds, backend=backend, scheduler=scheduler, tell=tell)
+        progress = None if quiet else say
+        found = measure(
+            sweep, designs=designs, seconds=seconds, backend=backend, scheduler=scheduler, progress=progress
+        )
     files = [] if out is None else found.write(out)
     if as_json:
         show(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))

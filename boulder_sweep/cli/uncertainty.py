@@ -81,7 +81,7 @@ def uncertainty(
     sweep = load_sweep(grid, overrides, quiet)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
-    with working(quiet, kernels_for(sweep)) as told:
+    with working(quiet, kernels_for(sweep)) as progress:
         found = estimate(
             sweep,
             half_width=half_width,
@@ -92,7 +92,7 @@ def uncertainty(
             jobs=jobs,
             backend=backend,
             scheduler=scheduler,
-            told=told,
+            progress=progress,
         )
     parts = []
     if doubts:

@@ -41,8 +41,8 @@ def which(
     refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out)
-    with working(quiet, kernels_for(sweep)) as told:
-        found = reserves(sweep, jobs=jobs, told=told)
+    with working(quiet, kernels_for(sweep)) as progress:
+        found = reserves(sweep, jobs=jobs, progress=progress)
     show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found, units=units)))
     if out is not None:
         found.write(out)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_sweep.settings.numbers import NumberError, split_number
-from boulder_sweep.settings.problems import Place, ProblemList, cell_place, did_you_mean, shorten
+from boulder_sweep.settings.problems import Position, ProblemList, cell_position, did_you_mean, shorten
 from boulder_sweep.settings.source import check_regular_file, refuse
 from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
 
@@ -100,16 +100,16 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     problems = ProblemList()
     if len(header.cells) > MOST_COLUMNS:
         raise refuse(str(file), f"has {len(header.cells):,} columns; at most {MOST_COLUMNS:,} are read")
-    columns = [_column(cell, header.place(index), wanted, problems) for index, cell in enumerate(header.cells)]
+    columns = [_column(cell, header.position(index), wanted, problems) for index, cell in enumerate(header.cells)]
     named = [column and column.signal.name for column in columns]
     for index, name in enumerate(named):
         if name is not None and name in named[:index]:
-            problems.add(header.place(index), name, "stands in two columns")
+            problems.add(header.position(index), name, "stands in two columns")
     if not problems and TIME.name not in named:
-        problems.add(header.place(0), "", "has no column of time, such as 'time [ms]'")
+        problems.add(header.position(0), "", "has no column of time, such as 'time [ms]'")
     if not problems and len(named) < 2:
         names = ", ".join(signal.name for signal in wanted if signal is not TIME)
-        problems.add(header.place(0), "", f"has nothing beside time; it may hold {names}")
+        problems.add(header.position(0), "", f"has nothing beside time; it may hold {names}")
     problems.raise_if_any()
     values = _values(rows, columns, problems)
     if not problems:
@@ -135,9 +135,9 @@ class _Row(NamedTuple):
     delimiter: str
     cells: list[str]
 
-    def place(self, index: int) -> Place:
+    def position(self, index: int) -> Position:
         """Return where a cell begins."""
-        return cell_place(str(self.file), self.line, self.text, self.delimiter, index)
+        return cell_position(str(self.file), self.line, self.text, self.delimiter, index)
 
 
 def _rows(file: Path) -> list[_Row]:
@@ -172,7 +172,7 @@ def _holds_something(text: str) -> bool:
     return bool(text.strip(" \t\r\n,;")) and not text.startswith("#")
 
 
-def _column(cell: str, place: Place, wanted: Sequence[Signal], problems: ProblemList) -> _Column | None:
+def _column(cell: str, position: Position, wanted: Sequence[Signal], problems: ProblemList) -> _Column | None:
     """Return what a cell of the header names; with a mistake it is reported and None returned."""
     name, unit = _split_header(cell.strip())
     known = {word: signal for signal in wanted for word in (signal.name, *signal.other_names)}
@@ -180,17 +180,17 @@ def _column(cell: str, place: Place, wanted: Sequence[Signal], problems: Problem
     signal = known.get(plain)
     if signal is None:
         names = ", ".join(signal.name for signal in wanted)
-        problems.add(place, shorten(cell), f"is not known{did_you_mean(plain, known)}; a file may hold {names}")
+        problems.add(position, shorten(cell), f"is not known{did_you_mean(plain, known)}; a file may hold {names}")
         return None
     if not unit:
         problems.add(
-            place, shorten(cell), f"has no unit; write it in brackets, such as '{signal.name} [{signal.unit}]'"
+            position, shorten(cell), f"has no unit; write it in brackets, such as '{signal.name} [{signal.unit}]'"
         )
         return None
     try:
         return _Column(signal, _factor(unit, signal.unit))
     except UnitError as error:
-        problems.add(place, shorten(cell), str(error))
+        problems.add(position, shorten(cell), str(error))
         return None
 
 
@@ -224,13 +224,13 @@ def _values(rows: list[_Row], columns: Sequence[_Column | None], problems: Probl
         if len(row.cells) != len(columns):
             plural = "" if len(row.cells) == 1 else "s"
             message = f"has {len(row.cells)} cell{plural}; the first line has {len(columns)}"
-            problems.add(row.place(0), "", message)
+            problems.add(row.position(0), "", message)
             continue
         for index, (cell, column) in enumerate(zip(row.cells, columns, strict=True)):
             if column is not None and cell.strip():
                 value = _number(cell)
                 if isinstance(value, str):
-                    problems.add(row.place(index), column.signal.name, value)
+                    problems.add(row.position(index), column.signal.name, value)
                 else:
                     values[column.signal.name][number] = value * column.factor
     return values
@@ -254,7 +254,7 @@ def _number(cell: str) -> float | str:
 def _check_time(rows: list[_Row], column: int, time: np.ndarray, problems: ProblemList) -> None:
     """Report times that are missing or do not ascend."""
     for number in np.flatnonzero(np.isnan(time))[:5]:
-        problems.add(rows[number].place(column), TIME.name, "is missing in this row")
+        problems.add(rows[number].position(column), TIME.name, "is missing in this row")
     for number in np.flatnonzero(np.diff(time) <= 0.0)[:5]:
         message = f"{time[number + 1]:.6g} s comes after {time[number]:.6g} s; times must ascend"
-        problems.add(rows[number + 1].place(column), TIME.name, message)
+        problems.add(rows[number + 1].position(column), TIME.name, message)

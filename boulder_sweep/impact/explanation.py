@@ -18,7 +18,7 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import Evaluation, known_control
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import limits_of
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
 from boulder_sweep.settings.shown_units import shown_values
@@ -114,7 +114,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     IndexError
         The table has no such row, or not yet.
     """
-    folder = place_of(out)
+    folder = location_of(out)
     manifest = load_manifest(folder)
     there = manifest.identity
     row = read_row(folder, design_id)

@@ -250,17 +250,17 @@ class Trajectory:
         """Draw the impact from the side at one instant, by default when the contact force peaks; see `plot`."""
         draw("side_view", "draw_still", self, path, time_s=time_s)
 
-    def animate(self, path: str | Path, told: Callable[[int, int], None] | None = None) -> None:
+    def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> None:
         """Draw a moving side view: .gif, .mp4 (needs ffmpeg) or .html; see `plot`.
 
         Parameters
         ----------
         path
             File to write.
-        told
+        progress
             Told how many frames of how many are drawn.
         """
-        draw("animation", "animate", self, path, told)
+        draw("animation", "animate", self, path, progress)
 
 
 def _plain(value: Any) -> float | None:

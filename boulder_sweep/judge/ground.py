@@ -75,7 +75,7 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0)
 def layers_of(table: DesignTable, law: str, ground: Ground, turned: float = 0.0) -> np.ndarray:
     """Return the layers of n designs as `boulder_kernels.layered` takes them, shape (n, M, 6) (Eqs 105, 106).
 
-    Parameters as of `with_soil`. A layer that the water table cuts becomes two.
+    Parameters: see `with_soil`. A layer that the water table cuts becomes two.
     """
     n, slope = table.d.size, np.radians(ground.slope_deg)
     water = np.inf if ground.water_table_m is None else ground.water_table_m

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import INPUT_COLUMNS
-from boulder_sweep.places import Place, RemotePath, place_of
+from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.provenance import differences
 from boulder_sweep.store.reader import read
@@ -94,12 +94,12 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     StoreError
         There is no result in a folder, or it is damaged.
     """
-    tables = [_table(place_of(folder)) for folder in (before, after)]
+    tables = [_table(location_of(folder)) for folder in (before, after)]
     keys = [f"key_{name}" for name in INPUT_COLUMNS]
     matched = tables[0].merge(
         tables[1].drop(columns=[*INPUT_COLUMNS, "mass_kg"]), on=[*keys, "nth"], suffixes=("_before", "_after")
     )
-    one, other = (FinishedRows(place_of(folder)) for folder in (before, after))
+    one, other = (FinishedRows(location_of(folder)) for folder in (before, after))
     passing = [table[table.verdict == "pass"] for table in tables]
     return Comparison(
         matched=matched.drop(columns=[*keys, "nth"]),
@@ -114,7 +114,7 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     )
 
 
-def _table(folder: Place) -> pd.DataFrame:
+def _table(folder: Location) -> pd.DataFrame:
     """Read a result with the keys for matching; repeated designs are numbered."""
     table = read(folder, ["design_id", *INPUT_COLUMNS, *OUTCOMES])
     for name in ("verdict", "reason"):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from boulder_sweep.errors import ReportError
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_column
 from boulder_sweep.store.files import replacing
@@ -61,7 +61,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         The units are unknown.
     """
     check_system(units)
-    target, finished = Path(file), FinishedRows(place_of(out))
+    target, finished = Path(file), FinishedRows(location_of(out))
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")

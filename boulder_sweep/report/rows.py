@@ -16,7 +16,7 @@ import numpy as np
 
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.validity import flag_counts
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.report.chances import ChanceFile
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.store.finished import FinishedRows
@@ -66,7 +66,7 @@ class Rows:
 
     Attributes
     ----------
-    folder : Place
+    folder : Location
         Where they are.
     finished : FinishedRows or ChanceFile
         Those that were there when they were read.
@@ -86,7 +86,7 @@ class Rows:
         other, and for a grid against its shape.
     """
 
-    folder: Place
+    folder: Location
     finished: FinishedRows | ChanceFile
     names: tuple[str, ...]
     codes: np.ndarray
@@ -223,7 +223,7 @@ class Rows:
         return next(self.finished.tables(["p_pass"])).column("p_pass").to_numpy()
 
 
-def read_rows(folder: Place) -> Rows:
+def read_rows(folder: Location) -> Rows:
     """Read what the page needs of a result.
 
     Raises
@@ -270,7 +270,7 @@ def read_rows(folder: Place) -> Rows:
     return Rows(folder, finished, (*names, NOT_YET), codes, told, axes, sets, inputs)
 
 
-def _check_whole(file: ChanceFile, path: Place) -> None:
+def _check_whole(file: ChanceFile, path: Location) -> None:
     """Refuse a file from which rows were taken, or whose rows were put in another order."""
     asked, ids = file.identity["settings"]["n_designs"], next(file.tables(["design_id"])).column("design_id").to_numpy()
     if len(ids) != asked or not np.array_equal(ids, np.arange(asked)):

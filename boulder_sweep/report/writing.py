@@ -13,7 +13,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.evaluation import control_of, known_control, readings_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import Named, answer_of
 from boulder_sweep.report.rows import read_rows, thinned
 from boulder_sweep.settings import Sweep
@@ -64,7 +64,7 @@ def write_report(
     """
     check_system(units)
     assembled = _page_maker()
-    rows = read_rows(place_of(out))
+    rows = read_rows(location_of(out))
     target = checked_page(page)
     if rows.finished.rows_done == 0:
         raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` shows its progress")

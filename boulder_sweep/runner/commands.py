@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from typing import TYPE_CHECKING
 
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -18,7 +18,7 @@ def repeat_command(sweep: Sweep) -> str:
     return shlex.join(["sweep", "run", sweep.path.name, *_overrides(sweep)])
 
 
-def resume_command(sweep: Sweep, out: Place, jobs: int | None, backend: str, scheduler: str | None) -> str:
+def resume_command(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
     """Return the command that resumes a run with the given arguments."""
     if sweep.path is None:
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.judge.evaluation import Evaluation
-from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
 from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.writer import ROWS_PER_PART
@@ -194,7 +194,7 @@ def estimated(
     rows: int,
     rows_to_compute: int,
     jobs: int,
-    out: Place | None,
+    out: Location | None,
     rows_per_part: int = ROWS_PER_PART,
     cores: int | None = None,
 ) -> Estimate:
@@ -249,7 +249,7 @@ def rows_per_task(estimate: Estimate, rows_per_part: int) -> int:
     return rows - rows % rows_per_part if rows > rows_per_part else rows
 
 
-def refuse_hopeless(sweep: Sweep, rows_to_compute: int, out: Place) -> None:
+def refuse_hopeless(sweep: Sweep, rows_to_compute: int, out: Location) -> None:
     """Refuse, without compiling or computing anything, a table that cannot fit on the disk.
 
     Raises
@@ -309,7 +309,7 @@ def tasks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, i
         yield first, last
 
 
-def _disk_free(out: Place) -> int | None:
+def _disk_free(out: Location) -> int | None:
     """Free space on the disk where a folder is, or would be created; None for an object store."""
     if isinstance(out, RemotePath):
         return None

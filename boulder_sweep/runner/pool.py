@@ -118,7 +118,7 @@ class Pool:
 
 @contextmanager
 def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = None) -> Iterator[Pool]:
-    """Give a pool on a backend; arguments as of `boulder_sweep.run`.
+    """Give a pool on a backend; arguments: see `boulder_sweep.run`.
 
     Raises
     ------

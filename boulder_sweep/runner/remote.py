@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from boulder_sweep.errors import BackendError
-from boulder_sweep.places import place_of
+from boulder_sweep.locations import location_of
 from boulder_sweep.runner.computing import Computation, EncodedPart
 from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.store.lock import LOCK_NAME
@@ -82,7 +82,7 @@ def received(work: Work) -> Work:
 def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
     """Compute, encode and stage some rows on a worker, part by part."""
     prepare(work)
-    folder = place_of(work.folder)
+    folder = location_of(work.folder)
     done = Done([], [])
     if not relayed and not (folder / LOCK_NAME).exists():
         return done

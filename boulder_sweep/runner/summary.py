@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 
 if TYPE_CHECKING:
     from boulder_sweep.store.manifest import Manifest
@@ -69,7 +69,7 @@ class Summary:
         What the user should know: damaged parts that were computed again, lost workers.
     """
 
-    out: Place
+    out: Location
     rows: int
     rows_computed: int
     verdicts: dict[str, int]
@@ -138,7 +138,7 @@ def progress_of(rows_before: int, rows_computed: int, rows: int, seconds: float,
 
 
 def summary_of(
-    out: Place,
+    out: Location,
     manifest: Manifest,
     *,
     rows_computed: int,

@@ -16,7 +16,7 @@ from boulder_sweep.errors import BoulderSweepError, ClusterLostError, Computatio
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
 from boulder_sweep.runner.backends import available_cores, check_backend, check_count, check_jobs, start_failure
 from boulder_sweep.runner.commands import repeat_command
@@ -114,7 +114,7 @@ def run(
         SIGINT or SIGTERM arrived (main thread only); the run can be resumed.
     """
     begun = time.monotonic()
-    out = place_of(out)
+    out = location_of(out)
     _check_arguments(sweep, jobs, rows_per_part, commit_every_s, progress)
     sweep.require_values()
     check_backend(backend, scheduler)
@@ -208,7 +208,7 @@ def estimate(
     sweep.require_values()
     accuracy = accuracy_of(sweep)
     evaluation = evaluation_of(sweep, accuracy, simulate)
-    folder = None if out is None else place_of(out)
+    folder = None if out is None else location_of(out)
     rows_there, rows_per_part = 0, ROWS_PER_PART
     if resume and folder is not None:
         try:

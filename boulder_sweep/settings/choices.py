@@ -37,7 +37,7 @@ def read_setting(node: Node, field: Field) -> Any:
 
 
 def _wrong(node: Node, message: str) -> LeafError:
-    return LeafError([Mistake(node.place, message)])
+    return LeafError([Mistake(node.position, message)])
 
 
 def _shown(node: Node) -> str:
@@ -74,7 +74,7 @@ def _read_readings(node: Node) -> ReadingChoice:
                 known = ("preset", *SWITCHES)
                 hint = did_you_mean(entry.key, known)
                 message = f"'{shorten(entry.key)}' is not a reading ({', '.join(known)}){hint}"
-                mistakes.append(Mistake(entry.place, message))
+                mistakes.append(Mistake(entry.position, message))
         except LeafError as error:
             mistakes.extend(error.mistakes)
     if mistakes:

@@ -19,15 +19,15 @@ def check_complete(entries: Entries) -> None:
     for field in fields.INPUTS:
         if field.name in listed and field.path in entries.given:
             message = f"is given here and as column {field.name} of the table; remove one"
-            entries.problems.add(entries.place_of(field), field.path, message)
+            entries.problems.add(entries.position_of(field), field.path, message)
         if not field.optional and not unread_table and field.path not in present | entries.misspelled:
-            entries.problems.add(entries.place_of(field), field.path, "is required and missing")
+            entries.problems.add(entries.position_of(field), field.path, "is required and missing")
     _check_embedment(entries, present, unread_table)
     if entries.root.get("table") is not None:
         for name, leaf in entries.leaves.items():
             if leaf.is_axis:
                 message = "must be one value beside a table; lists and ranges are axes of a grid"
-                entries.problems.add(leaf.place, fields.BY_NAME[name].path, message)
+                entries.problems.add(leaf.position, fields.BY_NAME[name].path, message)
 
 
 def _check_embedment(entries: Entries, present: set[str], unread_table: bool) -> None:
@@ -35,9 +35,9 @@ def _check_embedment(entries: Entries, present: set[str], unread_table: bool) ->
     given = [field for field in ways if field.path in present]
     keys = " or ".join(field.key for field in ways)
     if len(given) > 1:
-        entries.problems.add(entries.place_of(given[1]), given[1].path, f"give {keys}, not both")
+        entries.problems.add(entries.position_of(given[1]), given[1].path, f"give {keys}, not both")
     elif not given and not unread_table and not {field.path for field in ways} & entries.misspelled:
-        entries.problems.add(entries.place_of(ways[0]), "site", f"{keys} is required and missing")
+        entries.problems.add(entries.position_of(ways[0]), "site", f"{keys} is required and missing")
 
 
 def check_pairs(entries: Entries) -> None:
@@ -46,7 +46,7 @@ def check_pairs(entries: Entries) -> None:
     if bumper is not None and hood is not None and hood < bumper:
         key = "hood_height" if "vehicle.hood_height" in entries.given else "bumper_height"
         message = f"the hood ({hood:g} m) is lower than the bumper ({bumper:g} m)"
-        entries.problems.add(entries.key_place("vehicle", key), f"vehicle.{key}", message)
+        entries.problems.add(entries.key_position("vehicle", key), f"vehicle.{key}", message)
     _check_impact_height(entries, bumper)
     _check_second_spring(entries)
     _check_solver(entries)
@@ -64,7 +64,7 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
     exposed = height - depth
     if exposed > bumper and impact > exposed * (1 + 1e-12):
         message = f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
-        entries.problems.add(entries.leaves["impact_height_m"].place, "site.impact_height", message)
+        entries.problems.add(entries.leaves["impact_height_m"].position, "site.impact_height", message)
 
 
 def _check_second_spring(entries: Entries) -> None:
@@ -76,20 +76,20 @@ def _check_second_spring(entries: Entries) -> None:
     if len(given) == 1:
         lacking = next(field for field in both if field not in given)
         message = f"needs {lacking.key} beside it"
-        entries.problems.add(entries.key_place("vehicle", given[0].key), given[0].path, message)
+        entries.problems.add(entries.key_position("vehicle", given[0].key), given[0].path, message)
     spring, second = entries.single("vehicle_spring_N_m"), entries.single(names[0])
     if spring is not None and second is not None and second < spring:
         message = f"{second:g} N/m is softer than the first spring of {spring:g} N/m; a front that softens is refused"
-        entries.problems.add(entries.key_place("vehicle", both[0].key), both[0].path, message)
+        entries.problems.add(entries.key_position("vehicle", both[0].key), both[0].path, message)
 
 
 def _check_solver(entries: Entries) -> None:
-    place = entries.key_place("solver", "step")
+    position = entries.key_position("solver", "step")
     step, horizon = entries.settings.get("step_s"), entries.settings.get("horizon_s", SolverSettings().horizon_s)
     if {"solver.accuracy", "solver.step"} <= entries.given:
-        entries.problems.add(place, "solver.step", "give accuracy or step, not both")
+        entries.problems.add(position, "solver.step", "give accuracy or step, not both")
     elif step is not None and step > horizon:
-        entries.problems.add(place, "solver.step", f"is longer than the horizon of {horizon:g} s")
+        entries.problems.add(position, "solver.step", f"is longer than the horizon of {horizon:g} s")
 
 
 def _check_uncertain(entries: Entries) -> None:
@@ -98,11 +98,11 @@ def _check_uncertain(entries: Entries) -> None:
     pair = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
     if "correlation" in entries.settings and not pair <= uncertain and pair <= set(entries.leaves):
         message = "needs a distribution of soil.friction_angle and one of soil.subgrade_reaction"
-        entries.problems.add(entries.key_place("soil", "correlation"), "soil.correlation", message)
+        entries.problems.add(entries.key_position("soil", "correlation"), "soil.correlation", message)
     if "partial_factor" in entries.settings and "friction_angle_deg" in uncertain:
-        place = entries.key_place("partial_factor", "friction_angle")
+        position = entries.key_position("partial_factor", "friction_angle")
         message = "give a partial factor or a distribution of soil.friction_angle, not both"
-        entries.problems.add(place, "partial_factor.friction_angle", message)
+        entries.problems.add(position, "partial_factor.friction_angle", message)
 
 
 def _check_ground(entries: Entries) -> None:
@@ -115,7 +115,7 @@ def _check_ground(entries: Entries) -> None:
         least = math.degrees(math.atan(math.tan(math.radians(min(angles))) / factor)) if len(angles) else math.inf
         if slope >= least:
             message = f"must be less than every friction angle (the least is {least:.4g} deg), or the ground slides"
-            entries.problems.add(entries.key_place("soil", "slope"), "soil.slope", message)
+            entries.problems.add(entries.key_position("soil", "slope"), "soil.slope", message)
     if water is not None:
         top_is_wet = not layers or layers[0].from_m > water
         bottoms = [*(layer.from_m for layer in layers[1:]), math.inf]
@@ -123,4 +123,4 @@ def _check_ground(entries: Entries) -> None:
         densities += [*entries.values("soil_density_kg_m3")] if top_is_wet else []
         if densities and min(densities) <= WATER_KG_M3:
             message = f"soil of {min(densities):g} kg/m^3 would float; give the density of the saturated soil below it"
-            entries.problems.add(entries.key_place("soil", "water_table"), "soil.water_table", message)
+            entries.problems.add(entries.key_position("soil", "water_table"), "soil.water_table", message)

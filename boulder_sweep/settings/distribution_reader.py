@@ -73,7 +73,7 @@ def _read_distribution(node: Mapping, field: Field) -> Leaf:
         except LeafError as error:
             mistakes.extend(error.mistakes)
         except NumberError as error:
-            mistakes.append(Mistake(value.place, str(error)))
+            mistakes.append(Mistake(value.position, str(error)))
         return None
 
     low, high, mode = (read(key, lambda value: read_single(value, field)) for key in ("low", "high", "mode"))
@@ -92,14 +92,14 @@ def _read_distribution(node: Mapping, field: Field) -> Leaf:
         sd=sd,
         cov=cov,
         mode=mode,
-        place=node.place,
+        position=node.position,
     )
     if given is None:
         ends = (distribution.low, *(() if mode is None else (mode,)), distribution.high)
-        leaf = Leaf(np.array([sum(ends) / len(ends)]), False, node.place, distribution)
+        leaf = Leaf(np.array([sum(ends) / len(ends)]), False, node.position, distribution)
     else:
         values = given.values if centre == "mean" else _means(node, kind, given.values, sd, cov)
-        leaf = Leaf(values, given.is_axis, node.place, distribution)
+        leaf = Leaf(values, given.is_axis, node.position, distribution)
     _check_values(node, leaf, distribution, field)
     return leaf
 
@@ -111,12 +111,12 @@ def _kind(node: Mapping) -> str:
         named = next((key for key in node.entries if key in KINDS), None)
         if named is not None:
             message = f"write the kind as an entry of its own: {{distribution: {named}, mean: ..., sd: ...}}"
-            raise LeafError([Mistake(node.entries[named].place, message)])
+            raise LeafError([Mistake(node.entries[named].position, message)])
         return "normal"
     word = value.text.strip() if isinstance(value, Scalar) else ""
     if word not in KINDS:
         hint = did_you_mean(word, KINDS)
-        raise LeafError([Mistake(value.place, f"'{shorten(word)}' is not a distribution: {', '.join(KINDS)}{hint}")])
+        raise LeafError([Mistake(value.position, f"'{shorten(word)}' is not a distribution: {', '.join(KINDS)}{hint}")])
     return word
 
 
@@ -129,15 +129,15 @@ def _check_keys(node: Mapping, kind: str) -> None:
             hint = "" if entry.key in _KEYS else did_you_mean(entry.key, _KEYS)
             known = ", ".join(key for key in _KEYS if key in taken)
             message = f"'{shorten(entry.key)}' is not a key of a {kind} distribution ({known}){hint}"
-            mistakes.append(Mistake(entry.place, message))
+            mistakes.append(Mistake(entry.position, message))
     for group in NEEDED[kind]:
         given = [key for key in group if key in node.entries]
         if len(given) > 1:
-            mistakes.append(Mistake(node.entries[given[1]].place, f"give {' or '.join(group)}, not both"))
+            mistakes.append(Mistake(node.entries[given[1]].position, f"give {' or '.join(group)}, not both"))
         elif not given and not mistakes:
-            mistakes.append(Mistake(node.place, f"a {kind} distribution needs {' or '.join(group)}"))
+            mistakes.append(Mistake(node.position, f"a {kind} distribution needs {' or '.join(group)}"))
     if node.unit is not None:
-        mistakes.append(Mistake(node.unit.place, "write the unit behind each number of a distribution"))
+        mistakes.append(Mistake(node.unit.position, "write the unit behind each number of a distribution"))
     if mistakes:
         raise LeafError(mistakes)
 
@@ -152,10 +152,10 @@ def _positive(node: Node, unit: str) -> float:
 def _means(node: Mapping, kind: str, fractile: np.ndarray, sd: float | None, cov: float | None) -> np.ndarray:
     """Return the means that belong to characteristic values."""
     if kind == "lognormal" and cov is None:
-        raise LeafError([Mistake(node.place, "a characteristic value of a lognormal distribution needs cov")])
+        raise LeafError([Mistake(node.position, "a characteristic value of a lognormal distribution needs cov")])
     if kind == "normal" and cov is not None and FRACTILE_5 * cov >= 1.0:
         message = "a normal distribution this wide has no positive 5 % fractile; use lognormal"
-        raise LeafError([Mistake(node.entries["cov"].place, message)])
+        raise LeafError([Mistake(node.entries["cov"].position, message)])
     return mean_of_fractile(kind, fractile, sd, cov)
 
 
@@ -175,4 +175,4 @@ def _check_values(node: Mapping, leaf: Leaf, distribution: Distribution, field: 
         if np.any(distribution.deviation(leaf.values) >= largest):
             message = f"the standard deviation must be less than {largest.min():.4g}{unit} between these ends"
     if message:
-        raise LeafError([Mistake(node.place, message)])
+        raise LeafError([Mistake(node.position, message)])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from boulder_sweep.settings.problems import Place
+from boulder_sweep.settings.problems import Position
 
 KINDS = ("normal", "lognormal", "uniform", "triangular", "beta")
 FRACTILE_5 = 1.6448536269514722
@@ -35,7 +35,7 @@ class Distribution:
         before truncation; the others reach from one end to the other. The admitted range where the file names none.
     mode : float or None
         Most likely value; triangular only.
-    place : Place
+    position : Position
         Where it stands in the file.
     """
 
@@ -45,7 +45,7 @@ class Distribution:
     sd: float | None = None
     cov: float | None = None
     mode: float | None = None
-    place: Place = field(default_factory=lambda: Place(""), compare=False)
+    position: Position = field(default_factory=lambda: Position(""), compare=False)
 
     def deviation(self, mean: np.ndarray) -> np.ndarray:
         """Return the standard deviation (before truncation) for some means, in the unit of the column.
@@ -102,9 +102,9 @@ class SetDistributions:
     each: tuple[Distribution | None, ...]
 
     @property
-    def place(self) -> Place:
+    def position(self) -> Position:
         """Where the first of them stands in the file."""
-        return next(own.place for own in self.each if own is not None)
+        return next(own.position for own in self.each if own is not None)
 
     def words(self, unit: str) -> str:
         """Return kind and spread of each in words; `unit` is that of the column."""

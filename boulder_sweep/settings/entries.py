@@ -13,7 +13,7 @@ from boulder_sweep.settings.choices import read_setting
 from boulder_sweep.settings.distribution_reader import read_input
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_single
-from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
+from boulder_sweep.settings.problems import Position, ProblemList, nearest, shorten
 from boulder_sweep.settings.springs import unfold_springs
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
@@ -67,7 +67,7 @@ class Entries:
         self._read_table()
         for problem in unfold_springs(self.root):
             self.given.add("vehicle.spring")
-            self.problems.add(problem.place, "vehicle.spring", problem.message)
+            self.problems.add(problem.position, "vehicle.spring", problem.message)
         for section in fields.SECTIONS:
             self._read_block(section)
 
@@ -79,10 +79,10 @@ class Entries:
         from boulder_sweep.settings.table import read_table
 
         if not isinstance(node, Scalar) or not node.text.strip():
-            self.problems.add(node.place, "table", "must be the name of a .csv, .xlsx or .parquet file")
+            self.problems.add(node.position, "table", "must be the name of a .csv, .xlsx or .parquet file")
             return
         # A name in the file is relative to the file's folder, one given by --set to the current directory.
-        folder = self.path.parent if node.place.file == str(self.path) else Path()
+        folder = self.path.parent if node.position.file == str(self.path) else Path()
         self.table = read_table(node, folder, self.problems)
 
     def _read_block(self, section: str) -> None:
@@ -97,7 +97,7 @@ class Entries:
             self._read_sets(section, node, known)
             return
         if not isinstance(node, Mapping) or node.unit is not None:
-            self.problems.add(node.place, section, f"must be a block of keys: {', '.join(known)}")
+            self.problems.add(node.position, section, f"must be a block of keys: {', '.join(known)}")
             return
         for inner in node:
             field = known.get(inner.key)
@@ -112,18 +112,18 @@ class Entries:
                     self.settings[field.name] = read_setting(inner.value, field)
             except LeafError as error:
                 for mistake in error.mistakes:
-                    self.problems.add(mistake.place, field.path, mistake.message)
+                    self.problems.add(mistake.position, field.path, mistake.message)
 
     def _read_sets(self, section: str, node: Sequence, known: dict[str, fields.Field]) -> None:
         """Read a list of named sets: ``[{name: loose, density: 1700 kg/m^3, ...}, ...]``."""
         before = len(self.problems.problems)
         names: list[str] = []
         columns: dict[str, list[Leaf]] = {}
-        items = node.items or [Scalar(node.place, "")]
+        items = node.items or [Scalar(node.position, "")]
         for item in items:
             if not isinstance(item, Mapping):
                 message = "must be a list of blocks, each with a name and one value per key"
-                self.problems.add(item.place, section, message)
+                self.problems.add(item.position, section, message)
                 continue
             names.append(self._read_set_name(section, item, names))
             for inner in item:
@@ -132,7 +132,7 @@ class Entries:
                     continue
                 if field is not None and field not in fields.INPUTS:
                     message = f"is not a key of {section} in a named set: it is one for all designs of a file"
-                    self.problems.add(inner.place, field.path, message)
+                    self.problems.add(inner.position, field.path, message)
                     continue
                 if field is None:
                     self._unknown(inner, section, ("name", *(key for key in known if known[key] in fields.INPUTS)))
@@ -142,26 +142,26 @@ class Entries:
                     columns.setdefault(field.name, []).append(_one_of_set(inner.value, field))
                 except LeafError as error:
                     for mistake in error.mistakes:
-                        self.problems.add(mistake.place, field.path, mistake.message)
+                        self.problems.add(mistake.position, field.path, mistake.message)
             if len(self.problems.problems) == before:
                 ragged = [name for name, values in columns.items() if len(values) != len(names)]
                 for name in ragged:
                     message = "must be given in every named set, or in none"
-                    self.problems.add(item.place, fields.BY_NAME[name].path, message)
+                    self.problems.add(item.position, fields.BY_NAME[name].path, message)
         if len(self.problems.problems) == before:
             self.sets[section] = tuple(names)
-            self.leaves |= {name: _axis_of_sets(section, leaves, node.place) for name, leaves in columns.items()}
+            self.leaves |= {name: _axis_of_sets(section, leaves, node.position) for name, leaves in columns.items()}
 
     def _read_set_name(self, section: str, item: Mapping, taken: list[str]) -> str:
         """Return the name of a named set."""
         node = item.get("name")
         name = node.text.strip() if isinstance(node, Scalar) else ""
         if not NAME.fullmatch(name):
-            place = item.place if node is None else node.place
+            position = item.position if node is None else node.position
             message = "every named set needs a name of at most 80 letters, digits, spaces and - _ . +"
-            self.problems.add(place, f"{section}.name", message)
+            self.problems.add(position, f"{section}.name", message)
         elif name in taken:
-            self.problems.add(item.place, f"{section}.name", f"'{name}' is given twice")
+            self.problems.add(item.position, f"{section}.name", f"'{name}' is given twice")
         return name
 
     def inputs_of_sets(self, section: str) -> list[fields.Field]:
@@ -188,7 +188,7 @@ class Entries:
         where = section or "the file"
         name = shorten(entry.key) or "(empty)"
         path = f"{section}.{name}" if section else name
-        self.problems.add(entry.place, path, f"is not a key of {where} (keys: {', '.join(known)}){hint}")
+        self.problems.add(entry.position, path, f"is not a key of {where} (keys: {', '.join(known)}){hint}")
 
     def single(self, name: str) -> float | None:
         """Return the single value of a quantity, its default where it has one, None for axes and tables."""
@@ -207,17 +207,17 @@ class Entries:
         leaf = self.leaves.get(name)
         return np.empty(0) if leaf is None else leaf.values
 
-    def place_of(self, field: fields.Field) -> Place:
+    def position_of(self, field: fields.Field) -> Position:
         """Return where a quantity stands, else its block, else the beginning of the file."""
-        return self.key_place(field.section, field.key)
+        return self.key_position(field.section, field.key)
 
-    def key_place(self, section: str, key: str) -> Place:
+    def key_position(self, section: str, key: str) -> Position:
         """Return where a key stands, else its block, else the beginning of the file."""
         entry = self.root.entries.get(section)
         if entry is None:
-            return self.root.place
+            return self.root.position
         inner = entry.value.entries.get(key) if isinstance(entry.value, Mapping) else None
-        return entry.place if inner is None else inner.place
+        return entry.position if inner is None else inner.position
 
 
 def _one_of_set(node: Node, field: fields.Field) -> Leaf:
@@ -230,14 +230,14 @@ def _one_of_set(node: Node, field: fields.Field) -> Leaf:
     """
     leaf = read_input(node, field)
     if leaf.distribution is None:
-        return Leaf(np.array([read_single(node, field)]), False, node.place)
+        return Leaf(np.array([read_single(node, field)]), False, node.position)
     if leaf.is_axis:
-        raise LeafError([Mistake(node.place, "must have one mean in a named set")])
+        raise LeafError([Mistake(node.position, "must have one mean in a named set")])
     return leaf
 
 
-def _axis_of_sets(section: str, leaves: list[Leaf], place: Place) -> Leaf:
+def _axis_of_sets(section: str, leaves: list[Leaf], position: Position) -> Leaf:
     """Return the values that the named sets give for an input, as an axis."""
     each = tuple(own if isinstance(own := leaf.distribution, Distribution) else None for leaf in leaves)
     spread = SetDistributions(section, each) if any(each) else None
-    return Leaf(np.concatenate([leaf.values for leaf in leaves]), True, place, spread)
+    return Leaf(np.concatenate([leaf.values for leaf in leaves]), True, position, spread)

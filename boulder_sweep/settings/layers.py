@@ -33,7 +33,7 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
     """
     if not isinstance(node, Sequence) or not 1 <= len(node.items) <= MOST_LAYERS:
         message = f"must be a list of 1 to {MOST_LAYERS} layers, each a block of keys: {', '.join(LAYER_FIELDS)}"
-        raise LeafError([Mistake(node.place, message)])
+        raise LeafError([Mistake(node.position, message)])
     layers: list[Layer] = []
     mistakes: list[Mistake] = []
     for item in node.items:
@@ -44,7 +44,7 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
             continue
         if layers and layer.from_m <= layers[-1].from_m:
             message = f"begins at {layer.from_m:g} m, not below the layer before it ({layers[-1].from_m:g} m)"
-            mistakes.append(Mistake(item.place, message))
+            mistakes.append(Mistake(item.position, message))
         layers.append(layer)
     if mistakes:
         raise LeafError(mistakes)
@@ -54,7 +54,7 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
 def _read_layer(node: Node) -> Layer:
     """Read one layer; single values only."""
     if not isinstance(node, Mapping):
-        raise LeafError([Mistake(node.place, f"a layer must be a block of keys: {', '.join(LAYER_FIELDS)}")])
+        raise LeafError([Mistake(node.position, f"a layer must be a block of keys: {', '.join(LAYER_FIELDS)}")])
     values: dict[str, float] = {}
     mistakes: list[Mistake] = []
     for entry in node:
@@ -62,15 +62,15 @@ def _read_layer(node: Node) -> Layer:
         if field is None:
             hint = did_you_mean(entry.key, tuple(LAYER_FIELDS))
             message = f"'{shorten(entry.key)}' is not a key of a layer ({', '.join(LAYER_FIELDS)}){hint}"
-            mistakes.append(Mistake(entry.place, message))
+            mistakes.append(Mistake(entry.position, message))
             continue
         try:
             values[_NAMES[entry.key]] = read_single(entry.value, field)
         except LeafError as error:
-            mistakes.extend(Mistake(found.place, f"{entry.key}: {found.message}") for found in error.mistakes)
+            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
     missing = [key for key in LAYER_FIELDS if key not in node.entries and key != "cohesion"]
     if missing:
-        mistakes.append(Mistake(node.place, f"the layer lacks {', '.join(missing)}"))
+        mistakes.append(Mistake(node.position, f"the layer lacks {', '.join(missing)}"))
     if mistakes:
         raise LeafError(mistakes)
     return Layer(**values)

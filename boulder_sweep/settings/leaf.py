@@ -12,7 +12,7 @@ import numpy as np
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.numbers import NumberError, Quantity, describe, read_count, read_quantity
-from boulder_sweep.settings.problems import Place, did_you_mean, shorten
+from boulder_sweep.settings.problems import Position, did_you_mean, shorten
 from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 
 MAX_AXIS = 1_000_000
@@ -32,7 +32,7 @@ class Leaf:
         The values in the order given.
     is_axis : bool
         Whether it was written as a list or range (an axis of the grid) or as one value.
-    place : Place
+    position : Position
         Where it stands.
     distribution : Distribution, SetDistributions or None
         Spread about the values, which are its means; None where the values are certain.
@@ -40,7 +40,7 @@ class Leaf:
 
     values: np.ndarray
     is_axis: bool
-    place: Place
+    position: Position
     distribution: Distribution | SetDistributions | None = None
 
 
@@ -48,7 +48,7 @@ class Leaf:
 class Mistake:
     """One mistake within an entry."""
 
-    place: Place
+    position: Position
     message: str
 
 
@@ -79,17 +79,17 @@ def read_leaf(node: Node, field: Field) -> Leaf:
     node = _unfold_text_list(node)
     if isinstance(node, Mapping):
         values = _read_range(node, field)
-        return Leaf(np.array(values), True, node.place)
+        return Leaf(np.array(values), True, node.position)
     items: list[Node] = [node]
     if isinstance(node, Sequence):
         items = node.items
     if not items:
-        raise LeafError([Mistake(node.place, "the list is empty; give at least one value")])
+        raise LeafError([Mistake(node.position, "the list is empty; give at least one value")])
     if len(items) > MAX_AXIS:
-        raise LeafError([Mistake(node.place, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")])
+        raise LeafError([Mistake(node.position, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")])
     quantities = _read_all(items, field, node.unit if isinstance(node, Sequence) else None)
     values = _checked(quantities, items, field)
-    return Leaf(np.array(values), isinstance(node, Sequence), node.place)
+    return Leaf(np.array(values), isinstance(node, Sequence), node.position)
 
 
 def read_single(node: Node, field: Field) -> float:
@@ -101,14 +101,14 @@ def read_single(node: Node, field: Field) -> float:
         Not one number, wrong unit, or outside the admitted range.
     """
     if not isinstance(node, Scalar):
-        raise LeafError([Mistake(node.place, "takes one value here, not a list or a range")])
+        raise LeafError([Mistake(node.position, "takes one value here, not a list or a range")])
     try:
         value = _to_float(read_quantity(node, field.unit).value)
     except NumberError as error:
-        raise LeafError([Mistake(node.place, str(error))]) from None
+        raise LeafError([Mistake(node.position, str(error))]) from None
     problem = outside(value, field)
     if problem:
-        raise LeafError([Mistake(node.place, problem)])
+        raise LeafError([Mistake(node.position, problem)])
     return value
 
 
@@ -130,9 +130,9 @@ def _unfold_text_list(node: Node) -> Node:
     match = _TEXT_LIST.fullmatch(node.text)
     if match is None:
         return node
-    items: list[Node] = [Scalar(node.place, part) for part in match[1].split(",")] if match[1].strip() else []
+    items: list[Node] = [Scalar(node.position, part) for part in match[1].split(",")] if match[1].strip() else []
     unit = match[2].strip()
-    return Sequence(node.place, items, Scalar(node.place, unit) if unit else None)
+    return Sequence(node.position, items, Scalar(node.position, unit) if unit else None)
 
 
 def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quantity]:
@@ -143,12 +143,12 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
         try:
             quantities.append(read_quantity(item, field.unit, unit))
         except NumberError as error:
-            mistakes.setdefault(str(error), Mistake(item.place, str(error)))
+            mistakes.setdefault(str(error), Mistake(item.position, str(error)))
     if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:
         bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.has_unit)
         text = shorten(bare.text) if isinstance(bare, Scalar) else ""
         message = f"'{text}' has no unit while the others have one; give all of them a unit, or none"
-        mistakes[message] = Mistake(bare.place, message)
+        mistakes[message] = Mistake(bare.position, message)
     if mistakes:
         raise LeafError(list(mistakes.values()))
     return quantities
@@ -158,7 +158,7 @@ def _checked(quantities: list[Quantity], nodes: list[Node], field: Field) -> lis
     """Return the values; every one of them must be admitted."""
     values = [_to_float(quantity.value) for quantity in quantities]
     problems = ((node, outside(value, field)) for node, value in zip(nodes, values, strict=True))
-    mistakes = [Mistake(node.place, problem) for node, problem in problems if problem]
+    mistakes = [Mistake(node.position, problem) for node, problem in problems if problem]
     if mistakes:
         raise LeafError(mistakes)
     return values
@@ -181,7 +181,7 @@ def _read_range(node: Mapping, field: Field) -> list[float]:
             count = _count_of_count(exact["from"], exact["to"], node.entries["count"].value)
     except NumberError as error:
         key = "step" if "step" in exact else "count"
-        raise LeafError([Mistake(node.entries[key].value.place, str(error))]) from None
+        raise LeafError([Mistake(node.entries[key].value.position, str(error))]) from None
     return spread(exact["from"], exact["to"], count)
 
 
@@ -191,15 +191,15 @@ def _check_range_keys(node: Mapping) -> None:
         if entry.key not in _RANGE_KEYS:
             hint = did_you_mean(entry.key, _RANGE_KEYS)
             message = f"'{shorten(entry.key)}' is not a key of a range (from, to, count or step){hint}"
-            mistakes.append(Mistake(entry.place, message))
+            mistakes.append(Mistake(entry.position, message))
     if not mistakes:
         missing = [key for key in ("from", "to") if key not in node.entries]
         if missing:
-            mistakes.append(Mistake(node.place, f"the range lacks {' and '.join(missing)}"))
+            mistakes.append(Mistake(node.position, f"the range lacks {' and '.join(missing)}"))
         elif "count" in node.entries and "step" in node.entries:
-            mistakes.append(Mistake(node.entries["step"].place, "give count or step, not both"))
+            mistakes.append(Mistake(node.entries["step"].position, "give count or step, not both"))
         elif "count" not in node.entries and "step" not in node.entries:
-            mistakes.append(Mistake(node.place, "the range lacks count or step"))
+            mistakes.append(Mistake(node.position, "the range lacks count or step"))
     if mistakes:
         raise LeafError(mistakes)
 

@@ -79,7 +79,7 @@ def _read_name(entries: Entries) -> str:
         return default
     if isinstance(node, Scalar) and NAME.fullmatch(node.text):
         return node.text
-    entries.problems.add(node.place, "name", NAME_RULE)
+    entries.problems.add(node.position, "name", NAME_RULE)
     return default
 
 
@@ -111,8 +111,8 @@ def _build(name: str, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
         partial_factor=factor,
         overrides=overrides,
     )
-    places = {field.name: entries.place_of(field) for field in fields.INPUTS}
-    object.__setattr__(sweep, "notes", tuple(notes_on(sweep, places)))
+    positions = {field.name: entries.position_of(field) for field in fields.INPUTS}
+    object.__setattr__(sweep, "notes", tuple(notes_on(sweep, positions)))
     return sweep
 
 
@@ -158,7 +158,7 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
                 count *= len(leaf.values)
     if count > MAX_DESIGNS:
         message = f"the grid has {count} designs; at most {MAX_DESIGNS} can be numbered"
-        entries.problems.add(entries.root.place, "", message)
+        entries.problems.add(entries.root.position, "", message)
         entries.problems.raise_if_any()
     return tuple(axes)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from boulder_sweep.settings.fields import BY_NAME, Field
 from boulder_sweep.settings.numbers import describe
-from boulder_sweep.settings.problems import Place, Problem
+from boulder_sweep.settings.problems import Position, Problem
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import Sweep
@@ -22,14 +22,14 @@ FAMILY_FACTOR = 2.0
 """How far a pair of soil constants may be off the nearer family of data."""
 
 
-def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
+def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Problem]:
     """Yield a note for every unusual value and for data that do not belong together.
 
     Parameters
     ----------
     sweep : Sweep
         Valid settings.
-    places : mapping of str to Place
+    places : mapping of str to Position
         Where each quantity stands in the file.
     """
     values = {name: np.array([value]) for name, value in sweep.constants.items()}
@@ -39,29 +39,29 @@ def notes_on(sweep: Sweep, places: Mapping[str, Place]) -> Iterator[Problem]:
     for name, found in values.items():
         message = _unusual(name, found)
         if message:
-            yield _note(places[name], BY_NAME[name].path, message)
+            yield _note(positions[name], BY_NAME[name].path, message)
     for axis in sweep.axes:
         if len(set(axis.values.tolist())) < len(axis.values):
-            yield _note(places[axis.name], BY_NAME[axis.name].path, "contains a value more than once")
+            yield _note(positions[axis.name], BY_NAME[axis.name].path, "contains a value more than once")
     if "embedment_depth_m" in values:
         depth, height = _pairs(values, groups, "embedment_depth_m", "boulder_height_m")
         ratio = depth / height
         off = _without_partner(_outside(ratio, BY_NAME["embedment_ratio"]))
         if off.any():
             message = _unusual("embedment_ratio", ratio[off])
-            yield _note(places["embedment_depth_m"], "site.embedment_depth", f"depth over height: {message}")
+            yield _note(positions["embedment_depth_m"], "site.embedment_depth", f"depth over height: {message}")
     limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
     if usual is not None and limit > usual.high:
-        yield _note(Place(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}")
+        yield _note(Position(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}")
     if sweep.partial_factor != 1.0:
         angles = values["friction_angle_deg"]
         ends = f"{angles.min():.4g}" if angles.min() == angles.max() else f"{angles.min():.4g} to {angles.max():.4g}"
         message = f"tan(friction angle) is divided by {sweep.partial_factor:g}: simulated and listed as {ends} deg"
-        yield _note(Place(str(sweep.path)), "partial_factor.friction_angle", message)
+        yield _note(Position(str(sweep.path)), "partial_factor.friction_angle", message)
     angle, reaction = _pairs(values, groups, "friction_angle_deg", "subgrade_reaction_MN_m3")
     message = _off_families(angle, reaction) or _mixed_families(angle, reaction)
     if message:
-        yield _note(places["subgrade_reaction_MN_m3"], "soil.subgrade_reaction", message)
+        yield _note(positions["subgrade_reaction_MN_m3"], "soil.subgrade_reaction", message)
 
 
 def _pairs(
@@ -80,8 +80,8 @@ def _without_partner(off: np.ndarray) -> np.ndarray:
     return off if off.ndim == 1 else off & (off.all(axis=0, keepdims=True) | off.all(axis=1, keepdims=True))
 
 
-def _note(place: Place, key: str, message: str) -> Problem:
-    return Problem(place.file, place.line, place.column, key, message)
+def _note(position: Position, key: str, message: str) -> Problem:
+    return Problem(position.file, position.line, position.column, key, message)
 
 
 def _outside(values: np.ndarray, field: Field) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, shorten
+from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
 from boulder_sweep.settings.tree import Sequence as List
 from boulder_sweep.settings.yaml_reader import parse_node
@@ -41,49 +41,49 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
         key, equals, value_text = text.partition("=")
         option, key = (key, OPTIONS[key]) if key in OPTIONS else ("--set", key)
         path = key.strip().split(".")
-        place, name = Place(option), shorten(key.strip())
+        position, name = Position(option), shorten(key.strip())
         if not equals or not all(path) or len(path) > 4:
-            problems.add(place, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
+            problems.add(position, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
             continue
         if len(text) > MAX_OVERRIDE:
-            problems.add(place, name, f"is longer than {MAX_OVERRIDE} characters; put it into the file")
+            problems.add(position, name, f"is longer than {MAX_OVERRIDE} characters; put it into the file")
             continue
-        value = _read_value(value_text, name, place, problems)
+        value = _read_value(value_text, name, position, problems)
         if value is not None:
-            _put(root, path, value, place)
+            _put(root, path, value, position)
 
 
-def _read_value(text: str, name: str, place: Place, problems: ProblemList) -> Node | None:
+def _read_value(text: str, name: str, position: Position, problems: ProblemList) -> Node | None:
     found = ProblemList()
     try:
-        value = parse_node(text, place.file, found)
+        value = parse_node(text, position.file, found)
     except SettingsError:
         value = None  # its problems are in `found`
     for problem in found.problems:
-        problems.add(place, name, problem.message)
+        problems.add(position, name, problem.message)
     if value is None:
-        return None if found else Scalar(place, "")
-    _move(value, place)
+        return None if found else Scalar(position, "")
+    _move(value, position)
     return value
 
 
-def _move(node: Node, place: Place) -> None:
+def _move(node: Node, position: Position) -> None:
     """Give a whole tree the place of its option: a line number within an option means nothing."""
-    node.place = place
+    node.position = position
     if isinstance(node, Scalar):
         return
     if node.unit is not None:
-        node.unit.place = place
+        node.unit.position = position
     if isinstance(node, Mapping):
         for entry in node:
-            entry.place = place
-            _move(entry.value, place)
+            entry.position = position
+            _move(entry.value, position)
     else:
         for item in node.items:
-            _move(item, place)
+            _move(item, position)
 
 
-def _put(root: Mapping, path: list[str], value: Node, place: Place) -> None:
+def _put(root: Mapping, path: list[str], value: Node, position: Position) -> None:
     """Set one entry, opening blocks on the way where there are none."""
     block = root
     for depth, key in enumerate(path[:-1]):
@@ -91,22 +91,22 @@ def _put(root: Mapping, path: list[str], value: Node, place: Place) -> None:
         if isinstance(inner, List) and all(isinstance(item, Mapping) for item in inner.items):
             for item in inner.items:  # named sets: the entry holds for all of them
                 assert isinstance(item, Mapping)
-                _put(item, path[depth + 1 :], value, place)
+                _put(item, path[depth + 1 :], value, position)
             return
         if not isinstance(inner, Mapping):
-            opened = Mapping(place)
+            opened = Mapping(position)
             if path[: depth + 1] == ["model", "readings"] and isinstance(inner, Scalar):
                 # `readings: corrected` with one switch on top of it: the preset stays.
-                opened.entries["preset"] = Entry("preset", inner.place, inner)
-            _store(block, key, opened, place)
+                opened.entries["preset"] = Entry("preset", inner.position, inner)
+            _store(block, key, opened, position)
             inner = opened
         block = inner
     other = _ALTERNATIVES.get(".".join(path))
-    if other in block.entries and block.entries[other].place.file not in ("--set", *OPTIONS):
+    if other in block.entries and block.entries[other].position.file not in ("--set", *OPTIONS):
         del block.entries[other]
-    _store(block, path[-1], value, place)
+    _store(block, path[-1], value, position)
 
 
-def _store(block: Mapping, key: str, value: Node, place: Place) -> None:
+def _store(block: Mapping, key: str, value: Node, position: Position) -> None:
     """Replace an entry where it stands, so that axes keep their order, or append it."""
-    block.entries[key] = Entry(key, place, value)
+    block.entries[key] = Entry(key, position, value)

@@ -12,7 +12,7 @@ MAX_REPORTED = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Position:
     """A position in a file (or in a ``--set`` option): file, line and column counted from 1."""
 
     file: str
@@ -23,11 +23,11 @@ class Place:
         return ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
 
 
-def cell_place(file: str, line: int, text: str, delimiter: str, index: int) -> Place:
+def cell_position(file: str, line: int, text: str, delimiter: str, index: int) -> Position:
     """Return where a cell begins in a line of delimited text; with quotation marks in it, only the line is certain."""
     if '"' in text:
-        return Place(file, line)
-    return Place(file, line, sum(len(cell) + 1 for cell in text.split(delimiter)[:index]) + 1)
+        return Position(file, line)
+    return Position(file, line, sum(len(cell) + 1 for cell in text.split(delimiter)[:index]) + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Problem:
 
     def __str__(self) -> str:
         """Format as ``file:line:column: key: message``."""
-        head = str(Place(self.file, self.line, self.column))
+        head = str(Position(self.file, self.line, self.column))
         return ": ".join(part for part in (head, self.key, self.message) if part)
 
 
@@ -92,12 +92,12 @@ class ProblemList:
         """Whether further problems are only counted."""
         return len(self.problems) >= MAX_REPORTED
 
-    def add(self, place: Place, key: str, message: str) -> None:
+    def add(self, position: Position, key: str, message: str) -> None:
         """Add one problem, once."""
         if self.full:
             self.dropped += 1
             return
-        problem = Problem(place.file, place.line, place.column, key, message)
+        problem = Problem(position.file, position.line, position.column, key, message)
         if problem not in self.problems:
             self.problems.append(problem)
 

@@ -72,13 +72,13 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
         A value of the table divided by ``size`` is in ``unit``. A unit that both systems share stays as it is.
     """
     check_system(system)
-    place = SYSTEMS.index(system)
+    position = SYSTEMS.index(system)
     if unit in _FORCES:
         us_size = KILOJOULES_PER_FOOT_KIP if unit == "J" else KILONEWTONS_PER_KIP
-        return ShownUnit(_FORCES[unit][place], (us_size if system == "us" else 1.0) / _OF_FORCE[unit])
+        return ShownUnit(_FORCES[unit][position], (us_size if system == "us" else 1.0) / _OF_FORCE[unit])
     if unit not in _SHOWN:
         return ShownUnit(unit, 1.0)
-    shown = _SHOWN[unit][place]
+    shown = _SHOWN[unit][position]
     return ShownUnit(shown, float(factor(shown, unit)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
-from boulder_sweep.places import RemotePath
+from boulder_sweep.locations import RemotePath
 from boulder_sweep.settings.problems import Problem, SettingsError
 
 MAX_BYTES = 500_000

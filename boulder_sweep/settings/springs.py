@@ -35,9 +35,9 @@ def _unfold(vehicle: Mapping) -> list[Mistake]:
     stages = [item for item in spring.items if isinstance(item, Mapping)]
     if len(stages) < len(spring.items) or len(stages) > 2 or spring.unit is not None:
         del vehicle.entries["spring"]
-        return [Mistake(spring.place, f"takes one stage or two: {FORM}")]
+        return [Mistake(spring.position, f"takes one stage or two: {FORM}")]
     mistakes = [
-        Mistake(stage.place, f"a stage of the spring has {' and '.join(sorted(keys))}, as in {FORM}")
+        Mistake(stage.position, f"a stage of the spring has {' and '.join(sorted(keys))}, as in {FORM}")
         for stage, keys in zip(stages, KEYS, strict=False)
         if set(stage.entries) != keys
     ]
@@ -45,8 +45,8 @@ def _unfold(vehicle: Mapping) -> list[Mistake]:
     for entry in vehicle:
         if entry.key == "spring" and not mistakes:
             entries |= _entries(stages)
-        elif entry.key in entries and entry.place.line is not None:
-            mistakes.append(Mistake(entry.place, f"{entry.key} stands in the stages of the spring, too; remove one"))
+        elif entry.key in entries and entry.position.line is not None:
+            mistakes.append(Mistake(entry.position, f"{entry.key} stands in the stages of the spring, too; remove one"))
         elif entry.key != "spring":
             entries[entry.key] = entry  # what --set gives takes the place of what the file gives
     vehicle.entries = entries
@@ -58,4 +58,4 @@ def _entries(stages: list[Mapping]) -> dict[str, Entry]:
     found = {"spring": stages[0].entries["stiffness"]}
     for stage in stages[1:]:
         found |= {"second_spring_from": stage.entries["beyond"], "second_spring": stage.entries["stiffness"]}
-    return {key: Entry(key, entry.place, entry.value) for key, entry in found.items()}
+    return {key: Entry(key, entry.position, entry.value) for key, entry in found.items()}

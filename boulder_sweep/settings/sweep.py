@@ -169,8 +169,8 @@ class Sweep:
         takers = "'sweep uncertainty' and 'sweep need --probability'"
         message = f"has a distribution, which only {takers} take; give a value, a list or a range"
         if self.distributions:
-            places = ((name, spread.place) for name, spread in self.distributions.items())
-            raise SettingsError(Problem(p.file, p.line, p.column, BY_NAME[name].path, message) for name, p in places)
+            positions = ((name, spread.position) for name, spread in self.distributions.items())
+            raise SettingsError(Problem(p.file, p.line, p.column, BY_NAME[name].path, message) for name, p in positions)
 
     def resolved(self) -> dict[str, Any]:
         """Return everything that decides the results as plain data: defaults filled in, units in the names.

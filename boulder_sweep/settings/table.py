@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.designs import Label
-from boulder_sweep.places import Place as FilePlace
-from boulder_sweep.places import PlaceError, is_url, place_of, source_of
-from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, shorten
+from boulder_sweep.locations import Location, LocationError, is_url, location_of, source_of
+from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, shorten
 from boulder_sweep.settings.source import check_regular_file, refuse
 from boulder_sweep.settings.sweep import DesignList
 from boulder_sweep.settings.table_header import check_count, check_numbers, read_header
@@ -51,16 +50,16 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
     """
     text = node.text.strip()
     try:
-        path = place_of(text) if is_url(text) else folder / Path(text)
-    except PlaceError as refused:
-        problems.add(node.place, "table", str(refused))
+        path = location_of(text) if is_url(text) else folder / Path(text)
+    except LocationError as refused:
+        problems.add(node.position, "table", str(refused))
         return None
     before = len(problems.problems)
     suffix = path.suffix.lower()
     reader = _READERS.get(suffix)
     if reader is None:
         kinds = ", ".join(_READERS)
-        problems.add(node.place, "table", f"'{shorten(node.text)}' has an unsupported type; use one of {kinds}")
+        problems.add(node.position, "table", f"'{shorten(node.text)}' has an unsupported type; use one of {kinds}")
         return None
     try:
         check_regular_file(path, MAX_TABLE_BYTES, "Split it into several sweeps")
@@ -68,21 +67,21 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
     except SettingsError as error:
         for problem in error.problems:
             inside = problem.line is not None
-            place = Place(problem.file, problem.line, problem.column) if inside else node.place
-            problems.add(place, "table", problem.message if inside else f"{problem.file}: {problem.message}")
+            position = Position(problem.file, problem.line, problem.column) if inside else node.position
+            problems.add(position, "table", problem.message if inside else f"{problem.file}: {problem.message}")
         return None
     if len(problems.problems) == before and not found.columns:
-        problems.add(node.place, "table", f"{path} has no column that is an input")
+        problems.add(node.position, "table", f"{path} has no column that is an input")
     return None if len(problems.problems) > before else found
 
 
-def _read_parquet(path: FilePlace, problems: ProblemList) -> DesignList:
+def _read_parquet(path: Location, problems: ProblemList) -> DesignList:
     # pyarrow takes a third of a second to import: only for tables in this format.
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     label = str(path)
-    place = Place(label)
+    position = Position(label)
     alike = Alike(problems)
     found = DesignList(path.name, {})
     try:
@@ -94,24 +93,24 @@ def _read_parquet(path: FilePlace, problems: ProblemList) -> DesignList:
             raise refuse(label, "has no rows")
         names = list(file.schema_arrow.names)
         check_count(names, label)
-        for name, column in zip(names, read_header(names, [place] * len(names), problems), strict=True):
+        for name, column in zip(names, read_header(names, [position] * len(names), problems), strict=True):
             if column is None:
                 continue
             cells = file.read(columns=[name]).column(0)
             numeric = pa.types.is_floating(cells.type) or pa.types.is_integer(cells.type)
             if column.field is None:
-                if not numeric or check_numbers(column, place, problems):
+                if not numeric or check_numbers(column, position, problems):
                     found.labels[name] = _label(cells)
                 continue
             if not numeric:
-                problems.add(place, name, f"holds {cells.type}, not numbers")
+                problems.add(position, name, f"holds {cells.type}, not numbers")
                 continue
             if cells.null_count:
-                problems.add(place, name, f"has {cells.null_count} empty cells; every design needs a value")
+                problems.add(position, name, f"has {cells.null_count} empty cells; every design needs a value")
                 continue
             values = converted(cells.cast(pa.float64()).to_numpy(), column)
             for row, message in check_values(values, column.field):
-                alike.add("rows", place, name, f"row {row + 1}: {message}")
+                alike.add("rows", position, name, f"row {row + 1}: {message}")
             found.columns[column.field.name] = np.ascontiguousarray(values)
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, MemoryError) as error:
         # Of a damaged file, pyarrow raises almost anything.
@@ -133,7 +132,7 @@ def _label(cells: pa.ChunkedArray) -> Label:
     return Label(words.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], words.words)
 
 
-_READERS: dict[str, Callable[[FilePlace, ProblemList], DesignList]] = {
+_READERS: dict[str, Callable[[Location, ProblemList], DesignList]] = {
     ".csv": read_csv,
     ".xlsx": read_xlsx,
     ".parquet": _read_parquet,

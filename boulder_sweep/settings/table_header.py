@@ -9,7 +9,7 @@ from fractions import Fraction
 from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
 from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.settings.fields import INPUTS, Field
-from boulder_sweep.settings.problems import Place, ProblemList, nearest, shorten
+from boulder_sweep.settings.problems import Position, ProblemList, nearest, shorten
 from boulder_sweep.settings.source import refuse
 from boulder_sweep.settings.units import UnitError, factor
 
@@ -52,17 +52,17 @@ def check_count(names: list[str], label: str) -> None:
         raise refuse(label, f"has {len(names):,} columns; a table takes at most {MAX_COLUMNS:,}")
 
 
-def read_header(names: list[str], places: list[Place], problems: ProblemList) -> list[TableColumn | None]:
+def read_header(names: list[str], positions: list[Position], problems: ProblemList) -> list[TableColumn | None]:
     """Return what every column is, None for those that cannot be used; mistakes go to `problems`."""
     columns: list[TableColumn | None] = []
-    for name, place in zip(names, places, strict=True):
+    for name, position in zip(names, positions, strict=True):
         found = _column(name)
         if isinstance(found, TableColumn):
             same = [other for other in columns if other is not None and _key(other) == _key(found)]
             if same:
                 found = f"gives the same as column {same[0].name}" if same[0].name != name else "appears twice"
         if isinstance(found, str):
-            problems.add(place, shorten(name) or "(empty)", found)
+            problems.add(position, shorten(name) or "(empty)", found)
         columns.append(found if isinstance(found, TableColumn) else None)
     return columns
 
@@ -94,13 +94,13 @@ def _column(name: str) -> TableColumn | str:
     return TableColumn(name, None)
 
 
-def check_numbers(column: TableColumn, place: Place, problems: ProblemList) -> bool:
+def check_numbers(column: TableColumn, position: Position, problems: ProblemList) -> bool:
     """Report an unknown column that holds nothing but numbers; return whether it may be carried along."""
     if _ID.fullmatch(column.name):
         return True
     message = f"is not an input (inputs: {', '.join(_STEMS)}, each with its unit at the end)"
     message += "; a column of numbers that is to be carried along needs a name that ends in _id or _name"
-    problems.add(place, shorten(column.name), message)
+    problems.add(position, shorten(column.name), message)
     return False
 
 

@@ -12,12 +12,11 @@ from typing import Any, TextIO
 import numpy as np
 
 from boulder_sweep.designs import Label
-from boulder_sweep.places import Place as FilePlace
-from boulder_sweep.places import source_of
+from boulder_sweep.locations import Location, source_of
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.leaf import outside
 from boulder_sweep.settings.numbers import NumberError, split_number
-from boulder_sweep.settings.problems import Place, ProblemList, SettingsError, cell_place, shorten
+from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, cell_position, shorten
 from boulder_sweep.settings.source import refuse
 from boulder_sweep.settings.sweep import DesignList
 from boulder_sweep.settings.table_header import TableColumn, check_count, check_numbers, read_header
@@ -48,14 +47,14 @@ class Alike:
     def __init__(self, problems: ProblemList) -> None:
         self.problems = problems
         self.counts: Counter[tuple[str, str]] = Counter()
-        self.last: dict[tuple[str, str], Place] = {}
+        self.last: dict[tuple[str, str], Position] = {}
 
-    def add(self, kind: str, place: Place, key: str, message: str, most: int = MAX_ALIKE) -> None:
+    def add(self, kind: str, position: Position, key: str, message: str, most: int = MAX_ALIKE) -> None:
         """Report a problem, or count it if there were enough of its kind and key."""
         self.counts[kind, key] += 1
-        self.last[kind, key] = Place(place.file, place.line)
+        self.last[kind, key] = Position(position.file, position.line)
         if self.counts[kind, key] <= most:
-            self.problems.add(place, key, message)
+            self.problems.add(position, key, message)
 
     def finish(self) -> None:
         """Say how many more there are."""
@@ -89,15 +88,15 @@ def converted(values: np.ndarray, column: TableColumn) -> np.ndarray:
 class _Rows:
     """Turns rows of text into columns of numbers, a chunk at a time."""
 
-    def __init__(self, path: FilePlace, problems: ProblemList, place: Callable[[Origin, int], Place]) -> None:
+    def __init__(self, path: Location, problems: ProblemList, position: Callable[[Origin, int], Position]) -> None:
         self.path = path
-        self.place = place
+        self.position = position
         self.label = str(path)
         self.problems = problems
         self.before = len(problems.problems)
         self.alike = Alike(problems)
         self.columns: list[TableColumn | None] = []
-        self.places: list[Place] = []
+        self.positions: list[Position] = []
         self.numbers: dict[str, list[np.ndarray]] = {}
         self.texts: dict[str, list[str]] = {}
         self.rows: list[list[str]] = []
@@ -107,15 +106,15 @@ class _Rows:
     def header(self, names: list[str], origin: Origin) -> None:
         """Take the column names."""
         check_count(names, self.label)
-        self.places = [self.place(origin, index) for index in range(len(names))]
-        self.columns = read_header(names, self.places, self.problems)
+        self.positions = [self.position(origin, index) for index in range(len(names))]
+        self.columns = read_header(names, self.positions, self.problems)
 
     def take(self, row: list[str], origin: Origin, hint: str = "") -> None:
         """Take a row; `hint` follows the message if it has too many cells."""
         if len(row) != len(self.columns):
             message = f"has {len(row)} cell{'' if len(row) == 1 else 's'}; the first line has {len(self.columns)}"
             message += hint if len(row) > len(self.columns) else ""
-            self.alike.add("lines", self.place(origin, 0), "", message)
+            self.alike.add("lines", self.position(origin, 0), "", message)
             return
         self.count += 1
         if self.count > MAX_TABLE_ROWS:
@@ -131,9 +130,9 @@ class _Rows:
         self.alike.finish()
         if self.count == 0 and len(self.problems.problems) == self.before:
             raise refuse(self.label, "has no rows below the column names")
-        for column, place in zip(self.columns, self.places, strict=True):
+        for column, position in zip(self.columns, self.positions, strict=True):
             if column is not None and column.field is None and _are_numbers(self.texts.get(column.name, [])):
-                check_numbers(column, place, self.problems)
+                check_numbers(column, position, self.problems)
         numbers = {name: np.concatenate(parts) for name, parts in self.numbers.items()}
         return DesignList(self.path.name, numbers, {name: label_of(texts) for name, texts in self.texts.items()})
 
@@ -151,7 +150,7 @@ class _Rows:
             values = converted(self.convert(cells, index, column), column)
             for row, message in check_values(values, column.field):
                 if not np.isnan(values[row]):  # those have been reported as they were read
-                    self.alike.add("cells", self.place(self.origins[row], index), column.name, message)
+                    self.alike.add("cells", self.position(self.origins[row], index), column.name, message)
             self.numbers.setdefault(column.field.name, []).append(values)
         self.rows.clear()
         self.origins.clear()
@@ -168,7 +167,7 @@ class _Rows:
         for row, cell in enumerate(cells):
             if _DECIMAL_COMMA.fullmatch(cell):
                 message = f"'{shorten(cell)}' has a decimal comma; save the file with decimal points"
-                self.alike.add("", self.place(self.origins[row], index), "", message, most=1)
+                self.alike.add("", self.position(self.origins[row], index), "", message, most=1)
                 continue
             try:
                 number, unit = split_number(cell, column.field.unit)
@@ -176,7 +175,7 @@ class _Rows:
                     raise NumberError(f"'{shorten(cell)}' has a unit; units belong in the column's name")
                 values[row] = float(number)
             except (NumberError, OverflowError) as error:
-                self.alike.add("cells", self.place(self.origins[row], index), column.name, str(error))
+                self.alike.add("cells", self.position(self.origins[row], index), column.name, str(error))
         return values
 
 
@@ -206,7 +205,7 @@ class _Lines:
             yield line
 
 
-def read_csv(path: FilePlace, problems: ProblemList) -> DesignList:
+def read_csv(path: Location, problems: ProblemList) -> DesignList:
     """Return the designs of a CSV file.
 
     Parameters
@@ -232,7 +231,7 @@ def read_csv(path: FilePlace, problems: ProblemList) -> DesignList:
         raise refuse(label, f"cannot be read ({error.strerror})") from None
 
 
-def _read_lines(source: _Lines, path: FilePlace, problems: ProblemList) -> DesignList:
+def _read_lines(source: _Lines, path: Location, problems: ProblemList) -> DesignList:
     """Take the lines of a CSV file."""
     label = str(path)
     lines = iter(source)
@@ -241,7 +240,7 @@ def _read_lines(source: _Lines, path: FilePlace, problems: ProblemList) -> Desig
         raise refuse(label, "is empty; the first line must hold the column names")
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
     hint = " (numbers need a decimal point, and text with a comma needs quotation marks)" if delimiter == "," else ""
-    rows = _Rows(path, problems, lambda origin, index: cell_place(label, *origin, delimiter, index))
+    rows = _Rows(path, problems, lambda origin, index: cell_position(label, *origin, delimiter, index))
     try:
         names = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]
         rows.header(names, (source.number, header))
@@ -253,8 +252,8 @@ def _read_lines(source: _Lines, path: FilePlace, problems: ProblemList) -> Desig
     return rows.finish()
 
 
-def read_xlsx(path: FilePlace, problems: ProblemList) -> DesignList:
-    """Return the designs of the first sheet of a spreadsheet; row and column of a cell are its place.
+def read_xlsx(path: Location, problems: ProblemList) -> DesignList:
+    """Return the designs of the first sheet of a spreadsheet; row and column of a cell are its position.
 
     Parameters
     ----------
@@ -273,7 +272,7 @@ def read_xlsx(path: FilePlace, problems: ProblemList) -> DesignList:
         from openpyxl import load_workbook  # an extra, for tables in this format only
     except ImportError:
         raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
-    rows = _Rows(path, problems, lambda origin, index: Place(label, origin[0], index + 1))
+    rows = _Rows(path, problems, lambda origin, index: Position(label, origin[0], index + 1))
     for number, cells in enumerate(_sheet_rows(path, load_workbook), 1):
         texts = ["" if cell is None else str(cell) for cell in cells]
         origin = (number, "")
@@ -288,7 +287,7 @@ def read_xlsx(path: FilePlace, problems: ProblemList) -> DesignList:
     return rows.finish()
 
 
-def _sheet_rows(path: FilePlace, load_workbook: Callable[..., Any]) -> Iterator[tuple[object, ...]]:
+def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[tuple[object, ...]]:
     """Yield the rows of the first sheet.
 
     Raises

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from boulder_sweep.settings.problems import Place
+from boulder_sweep.settings.problems import Position
 
 
 @dataclass(slots=True)
 class Scalar:
     """One piece of text. `quoted` says whether it stood in quotation marks."""
 
-    place: Place
+    position: Position
     text: str
     quoted: bool = False
 
@@ -24,7 +24,7 @@ class Scalar:
 class Sequence:
     """A list; `unit` is the unit written behind its bracket, as in ``[36, 40] deg``."""
 
-    place: Place
+    position: Position
     items: list[Node] = field(default_factory=list)
     unit: Scalar | None = None
 
@@ -34,7 +34,7 @@ class Entry:
     """One key of a mapping with its value."""
 
     key: str
-    place: Place
+    position: Position
     value: Node
 
 
@@ -42,7 +42,7 @@ class Entry:
 class Mapping:
     """Keys and values in the order of the file; `unit` as for lists."""
 
-    place: Place
+    position: Position
     entries: dict[str, Entry] = field(default_factory=dict)
     unit: Scalar | None = None
 

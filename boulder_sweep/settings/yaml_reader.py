@@ -24,7 +24,7 @@ from ruamel.yaml.events import (
 from ruamel.yaml.scanner import Scanner
 from ruamel.yaml.tokens import FlowMappingEndToken, FlowSequenceEndToken
 
-from boulder_sweep.settings.problems import Place, ProblemList, shorten
+from boulder_sweep.settings.problems import Position, ProblemList, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 MAX_DEPTH = 20
@@ -138,9 +138,9 @@ def parse(text: str, label: str, problems: ProblemList) -> Mapping | None:
     if isinstance(root, Mapping):
         return root
     if root is None:
-        problems.add(Place(label), "", "is empty; it needs at least the blocks boulder, site, soil and vehicle")
+        problems.add(Position(label), "", "is empty; it needs at least the blocks boulder, site, soil and vehicle")
     else:
-        problems.add(root.place, "", "a settings file consists of blocks such as 'boulder: {length: 1.65 m}'")
+        problems.add(root.position, "", "a settings file consists of blocks such as 'boulder: {length: 1.65 m}'")
     return None
 
 
@@ -154,7 +154,7 @@ def parse_node(text: str, label: str, problems: ProblemList) -> Node | None:
             builder.take(event, yaml.scanner.units)
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
-        at = Place(label) if mark is None else Place(label, mark.line + 1, mark.column + 1)
+        at = Position(label) if mark is None else Position(label, mark.line + 1, mark.column + 1)
         reason = str(error.problem) if isinstance(error, _TooDeepError) else _explained(error)
         problems.add(at, "", reason)
         problems.raise_if_any()
@@ -189,12 +189,12 @@ class _Builder:
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
             if self.documents == 2:
-                self.problems.add(self.place(event), "", "a second document begins here; a file may hold only one")
+                self.problems.add(self.position(event), "", "a second document begins here; a file may hold only one")
         elif self.documents > 1:
             return
         elif isinstance(event, ScalarEvent):
             self.check_tag(event)
-            self.close(Scalar(self.place(event), event.value, event.style in ("'", '"')), 1, event.anchor)
+            self.close(Scalar(self.position(event), event.value, event.style in ("'", '"')), 1, event.anchor)
         elif isinstance(event, AliasEvent):
             self.alias(event)
         elif isinstance(event, SequenceStartEvent | MappingStartEvent):
@@ -204,7 +204,7 @@ class _Builder:
             mark = event.start_mark
             if event.end_mark.index > mark.index and (mark.line, mark.column) in units:
                 text, column = units[mark.line, mark.column]
-                opened.node.unit = Scalar(Place(self.label, mark.line + 1, column + 1), text)
+                opened.node.unit = Scalar(Position(self.label, mark.line + 1, column + 1), text)
             self.close(opened.node, opened.size, opened.anchor)
 
     def open(self, event: Any) -> None:
@@ -215,16 +215,16 @@ class _Builder:
         kind = Sequence if isinstance(event, SequenceStartEvent) else Mapping
         if event.anchor is not None:
             self.anchors[event.anchor] = None  # while it is open: an alias from inside would have no end
-        self.stack.append(_Open(kind(self.place(event)), event.anchor))
+        self.stack.append(_Open(kind(self.position(event)), event.anchor))
 
-    def place(self, event: Any) -> Place:
-        return Place(self.label, event.start_mark.line + 1, event.start_mark.column + 1)
+    def position(self, event: Any) -> Position:
+        return Position(self.label, event.start_mark.line + 1, event.start_mark.column + 1)
 
     def check_tag(self, event: Any) -> None:
         if event.tag is not None:
             tag = shorten(str(event.tag).replace("tag:yaml.org,2002:", "!!"))
             self.problems.add(
-                self.place(event),
+                self.position(event),
                 "",
                 f"the tag {tag} is not accepted: only plain text, numbers and lists are read",
             )
@@ -233,13 +233,13 @@ class _Builder:
         """Insert the node that an alias stands for."""
         name = shorten(str(event.anchor))
         if event.anchor not in self.anchors:
-            self.problems.add(self.place(event), "", f"*{name} is not defined: there is no &{name} before it")
+            self.problems.add(self.position(event), "", f"*{name} is not defined: there is no &{name} before it")
             node, size = None, 1
         else:
             node, size = self.anchors[event.anchor] or (None, 1)
             if node is None:
-                self.problems.add(self.place(event), "", f"*{name} refers to itself")
-        self.close(Scalar(self.place(event), "") if node is None else node, size, None)
+                self.problems.add(self.position(event), "", f"*{name} refers to itself")
+        self.close(Scalar(self.position(event), "") if node is None else node, size, None)
 
     def close(self, node: Node, size: int, anchor: str | None) -> None:
         """Put a finished node into its list or block."""
@@ -263,8 +263,8 @@ class _Builder:
         if isinstance(node, Scalar):
             parent.key = node
             return
-        self.problems.add(node.place, "", "a key must be one word")
-        parent.key, parent.skip_value = Scalar(node.place, ""), True
+        self.problems.add(node.position, "", "a key must be one word")
+        parent.key, parent.skip_value = Scalar(node.position, ""), True
 
     def take_value(self, parent: _Open, mapping: Mapping, node: Node) -> None:
         assert parent.key is not None
@@ -275,12 +275,12 @@ class _Builder:
         first = mapping.entries.get(key.text)
         if first is None:
             if isinstance(node, Scalar) and not node.text and not node.quoted:
-                node = Scalar(key.place, "")  # YAML places an empty value where the next token begins
-            mapping.entries[key.text] = Entry(key.text, key.place, node)
+                node = Scalar(key.position, "")  # YAML places an empty value where the next token begins
+            mapping.entries[key.text] = Entry(key.text, key.position, node)
         else:
             words = [*(opened.key.text for opened in self.stack if opened.key), key.text]
             path = ".".join(shorten(word) for word in words)
-            self.problems.add(key.place, path, f"is given twice (first on line {first.place.line})")
+            self.problems.add(key.position, path, f"is given twice (first on line {first.position.line})")
 
 
 def _explained(error: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.text import printable
 
 _LONGEST = 200
@@ -19,7 +19,7 @@ class OutputExistsError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Place, rows_done: int, rows: int):
+    def __init__(self, out: Location, rows_done: int, rows: int):
         self.out, self.rows_done, self.rows = out, rows_done, rows
         state = "is finished" if rows_done == rows else f"holds {rows_done:,} of {rows:,} rows"
         super().__init__(f"{out} exists and {state}: use --resume to continue it or --overwrite to start again")
@@ -38,7 +38,7 @@ class SettingsDifferError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Place, differences: list[str]):
+    def __init__(self, out: Location, differences: list[str]):
         self.out, self.differences = out, differences
         lines = "".join(f"\n  {difference}" for difference in differences)
         super().__init__(
@@ -59,7 +59,7 @@ class ForeignFilesError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Place, names: list[str]):
+    def __init__(self, out: Location, names: list[str]):
         self.out, self.names = out, names
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
         super().__init__(f"{out} contains files that no sweep wrote ({shown}): choose another folder or move them")
@@ -84,7 +84,7 @@ class OtherVersionError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, path: Place, why: str, version: str | None = None):
+    def __init__(self, path: Location, why: str, version: str | None = None):
         self.path, self.why, self.version = path, why, version
         noted = f", {version}" if version else ""
         super().__init__(
@@ -105,7 +105,7 @@ class ImpossibleRecordsError(DamagedError):
 
     exit_code = EXIT_WRONG_USE
 
-    def __init__(self, path: Place, what: str):
+    def __init__(self, path: Location, what: str):
         super().__init__(path, what)
         self.path, self.what = path, printable(what[:_LONGEST])
 
@@ -127,7 +127,7 @@ class LinkError(StoreError):
 class FolderRemovedError(StoreError):
     """The output folder was removed during the run, or moved, or is that of another run by now."""
 
-    def __init__(self, out: Place):
+    def __init__(self, out: Location):
         super().__init__(out)
         self.out = out
 

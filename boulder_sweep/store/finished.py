@@ -16,7 +16,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import OlderRulesWarning
-from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.errors import DamagedError, StoreError
 from boulder_sweep.store.files import hidden_name
@@ -66,7 +66,7 @@ class FinishedRows:
         Its manifest cannot be trusted, or not be read by this version.
     """
 
-    def __init__(self, folder: Place):
+    def __init__(self, folder: Location):
         manifest = load(folder)
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
         today = (*(spec.name for spec in COLUMNS), *manifest.more_columns)
@@ -218,7 +218,7 @@ class _Places:
                 yield name, merge.part
 
 
-def _damage_text(folder: Place, damaged: dict[str, str]) -> str:
+def _damage_text(folder: Location, damaged: dict[str, str]) -> str:
     """Describe what is damaged and what to do."""
     first, what = next(iter(damaged.items()))
     more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""

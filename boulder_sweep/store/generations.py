@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
-from boulder_sweep.places import RemotePath
+from boulder_sweep.locations import RemotePath
 
 MANIFEST_NAME = "_manifest.parquet"
 KEPT = 16

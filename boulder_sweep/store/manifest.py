@@ -18,7 +18,7 @@ from itertools import pairwise
 from typing import IO, Any
 
 from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
-from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.errors import (
@@ -245,7 +245,7 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
     return memoryview(sink.getvalue())
 
 
-def load(folder: Place) -> Manifest:
+def load(folder: Location) -> Manifest:
     """Read the manifest of a folder, by whichever version it was written.
 
     Raises
@@ -297,7 +297,7 @@ def load(folder: Place) -> Manifest:
         raise OtherVersionError(path, why, None if version is None else shorten(version)) from None
 
 
-def _check_claims(path: Place, manifest: Manifest) -> None:
+def _check_claims(path: Location, manifest: Manifest) -> None:
     """Check every name and number of a manifest, before any is used: the folder may be a stranger's.
 
     Raises
@@ -330,7 +330,7 @@ def _check_claims(path: Place, manifest: Manifest) -> None:
     check_kinds(path, "identity", manifest.identity, IDENTITY)
 
 
-def check_own(manifest: Manifest, folder: Place) -> None:
+def check_own(manifest: Manifest, folder: Location) -> None:
     """Check that a run of this version may go on with a table.
 
     Raises
@@ -343,7 +343,7 @@ def check_own(manifest: Manifest, folder: Place) -> None:
         raise OtherVersionError(folder / MANIFEST_NAME, shorten(why, 300), version_of({"identity": manifest.identity}))
 
 
-def _opened(folder: Place) -> IO[bytes]:
+def _opened(folder: Location) -> IO[bytes]:
     """Open the file of a manifest.
 
     Raises
@@ -362,7 +362,7 @@ def _opened(folder: Place) -> IO[bytes]:
         raise StoreError(f"{folder} cannot be read: {problem.strerror}") from None
 
 
-def _no_result(folder: Place) -> str:
+def _no_result(folder: Location) -> str:
     """Describe why a path holds no result."""
     if not folder.exists():
         return f"there is no {folder}; the result of a sweep is a folder, such as m30-sizing.sweep"

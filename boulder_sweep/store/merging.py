@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.storage import Storage
 from boulder_sweep.store.verify import merged_file
 
 
-def finish_merge(manifest: Manifest, folder: Place, storage: Storage) -> None:
+def finish_merge(manifest: Manifest, folder: Location, storage: Storage) -> None:
     """Let the merged part, complete under its temporary name, replace the small ones.
 
     Parameters
@@ -32,7 +32,7 @@ def finish_merge(manifest: Manifest, folder: Place, storage: Storage) -> None:
     manifest.merge = None
 
 
-def recover_merge(manifest: Manifest, folder: Place, storage: Storage) -> None:
+def recover_merge(manifest: Manifest, folder: Location, storage: Storage) -> None:
     """Finish a merge during which a run was killed, or drop it if it had only been announced.
 
     Parameters and effect are those of `finish_merge`.

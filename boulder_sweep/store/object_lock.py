@@ -14,7 +14,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from boulder_sweep.places import RemotePath
+from boulder_sweep.locations import RemotePath
 from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, StoreError
 from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, LOCK_NAME
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
-from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.store import errors
 from boulder_sweep.store.generations import is_generation
 from boulder_sweep.store.lock import LOCK_NAME
@@ -36,7 +36,7 @@ class ClaimedFolder:
         Rows that a resumed run keeps, if their parts are intact.
     """
 
-    def __init__(self, out: Place, storage: Storage, lock: Lock, resume: bool, overwrite: bool, created: bool):
+    def __init__(self, out: Location, storage: Storage, lock: Lock, resume: bool, overwrite: bool, created: bool):
         self._out, self._storage, self._lock, self._created = out, storage, lock, created
         self._names = storage.names()
         there = _allowed(out, storage, self._names, resume, overwrite)
@@ -99,7 +99,7 @@ class ClaimedFolder:
         return folder
 
 
-def claim_output(out: Place, *, resume: bool = False, overwrite: bool = False) -> ClaimedFolder:
+def claim_output(out: Location, *, resume: bool = False, overwrite: bool = False) -> ClaimedFolder:
     """Lock a folder for a run, and check that it can be used.
 
     Parameters
@@ -135,7 +135,7 @@ def claim_output(out: Place, *, resume: bool = False, overwrite: bool = False) -
 
 
 def open_output(
-    out: Place, manifest: Manifest, session: Session, *, resume: bool = False, overwrite: bool = False
+    out: Location, manifest: Manifest, session: Session, *, resume: bool = False, overwrite: bool = False
 ) -> OutputFolder:
     """Open a folder for a run at once: `claim_output`, then `ClaimedFolder.open`."""
     claimed = claim_output(out, resume=resume, overwrite=overwrite)
@@ -146,7 +146,7 @@ def open_output(
         raise
 
 
-def _locked(out: Place, storage: Storage) -> Lock:
+def _locked(out: Location, storage: Storage) -> Lock:
     """Lock the folder; an error names who else may hold it."""
     holder, host = "another run", None
     with suppress(errors.StoreError):
@@ -157,7 +157,7 @@ def _locked(out: Place, storage: Storage) -> Lock:
     return storage.lock(host, holder)
 
 
-def _allowed(out: Place, storage: Storage, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
+def _allowed(out: Location, storage: Storage, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
     """Check that a run may use a folder; return its manifest, None if there is none to resume from."""
     names = [name for name in names if not (name == ".DS_Store" or name.startswith(".nfs"))]  # of the system
     foreign = [name for name in names if not is_ours(name) or storage.is_folder(name)]
@@ -185,7 +185,7 @@ def _is_kept(name: str) -> bool:
     return name in (LOCK_NAME, MANIFEST_NAME) or is_generation(name)
 
 
-def _is_readable(out: Place) -> bool:
+def _is_readable(out: Location) -> bool:
     """Whether the manifest is intact and in this version's format."""
     try:
         load(out)
@@ -194,7 +194,7 @@ def _is_readable(out: Place) -> bool:
     return True
 
 
-def _is_written_by_us(path: Place) -> bool:
+def _is_written_by_us(path: Location) -> bool:
     """Whether the metadata of a file that is named like a part shows that a sweep wrote it."""
     import pyarrow as pa  # heavy, and only needed where a manifest is missing
     import pyarrow.parquet as pq

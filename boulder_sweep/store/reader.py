@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boulder_sweep.columns import OUTCOMES, column_spec
-from boulder_sweep.places import Place, RemotePath, place_of
+from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.text import counted
 
@@ -49,12 +49,12 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
         A part is missing, truncated or changed.
     OtherVersionError
         The result was written by a version whose results this one cannot read.
-    PlaceError
+    LocationError
         The folder is a URL that cannot be read.
     ValueError
         The result has no such column.
     """
-    table, finished = _read(place_of(out), columns, verify)
+    table, finished = _read(location_of(out), columns, verify)
     # Split into blocks: consolidating columns of one type would copy the whole table once more.
     frame = table.to_pandas(split_blocks=True, self_destruct=True)
     for spec in OUTCOMES:
@@ -77,12 +77,12 @@ def _ordered(words: pd.Series, known: Sequence[str]) -> pd.Series:
     return words if wanted == there else words.cat.reorder_categories(wanted)
 
 
-def read_table(folder: Place, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
+def read_table(folder: Location, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
     """Read the finished parts of a folder as one Arrow table; otherwise as `read`."""
     return _read(folder, columns, verify)[0]
 
 
-def read_row(folder: Place, design_id: int) -> pa.Table:
+def read_row(folder: Location, design_id: int) -> pa.Table:
     """Read one row of a result, from the one part that holds it.
 
     Raises
@@ -102,7 +102,7 @@ def read_row(folder: Place, design_id: int) -> pa.Table:
     return row
 
 
-def _read(folder: Place, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, FinishedRows]:
+def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, FinishedRows]:
     """Return the finished parts, in the order of the designs, and what is known of them."""
     import pyarrow as pa  # heavy, and only readers need it
 

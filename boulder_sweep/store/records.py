@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import MISSING, fields
 from typing import Any, get_args, get_origin, get_type_hints
 
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.store.errors import ImpossibleRecordsError
 
 _DEEPEST = 32
@@ -78,7 +78,7 @@ def is_deep(content: Any) -> bool:
     return bool(level)
 
 
-def check_kinds(path: Place, what: str, content: Any, kinds: Any) -> None:
+def check_kinds(path: Location, what: str, content: Any, kinds: Any) -> None:
     """Check the kinds of those nested entries that are looked at by name.
 
     Raises

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.places import PlaceError, RemotePath, place_of
+from boulder_sweep.locations import LocationError, RemotePath, location_of
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import Session
 from boulder_sweep.store.object_lock import is_held
@@ -98,7 +98,7 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
     DamagedError
         The manifest cannot be trusted.
     """
-    folder = place_of(out)
+    folder = location_of(out)
     running = is_held(folder) if isinstance(folder, RemotePath) else is_locked(folder)
     manifest, damaged = load_checked(folder, read_parts=verify)
     there = sorted((part.first, part.stop) for part in manifest.parts.values())
@@ -136,7 +136,7 @@ def _into(out: str | Path, command: str) -> tuple[str, str | None]:
         if len(words) < 5 or words[3] != "-o":
             return command, None
         settings = _moved_with(out, words[2], words[4])
-    except (ValueError, PlaceError):  # not what a run writes there
+    except (ValueError, LocationError):  # not what a run writes there
         return command, None
     here = shlex.join([*words[:2], settings, "-o", str(out), *words[5:]])
     return here, None if _exists(Path(settings)) else settings
@@ -144,7 +144,7 @@ def _into(out: str | Path, command: str) -> tuple[str, str | None]:
 
 def _moved_with(out: str | Path, settings: str, recorded_out: str) -> str:
     """Return the path of a settings file, by its place relative to the folder if there is one now."""
-    now, then = place_of(out), place_of(recorded_out)
+    now, then = location_of(out), location_of(recorded_out)
     if not isinstance(now, Path) or not isinstance(then, Path) or then.is_absolute() or Path(settings).is_absolute():
         return settings
     levels, folders, whole = len(then.parts), then.parts[:-1], now.resolve()

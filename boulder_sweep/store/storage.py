@@ -17,7 +17,7 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import Any, Protocol
 
-from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.store import errors
 from boulder_sweep.store.files import check_writable, flush_folder, hidden_name, is_file, opened_folder, put_file
 from boulder_sweep.store.generations import MANIFEST_NAME, Encode, Generations, OtherWriterError
@@ -81,7 +81,7 @@ class Storage(Protocol):
         """Remove the manifest."""
 
 
-def storage_of(place: Place) -> Storage:
+def storage_of(place: Location) -> Storage:
     """Return how a run writes into a folder."""
     return DiskStorage(place) if isinstance(place, Path) else ObjectStorage(place)
 

@@ -8,12 +8,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from boulder_sweep.errors import BoulderSweepError
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.store.files import is_file
 from boulder_sweep.store.generations import MANIFEST_NAME
 
 
-def check_target(target: Place, refusal: type[BoulderSweepError]) -> None:
+def check_target(target: Location, refusal: type[BoulderSweepError]) -> None:
     """Check that a file may be written at a place; readers would take one within a result for rows of it.
 
     Parameters
@@ -48,7 +48,7 @@ def check_target(target: Place, refusal: type[BoulderSweepError]) -> None:
         raise refusal(f"{target} cannot be written: {os.strerror(errno.EACCES)}")
 
 
-def _check_no_result(target: Place, folder: Place, refusal: type[BoulderSweepError]) -> None:
+def _check_no_result(target: Location, folder: Location, refusal: type[BoulderSweepError]) -> None:
     """Check that a folder is not the result of a run."""
     if (folder / MANIFEST_NAME).exists():
         raise refusal(f"{target}: the folder {folder} holds the result of a run; name a file outside it")

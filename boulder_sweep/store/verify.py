@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 
-from boulder_sweep.places import Place, RemotePath
+from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.store.errors import StoreError
 from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.manifest import Manifest, Merge, Part, load
@@ -18,7 +18,7 @@ _ATTEMPTS = 20
 _CHANGED = "changed: its checksum differs"
 
 
-def load_checked(folder: Place, *, read_parts: bool) -> tuple[Manifest, dict[str, str]]:
+def load_checked(folder: Location, *, read_parts: bool) -> tuple[Manifest, dict[str, str]]:
     """Read the manifest of a folder and compare the parts with it.
 
     Parameters
@@ -51,7 +51,7 @@ def load_checked(folder: Place, *, read_parts: bool) -> tuple[Manifest, dict[str
     return manifest, damaged
 
 
-def _without_merged(folder: Place, manifest: Manifest, damaged: dict[str, str]) -> dict[str, str]:
+def _without_merged(folder: Location, manifest: Manifest, damaged: dict[str, str]) -> dict[str, str]:
     """Put the merged part into the manifest if a run was killed during the merge."""
     merge = manifest.merge
     name = None if merge is None else merged_file(folder, merge)
@@ -63,14 +63,14 @@ def _without_merged(folder: Place, manifest: Manifest, damaged: dict[str, str]) 
     return {name: wrong for name, wrong in damaged.items() if name not in merge.replaced}
 
 
-def merged_file(folder: Place, merge: Merge) -> str | None:
+def merged_file(folder: Location, merge: Merge) -> str | None:
     """Return the name of a merged part on disk, final or temporary; None if it is not intact."""
     # The final name twice: the file may be renamed between the first two checks.
     names = (merge.name, hidden_name(merge.name), merge.name)
     return next((name for name in names if not wrong_content(folder / name, merge.part)), None)
 
 
-def damaged_parts(folder: Place, parts: Mapping[str, Part], *, read_parts: bool) -> dict[str, str]:
+def damaged_parts(folder: Location, parts: Mapping[str, Part], *, read_parts: bool) -> dict[str, str]:
     """Compare parts, by file name, with their records in the manifest.
 
     Returns
@@ -87,7 +87,7 @@ def damaged_parts(folder: Place, parts: Mapping[str, Part], *, read_parts: bool)
         return {name: wrong for name, wrong in zip(parts, found, strict=True) if wrong}
 
 
-def wrong_size(path: Place, part: Part) -> str:
+def wrong_size(path: Location, part: Part) -> str:
     """Describe how the size of a file differs from its record; empty if it does not."""
     try:
         size = path.stat().st_size
@@ -99,7 +99,7 @@ def wrong_size(path: Place, part: Part) -> str:
     return _other_size(size, part)
 
 
-def _refuse_to_guess(path: Place, problem: OSError) -> None:
+def _refuse_to_guess(path: Location, problem: OSError) -> None:
     """Raise StoreError where a part is on an object store: what does not answer is not damaged."""
     if isinstance(path, RemotePath):
         raise StoreError(f"{path} cannot be read: {problem.strerror}") from None
@@ -113,7 +113,7 @@ def _other_size(size: int, part: Part) -> str:
     return f"{kind}: {size:,} bytes instead of {part.bytes:,}"
 
 
-def wrong_content(path: Place, part: Part) -> str:
+def wrong_content(path: Location, part: Part) -> str:
     """Describe how a file differs from its record, by checksum; empty if it does not."""
     wrong = wrong_size(path, part)
     if wrong:

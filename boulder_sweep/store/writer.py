@@ -23,7 +23,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from boulder_sweep.places import Place
+from boulder_sweep.locations import Location
 from boulder_sweep.store import errors
 from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
 from boulder_sweep.store.manifest import Manifest, Merge, Part, is_ours, is_part_name, part_name, save, staged_name
@@ -86,7 +86,7 @@ def stage(
 class OutputFolder:
     """The folder of a run, open for writing until `close`; made by `opening.open_output`."""
 
-    def __init__(self, path: Place, storage: Storage, lock: Lock, manifest: Manifest, created: bool):
+    def __init__(self, path: Location, storage: Storage, lock: Lock, manifest: Manifest, created: bool):
         self.path = path
         self._storage = storage
         self.manifest = manifest

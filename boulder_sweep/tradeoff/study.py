@@ -47,8 +47,6 @@ REFERENCE_STEP_S = 5e-5
 SECONDS = 60.0
 TARGETS_DEG = (0.1, 0.01, 1e-3, 1e-4, 1e-5)
 
-Told = Callable[[str], None]
-
 
 @dataclass(frozen=True)
 class Tradeoff:
@@ -193,7 +191,7 @@ def measure(
     seconds: float = SECONDS,
     backend: str = THREADING,
     scheduler: str | None = None,
-    tell: Told | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Tradeoff:
     """Measure speed against accuracy on a sample of a sweep's designs.
 
@@ -208,7 +206,7 @@ def measure(
     backend, scheduler
         Where to measure: ``threading`` for this machine, or ``dask`` for a worker of a cluster, as for
         `boulder_sweep.run`.
-    tell
+    progress
         Told what is being measured; not by a worker.
 
     Raises
@@ -248,8 +246,8 @@ def measure(
             left_out += _methods(name)
             continue
         sample = Sample(sample_designs, readings, limits, control)
-        if tell is not None:
-            tell(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {sample_designs.size:,}")
+        if progress is not None:
+            progress(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {sample_designs.size:,}")
         known = sample.solve(REFERENCE_STEP_S, locate_yield=True)
         twice = sample.solve(2.0 * REFERENCE_STEP_S, locate_yield=True)
         references[name] = _largest_difference_deg(known, twice)
@@ -257,8 +255,8 @@ def measure(
             if time.monotonic() - begun > seconds:
                 left_out.append(method)
                 continue
-            if tell is not None:
-                tell(f"{name}: {method.soil}, {method.steps}")
+            if progress is not None:
+                progress(f"{name}: {method.soil}, {method.steps}")
             points.append(sample.measured(method, known, _name_of(method, readings)))
     mark_front(points)
     return Tradeoff(sweep, tuple(points), references, tuple(left_out))

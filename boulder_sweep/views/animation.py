@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -13,7 +13,7 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store.files import replacing
-from boulder_sweep.text import script_data, why
+from boulder_sweep.text import ProgressCallback, script_data, why
 from boulder_sweep.views import figures
 from boulder_sweep.views.scene import SideView, samples_shown
 from boulder_sweep.views.shapes import STYLES, Shape
@@ -23,7 +23,6 @@ from boulder_sweep.views.wording import design_line, verdict_line
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
-Told = Callable[[int, int], None]
 KINDS = (".gif", ".mp4", ".html")
 EVERY_S = 0.005
 """Time between two frames [s]."""
@@ -39,7 +38,7 @@ SWATCH = 40
 """Height of a strip of each colour in the picture that the palette of a GIF is taken from."""
 
 
-def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) -> None:
+def animate(trajectory: Trajectory, path: str | Path, progress: ProgressCallback | None = None) -> None:
     """Animate the side view: truck, boulder, soil wedge and forces to scale over time.
 
     Parameters
@@ -48,7 +47,7 @@ def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) 
         The impact.
     path
         File to write: .gif, .mp4 (needs the program ffmpeg), or .html, one file with a player and a slider.
-    told
+    progress
         Told how many frames of how many are drawn.
 
     Raises
@@ -64,9 +63,9 @@ def animate(trajectory: Trajectory, path: str | Path, told: Told | None = None) 
             if kind == ".html":
                 file.write(page(trajectory).encode())
             elif kind == ".gif":
-                _write_gif(trajectory, file, told)
+                _write_gif(trajectory, file, progress)
             else:
-                _write_mp4(trajectory, target, Path(file.name), told)
+                _write_mp4(trajectory, target, Path(file.name), progress)
     except OSError as problem:
         raise PictureError(f"{path} cannot be written: {why(problem)}") from problem
 
@@ -88,8 +87,8 @@ def checked_animation(path: str | Path) -> Path:
     return target
 
 
-def frames(trajectory: Trajectory, told: Told | None = None) -> Iterator[np.ndarray]:
-    """Draw the frames of an animation one by one; `told` hears how many of how many.
+def frames(trajectory: Trajectory, progress: ProgressCallback | None = None) -> Iterator[np.ndarray]:
+    """Draw the frames of an animation one by one; `progress` hears how many of how many.
 
     Yields
     ------
@@ -121,14 +120,14 @@ def frames(trajectory: Trajectory, told: Told | None = None) -> Iterator[np.ndar
             yield picture[:height, :width].copy()
             for artist in moving:
                 artist.remove()
-            if told is not None:
-                told(drawn, len(chosen))
+            if progress is not None:
+                progress(drawn, len(chosen))
 
 
-def _write_gif(trajectory: Trajectory, target: BinaryIO, told: Told | None) -> None:
+def _write_gif(trajectory: Trajectory, target: BinaryIO, progress: ProgressCallback | None) -> None:
     from PIL import Image  # comes with matplotlib
 
-    pictures = [Image.fromarray(picture) for picture in frames(trajectory, told)]
+    pictures = [Image.fromarray(picture) for picture in frames(trajectory, progress)]
     # One palette for all, from frames spread over the film, so that every colour is in it and none flickers.
     width, height = pictures[0].size
     sample = pictures[:: max(1, len(pictures) // 6)]
@@ -145,9 +144,9 @@ def _write_gif(trajectory: Trajectory, target: BinaryIO, told: Told | None) -> N
     first.save(target, "GIF", save_all=True, append_images=others, duration=times, loop=0, optimize=True)
 
 
-def _write_mp4(trajectory: Trajectory, target: Path, passing: Path, told: Told | None) -> None:
+def _write_mp4(trajectory: Trajectory, target: Path, passing: Path, progress: ProgressCallback | None) -> None:
     """Pipe raw frames to ffmpeg, which writes a file that is there already."""
-    film = frames(trajectory, told)
+    film = frames(trajectory, progress)
     first = next(film)
     height, width = first.shape[:2]
     command = [

@@ -31,7 +31,7 @@ def truck_shapes(trajectory: Trajectory, sample: int) -> list[Shape]:
     zone = min(max(CRUSH_ZONE_M, crush / (1.0 - LEAST_LEFT)), offset)
 
     def at(behind: float, height: float) -> tuple[float, float]:
-        """Place of a point given by its distance behind the undamaged front."""
+        """Location of a point given by its distance behind the undamaged front."""
         left = min(behind / zone, 1.0)
         return x_v - behind - min(crush, (1.0 - LEAST_LEFT) * zone) * (1.0 - left), height
 

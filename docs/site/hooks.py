@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 RENAMED = {"README.md": "quick_start.md"}
-"""Place in the site of files that would be in the way of others at their own."""
+"""Location in the site of files that would be in the way of others at their own."""
 TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
 """Pages from outside the folder of the documentation."""
 SHIM = "assets/iframe-worker.js"
@@ -88,7 +88,7 @@ def relinked(text: str, source: str) -> str:
     text
         Markdown without code.
     source
-        Place of the file in the repository.
+        Location of the file in the repository.
     """
 
     def renewed(match: re.Match[str]) -> str:

@@ -54,7 +54,7 @@ from .workspace import (
 def compute_constants(
     ws: np.ndarray, designs: np.ndarray, first: int, readings: Readings, control: Control, longest: float
 ) -> None:
-    """Work out constants and steps of designs, and whether they can be simulated; arguments as of `start_designs`."""
+    """Work out constants and steps of designs, and whether they can be simulated; arguments: see `start_designs`."""
     align_stack()
     # Loads from another array would keep the loop from being vectorised.
     for lane in range(LANES):

@@ -124,7 +124,7 @@ def next_design(
     control: Control,
     out: np.ndarray,
 ) -> None:
-    """Put the next design that needs integration into the lane at a place; other arguments as of `start_more`."""
+    """Put the next design that needs integration into the lane at a place; other arguments: see `start_more`."""
     if q.counts[STARTED] == 0:
         start_more(ws, q, designs, readings, control, out)
     if q.counts[STARTED] > 0:
@@ -160,7 +160,7 @@ def hand_over(
     control: Control,
     out: np.ndarray,
 ) -> None:
-    """Move a design into the group of events, and let another into its lane; arguments as of `start_more`."""
+    """Move a design into the group of events, and let another into its lane; arguments: see `start_more`."""
     counts = q.counts
     other = STEPPED + counts[SIDE] * LANES + counts[PENDING]
     copy_lane(ws, lane_of(place), lane_of(other), SIZE)
@@ -186,7 +186,7 @@ def handle(
     control: Control,
     out: np.ndarray,
 ) -> None:
-    """Work out what follows from the steps in the group of events; arguments as of `start_more`.
+    """Work out what follows from the steps in the group of events; arguments: see `start_more`.
 
     As many designs as lanes have left since this was last done, so all that were ready then have returned.
     """
@@ -236,7 +236,7 @@ def step_groups(ws: np.ndarray, q: Queue) -> int:
 
 @kernel
 def begin(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
-    """Put the first designs into the lanes of an empty workspace; arguments as of `start_more`."""
+    """Put the first designs into the lanes of an empty workspace; arguments: see `start_more`."""
     for place in range(STEPPED):
         next_design(ws, q, place, designs, readings, control, out)
         if q.rows[place] == EMPTY:
@@ -248,7 +248,7 @@ def begin(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, con
 
 @kernel
 def sweep(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> bool:
-    """Step all lanes once; return whether any design is left. Arguments as of `start_more`."""
+    """Step all lanes once; return whether any design is left. Arguments: see `start_more`."""
     for k in range(step_groups(ws, q)):
         hand_over(ws, q, q.waiting[k], designs, readings, control, out)
         if q.counts[PENDING] == LANES:

@@ -30,7 +30,7 @@ LEAST_ROTATION = 1e-4
 
 @array_kernel
 def simulate_rows(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
-    """Simulate designs one by one, with any representation of the soil; arguments as of `simulate_lanes`."""
+    """Simulate designs one by one, with any representation of the soil; arguments: see `simulate_lanes`."""
     out = empty_outcomes(designs.shape[1])
     for row in range(designs.shape[1]):
         write_outcome(out, row, simulate_design(design_in(designs, row), readings, control, no_record()))
@@ -106,7 +106,7 @@ def simulate_row(
     record: Record,
     second: SecondSpring | None = None,
 ) -> Outcome:
-    """Simulate one row of a table with its time history; arguments as of `simulate_table` and `simulate_design`."""
+    """Simulate one row of a table with its time history; arguments: see `simulate_table` and `simulate_design`."""
     design = design_at(table, row)
     if isinstance(table, LayeredTable):
         layers = table.layers[row]

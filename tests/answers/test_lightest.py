@@ -117,7 +117,7 @@ def test_no_boulder_among_many_is_lighter_than_the_lightest() -> None:
         rows = {name: np.full(len(sides), values[0]) for name, values in sweep.plan.given_rows(0, 1).items()}
         del rows["embedment_ratio"]
         assert len(sides) > 2000
-        assert not (judges_of(sweep).own(block_of(rows | inputs)).verdict == PASS).any()
+        assert not (judges_of(sweep).final(block_of(rows | inputs)).verdict == PASS).any()
 
 
 def lighter_around(sweep: Sweep, answer: pd.Series, count: int = 2000) -> np.ndarray:
@@ -144,7 +144,7 @@ def lighter_around(sweep: Sweep, answer: pd.Series, count: int = 2000) -> np.nda
     rows = {name: np.repeat(values[:1], count) for name, values in sweep.plan.given_rows(0, 1).items()}
     del rows["embedment_ratio"]
     block = block_of(rows | dict(zip(sides, tried.T, strict=True)) | {DEPTH: depth})
-    return (tried.prod(axis=1) * answer.boulder_density_kg_m3)[judges_of(sweep).own(block).verdict == PASS]
+    return (tried.prod(axis=1) * answer.boulder_density_kg_m3)[judges_of(sweep).final(block).verdict == PASS]
 
 
 def assert_lightest(sweep: Sweep) -> pd.Series:

@@ -110,7 +110,7 @@ def test_a_margin_is_proved_to_last() -> None:
     for asked, holds in ((0.0, True), (0.33, True), (0.36, False)):
         for sweep in (brief, long):
             judges = judges_of(sweep, asked)
-            for evaluation in (judges.quick, judges.own):
+            for evaluation in (judges.coarse, judges.final):
                 rows = evaluation(sweep.block(0, 1))
                 assert rows.verdict[0] == PASS
                 assert judges.holds(rows)[0] == holds

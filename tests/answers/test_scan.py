@@ -28,10 +28,10 @@ def compared(sweep: Sweep, word: str, between: Ends = None) -> tuple[int, int]:
     first, last = asked.lattice(rows)
 
     def thorough(index: np.ndarray, places: np.ndarray) -> np.ndarray:
-        codes = trials[1].quick(index, places)
+        codes = trials[1].coarse(index, places)
         return np.where(codes == FAR, FAILS, codes)
 
-    fewer, every = search(trials[0].quick, first, last), search(thorough, first, last)
+    fewer, every = search(trials[0].coarse, first, last), search(thorough, first, last)
     for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
         assert np.array_equal(getattr(fewer, name), getattr(every, name)), name
     assert fewer.changes == every.changes

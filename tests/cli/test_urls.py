@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from boulder_sweep.places import place_of
+from boulder_sweep.locations import location_of
 
 
 @pytest.fixture
@@ -40,6 +40,6 @@ def test_answers_are_written_to_a_url(sweep, possible_grid):
     need = ("need", possible_grid, "-q", "--own-readings", "-o")
     assert sweep(*need, "memory://answers/least.parquet")[0] == 0
     assert sweep(*need, "least.parquet")[0] == 0
-    assert place_of("memory://answers/least.parquet").read_bytes() == Path("least.parquet").read_bytes()
+    assert location_of("memory://answers/least.parquet").read_bytes() == Path("least.parquet").read_bytes()
     code, _, err = sweep(*need, "memory://answers/least.csv")
     assert (code, "must end in .parquet" in err) == (2, True)

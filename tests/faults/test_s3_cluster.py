@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from boulder_sweep.errors import ClusterLostError
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import load
@@ -54,7 +54,7 @@ def test_a_table_on_a_store_is_the_local_one_though_a_worker_and_the_scheduler_a
             summary = run(sweep, out, backend="dask", scheduler=cluster.address, resume=True)
         assert summary.rows_computed == rows - found.rows_done
         assert not any("does not share" in note for note in summary.notes)
-        place = place_of(out)
+        place = location_of(out)
         assert isinstance(place, RemotePath)
         assert same_bits(read_table(place), read_table(tmp_path / "whole"))
         parts = {path.name: path.read_bytes() for path in (tmp_path / "whole").glob("rows-*")}

@@ -8,9 +8,9 @@ import threading
 
 import pytest
 
-from boulder_sweep import places
+from boulder_sweep import locations
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner import interruption
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.sweeper import run
@@ -29,8 +29,8 @@ ROWS, ROWS_PER_PART = 6000, 1000
 
 @pytest.fixture
 def silent(monkeypatch):
-    monkeypatch.setattr(places, "FIRST_WAIT_S", 0.0)
-    monkeypatch.setattr(places, "REQUEST_S", HANG_GUARD_S)  # hang guard
+    monkeypatch.setattr(locations, "FIRST_WAIT_S", 0.0)
+    monkeypatch.setattr(locations, "REQUEST_S", HANG_GUARD_S)  # hang guard
     before = set(threading.enumerate())
     with store() as found:
         yield found
@@ -48,7 +48,7 @@ def fall_silent_at(silent, monkeypatch, kind, method, which):
     def ask_in_vain(self, *arguments):
         if next(count) == which:
             silent.quiet.set()
-            monkeypatch.setattr(places, "REQUEST_S", 0.2)  # no answer comes, however long it is
+            monkeypatch.setattr(locations, "REQUEST_S", 0.2)  # no answer comes, however long it is
         return ask(self, *arguments)
 
     monkeypatch.setattr(kind, method, ask_in_vain)
@@ -94,7 +94,7 @@ def test_what_goes_on_after_a_signal_is_undone(silent, monkeypatch):
         with pytest.raises(Interrupted):
             start()
     silent.speaks.set()
-    wait_until(lambda: "rm_file" in silent.asked and not place_of(OUT).names(), "the folder is released")
+    wait_until(lambda: "rm_file" in silent.asked and not location_of(OUT).names(), "the folder is released")
     assert start().rows == ROWS
 
 
@@ -122,11 +122,11 @@ def test_a_run_whose_store_was_silent_goes_on_to_the_same_table(silent, monkeypa
     with pytest.raises(WriteError, match=r"[1-5],000 of 6,000 rows are safe"):
         start()
     silent.speaks.set()
-    monkeypatch.setattr(places, "REQUEST_S", HANG_GUARD_S)  # hang guard
+    monkeypatch.setattr(locations, "REQUEST_S", HANG_GUARD_S)  # hang guard
     wait_until(lambda: not status(OUT).running, "the lock is released")
     start(resume=True)
     run(grid_of(ROWS), tmp_path / "whole", rows_per_part=ROWS_PER_PART, simulate=plausible)
-    assert same_bits(read_table(place_of(OUT)), read_table(tmp_path / "whole"))
+    assert same_bits(read_table(location_of(OUT)), read_table(tmp_path / "whole"))
 
 
 def test_a_last_attempt_waits_without_limit_until_there_is_a_signal(monkeypatch):

@@ -6,7 +6,7 @@ import pytest
 
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.impact.explanation import explain
-from boulder_sweep.places import place_of
+from boulder_sweep.locations import location_of
 from boulder_sweep.runner import sweeper
 from boulder_sweep.store import read, status
 from boulder_sweep.store.errors import OutputExistsError
@@ -36,7 +36,7 @@ def _store():
 def test_a_run_into_a_store_writes_the_bytes_of_a_local_one(local, how):
     summary = sweeper.run(grid(), OUT, **(HOW | how))
     assert str(summary.out) == summary.to_dict()["out"] == OUT
-    out = place_of(OUT)
+    out = location_of(OUT)
     parts = {path.name: path.read_bytes() for path in local.glob("rows-*")}
     assert {name: (out / name).read_bytes() for name in out.names() if is_part_name(name)} == parts
     assert read(OUT).equals(read(local))
@@ -57,7 +57,7 @@ def test_a_run_into_a_store_is_interrupted_and_resumed(local, monkeypatch):
     assert not found.running
     if not found.complete:
         sweeper.run(grid(), OUT, resume=True, **HOW)
-    assert same_bits(read_table(place_of(OUT)), read_table(local))
+    assert same_bits(read_table(location_of(OUT)), read_table(local))
     with pytest.raises(OutputExistsError, match="is finished"):
         sweeper.run(grid(), OUT, **HOW)
 

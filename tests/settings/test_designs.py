@@ -197,11 +197,11 @@ def test_rows_are_the_same_on_either_side_of_32_bits(start):
     axes = [np.arange(length, dtype=float) for length in lengths]
     names = ("boulder_height_m", "boulder_width_m", "boulder_density_kg_m3")
     given = {name: Source(np.ones(1)) for name in (*INPUT_COLUMNS, "hood_height_m", "bumper_height_m")}
-    given |= {name: Source(axis, (place,)) for place, (name, axis) in enumerate(zip(names, axes, strict=True))}
+    given |= {name: Source(axis, (position,)) for position, (name, axis) in enumerate(zip(names, axes, strict=True))}
     block = DesignPlan(lengths, given).block(start, start + 5)
     rows = np.arange(start, start + 5)
-    for name, places in zip(names, np.unravel_index(rows, lengths), strict=True):
-        assert block.columns[name].to_numpy().tolist() == places.tolist(), name
+    for name, positions in zip(names, np.unravel_index(rows, lengths), strict=True):
+        assert block.columns[name].to_numpy().tolist() == positions.tolist(), name
 
 
 def test_more_designs_than_can_be_numbered_are_refused(problems_of, minimal):

@@ -1,4 +1,4 @@
-"""Whatever the bytes, loading ends in a sweep or in problems with their places: never in a traceback."""
+"""Whatever the bytes, loading ends in a sweep or in problems with their positions: never in a traceback."""
 
 import re
 from contextlib import suppress
@@ -208,8 +208,8 @@ BESIDE_A_TABLE = (
 def test_any_table(tmp_path_factory: pytest.TempPathFactory, columns, count, changes, sign) -> None:
     header = ["embedment_ratio", *(name for name in columns if name != "embedment_ratio")]
     lines = [header, *([GOOD[name] for name in header] for _ in range(count))]
-    for line, place, cell in changes:
-        lines[line % len(lines)][place : place + 1] = [cell]
+    for line, position, cell in changes:
+        lines[line % len(lines)][position : position + 1] = [cell]
     path = tmp_path_factory.getbasetemp() / "any.csv"
     path.write_text("\n".join(sign.join(line) for line in lines))
     given = {name.split("_")[1] for name in header if name.startswith("boulder")}

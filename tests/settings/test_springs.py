@@ -53,7 +53,7 @@ def test_an_option_takes_the_place_of_a_stage(load_it, minimal):
 
 
 @pytest.mark.parametrize(
-    ("spring", "place", "words"),
+    ("spring", "position", "words"),
     [
         ("spring: [{stiffness: 3e6}, {stiffness: 9e6}]", "15:30", "beyond and stiffness"),
         ("spring: [{stiffness: 3e6, beyond: 1}]", "15:12", "has stiffness"),
@@ -70,11 +70,11 @@ def test_an_option_takes_the_place_of_a_stage(load_it, minimal):
         (f"{TWO}\n  second_spring: 9e6", "16:3", "in the stages of the spring, too"),
     ],
 )
-def test_mistakes(problems_of, minimal, spring, place, words):
+def test_mistakes(problems_of, minimal, spring, position, words):
     problems = problems_of(minimal.replace(ONE, spring))
     assert len(problems) == 1
     assert words in problems[0].message
-    assert f"{problems[0].line}:{problems[0].column}" == place
+    assert f"{problems[0].line}:{problems[0].column}" == position
 
 
 def test_a_softer_second_spring_is_refused_row_by_row(load_it, minimal):

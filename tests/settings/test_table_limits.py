@@ -65,17 +65,17 @@ def mutated(content: bytes, chance: random.Random) -> bytes:
     """Change some bytes: one by one, by pieces that are moved or lost, or by words that mean something."""
     changed = bytearray(content)
     for _ in range(chance.randint(1, 4)):
-        place = chance.randrange(len(changed) + 1)
+        position = chance.randrange(len(changed) + 1)
         how = chance.random()
-        if how < 0.3 and place < len(changed):
-            changed[place] = chance.randrange(256)
+        if how < 0.3 and position < len(changed):
+            changed[position] = chance.randrange(256)
         elif how < 0.6:
-            changed[place:place] = chance.choice(TOKENS)
+            changed[position:position] = chance.choice(TOKENS)
         elif how < 0.8:
-            del changed[place : place + chance.randint(1, 30)]
+            del changed[position : position + chance.randint(1, 30)]
         else:
             other = chance.randrange(len(changed) + 1)
-            changed[place:place] = changed[other : other + chance.randint(1, 60)]
+            changed[position:position] = changed[other : other + chance.randint(1, 60)]
     return bytes(changed)
 
 
@@ -207,7 +207,7 @@ def test_a_named_pipe_is_not_waited_for(tmp_path, name):
 
 @pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
 def test_more_columns_than_a_table_has(tmp_path, name):
-    names = [f"c{place} [s]" for place in range(5000)]
+    names = [f"c{position} [s]" for position in range(5000)]
     text = (",".join(names) + "\n" + ",".join("1" * len(names)) + "\n").encode()
     (tmp_path / name).write_bytes(parquet(**{name: [1.0] for name in names}) if name.endswith("parquet") else text * 2)
     assert calls_of(lambda: read(tmp_path / name)) < 100_000  # a few a column; there are 12 million pairs
@@ -218,13 +218,13 @@ def large(folder: Path) -> dict[str, Path]:
     rows = 20_000_000
     words = pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), pa.array(["y" * 1000]))
     made = {
-        "columns.csv": (",".join(f"c{place}" for place in range(10**6)) + "\n1\n").encode(),
+        "columns.csv": (",".join(f"c{position}" for position in range(10**6)) + "\n1\n").encode(),
         "line.csv": f"{HEIGHT},note\n2,".encode() + b"x" * 200_000_000,
         "quoted.csv": f'{HEIGHT},note\n2,"'.encode() + b"x\n" * 100_000_000,
         "zeros.csv": f"{HEIGHT}\n".encode() + bytes(200_000_000),
         "repeated.parquet": parquet(**{HEIGHT: np.full(rows, 2.0), "note": words}),
         "long.parquet": parquet(**{HEIGHT: np.full(1000, 2.0), "note": pa.array(["y" * 1_000_000] * 1000)}),
-        "pulse-columns.csv": (",".join(f"c{place} [s]" for place in range(10**6)) + "\n1\n2\n").encode(),
+        "pulse-columns.csv": (",".join(f"c{position} [s]" for position in range(10**6)) + "\n1\n2\n").encode(),
         "pulse-rows.csv": b"time [s], acceleration [g]\n" + b"1,1\n" * 6_000_000,
         "pulse-line.csv": b"time [s], acceleration [g]\n0," + b"1" * 200_000_000 + b"\n1,1\n",
     }

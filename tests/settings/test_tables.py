@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from boulder_sweep.places import place_of
+from boulder_sweep.locations import location_of
 from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.fields import INPUTS
 
@@ -372,7 +372,7 @@ def test_mistakes_in_a_spreadsheet(write_xlsx, messages_of):
     write_xlsx(HEADER.strip().split(","), [1, 1, 2, 1], [1, "x", 2, None], [1, 1, 2, 1, 7], [1, 1, 200, 1])
     messages = messages_of(None, "designs.xlsx")
     assert [message.split(": ")[0] for message in messages] == [
-        f"designs.xlsx:{place}" for place in ("3:2", "3:4", "4:1", "5:3")
+        f"designs.xlsx:{position}" for position in ("3:2", "3:4", "4:1", "5:3")
     ]
     assert "has 5 cells; the first line has 4" in messages[2]
 
@@ -401,7 +401,7 @@ def test_an_empty_spreadsheet(write_xlsx, messages_of):
 @pytest.mark.parametrize("suffix", ["csv", "xlsx", "parquet"])
 def test_a_table_may_be_named_by_a_url(load_table, tmp_path, suffix):
     names, *rows = [line.split(",") for line in (HEADER + ROWS).splitlines()]
-    columns = {name: [float(row[place]) for row in rows] for place, name in enumerate(names)}
+    columns = {name: [float(row[position]) for row in rows] for position, name in enumerate(names)}
     local = tmp_path / f"designs.{suffix}"
     if suffix == "csv":
         local.write_text(HEADER + ROWS)
@@ -413,7 +413,7 @@ def test_a_table_may_be_named_by_a_url(load_table, tmp_path, suffix):
             book.active.append(row)
         book.save(local)
     url = f"memory://tables/designs.{suffix}"
-    place_of(url).put(local.read_bytes())
+    location_of(url).put(local.read_bytes())
     sweep, same = load_table(None, url), load_table(None, local.name)
     assert _column(sweep, "boulder_height_m") == [2.2, 3.44]
     assert sweep.resolved() == same.resolved()

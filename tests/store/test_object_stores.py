@@ -14,8 +14,8 @@ from types import SimpleNamespace
 import pyarrow.parquet as pq
 import pytest
 
-from boulder_sweep import places
-from boulder_sweep.places import RemotePath, place_of
+from boulder_sweep import locations
+from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.store import object_lock, status
 from boulder_sweep.store.errors import (
     DamagedError,
@@ -41,7 +41,7 @@ NOW = 1e9
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    monkeypatch.setattr(places, "FIRST_WAIT_S", 0.0)
+    monkeypatch.setattr(locations, "FIRST_WAIT_S", 0.0)
     monkeypatch.setattr(folders, "part_bytes", cache(folders.part_bytes))
 
 
@@ -54,7 +54,7 @@ def stopped_clock(monkeypatch):
 @pytest.fixture
 def out():
     with store():
-        yield place_of(OUT)
+        yield location_of(OUT)
 
 
 def names(out: RemotePath) -> list[str]:
@@ -151,7 +151,7 @@ def test_the_lock_of_a_dead_run_is_taken(out, stopped_clock, holder, refused):
 @pytest.mark.parametrize("only_new", [True, False])
 def test_a_run_that_was_thought_dead_cannot_change_the_table(only_new, monkeypatch):
     with store(Trouble(0, 0.0, only_new)):
-        out = place_of(OUT)
+        out = location_of(OUT)
         asleep = folders.open_folder(out)
         folders.commit(asleep, 0)
         monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)
@@ -172,12 +172,12 @@ def test_no_row_is_lost_or_double_whatever_fails(only_new, monkeypatch):
     seeds, least = 12, 50
     monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)  # a lock that arrives late is that of a dead run
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "SECRET-KEY")
-    monkeypatch.setattr(places, "_TRIES", 2)
+    monkeypatch.setattr(locations, "_TRIES", 2)
     expected, counts, told = whole(), Counter(), ""
     for seed in range(seeds):
         trouble = Trouble(seed, 0.3, only_new)
         with store(trouble) as faulty:
-            out = place_of(OUT)
+            out = location_of(OUT)
             for _ in range(60):
                 try:
                     one_run(out)
@@ -253,7 +253,7 @@ def test_a_store_that_cannot_be_written_is_refused_before_anything_is_computed()
         store(Trouble(0, 1.0, True)),
         pytest.raises(WriteError, match=f"cannot write into {OUT}: (Timeout|Connection)Error: no answer"),
     ):
-        folders.open_folder(place_of(OUT))
+        folders.open_folder(location_of(OUT))
 
 
 @pytest.mark.parametrize("resume", [True, False])

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from boulder_sweep.errors import BoulderSweepError
-from boulder_sweep.places import place_of
+from boulder_sweep.locations import location_of
 from boulder_sweep.store import object_lock, read, status
 from boulder_sweep.store.errors import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
 from boulder_sweep.store.files import hidden_name
@@ -58,7 +58,7 @@ def out(tmp_path):
 )
 def test_what_a_worker_of_another_run_stages_is_never_published(tmp_path, place, error, words):
     with store():
-        out = tmp_path / "out" if place == "disk" else place_of("faulty://bucket/out")
+        out = tmp_path / "out" if place == "disk" else location_of("faulty://bucket/out")
         killed = open_folder(out, identity=OTHER)
         killed._lock.release()
         folder = open_folder(out, overwrite=True)
@@ -123,7 +123,7 @@ def test_the_same_rows_staged_twice_with_other_bytes_do_not_disturb_each_other(t
 
 def test_a_lock_that_another_run_has_taken_keeps_parts_from_being_published(monkeypatch):
     with store():
-        out = place_of("faulty://bucket/out")
+        out = location_of("faulty://bucket/out")
         asleep = open_folder(out)
         staged = asleep.stage(0, *_content(0))
         monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)
@@ -137,7 +137,7 @@ def test_a_lock_that_another_run_has_taken_keeps_parts_from_being_published(monk
 def test_a_run_does_not_lock_again_what_another_has_finished_meanwhile(monkeypatch):
     """It would publish its parts over those of the other before it noticed."""
     with store():
-        out = place_of("faulty://bucket/out")
+        out = location_of("faulty://bucket/out")
         asleep = open_folder(out, identity=OTHER)
         staged = asleep.stage(0, *_content(0))
         monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)
@@ -378,7 +378,7 @@ def test_a_command_that_no_run_writes_is_only_shown(out, command):
 ])  # fmt: skip
 def test_a_lock_that_no_run_wrote_is_that_of_a_dead_run(content):
     with store():
-        out = place_of("faulty://bucket/out")
+        out = location_of("faulty://bucket/out")
         open_folder(out).close("stopped")
         (out / "_lock").put(content.encode("latin-1"))
         assert not status("faulty://bucket/out").running
@@ -388,7 +388,7 @@ def test_a_lock_that_no_run_wrote_is_that_of_a_dead_run(content):
 @pytest.mark.parametrize("number", ["9" * 13, "9" * 5000, "-1", "x"])
 def test_the_number_of_a_version_that_no_run_wrote_is_not_believed(number):
     with store():
-        out = place_of("faulty://bucket/out")
+        out = location_of("faulty://bucket/out")
         open_folder(out).close("stopped")
         path = out / MANIFEST_NAME
         schema = pq.read_schema(path.open("rb"))

@@ -45,7 +45,7 @@ _FINAL = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryEr
 """Answers of a store, not failures: trying again does not help."""
 
 
-class PlaceError(BoulderSweepError):
+class LocationError(BoulderSweepError):
     """A URL cannot be used; the text never repeats a user name, password or query from it."""
 
 
@@ -59,7 +59,7 @@ class RemoteStat(NamedTuple):
 class RemotePath:
     """A file or folder of an fsspec file system, with the methods of `pathlib.Path` that readers use.
 
-    Made by `place_of`. Every request is tried again a few times. Failures are raised as `OSError`, without the chain
+    Made by `location_of`. Every request is tried again a few times. Failures are raised as `OSError`, without the chain
     of causes, which may quote what was sent.
     """
 
@@ -70,7 +70,7 @@ class RemotePath:
         return self._url
 
     def __repr__(self) -> str:
-        return f"place_of({self._url!r})"
+        return f"location_of({self._url!r})"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, RemotePath) and other._url == self._url
@@ -79,7 +79,7 @@ class RemotePath:
         return hash(self._url)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return place_of, (self._url,)
+        return location_of, (self._url,)
 
     def __truediv__(self, name: str) -> RemotePath:
         return RemotePath(self._filesystem, f"{self._path}/{name}", f"{self._url}/{name}")
@@ -232,7 +232,7 @@ def _tried(request: Callable[[], Result], given_up: threading.Event) -> Result:
     raise failure from None
 
 
-Place = Path | RemotePath
+Location = Path | RemotePath
 """Where a file or a folder is."""
 
 _NUMBERS = {
@@ -263,12 +263,12 @@ def is_url(text: str) -> bool:
     return "://" in text
 
 
-def place_of(text: str | Path | RemotePath) -> Place:
+def location_of(text: str | Path | RemotePath) -> Location:
     """Return the file or folder that a path or URL names.
 
     Raises
     ------
-    PlaceError
+    LocationError
         The URL has a user name, password or query in it, or no package can open it.
     """
     if isinstance(text, RemotePath):
@@ -277,29 +277,29 @@ def place_of(text: str | Path | RemotePath) -> Place:
         return Path(text)
     found = _URL.fullmatch(text.strip())
     if found is None:
-        raise PlaceError(f"{text.partition('://')[0]}:// is not the beginning of a URL")
+        raise LocationError(f"{text.partition('://')[0]}:// is not the beginning of a URL")
     scheme, host, path, rest = found[1].lower(), found[2], found[3], found[4]
     shown = f"{scheme}://{host.rpartition('@')[2]}{path}"
     if "@" in host or rest:
         what = "a user name or password" if "@" in host else "a query or fragment"
-        raise PlaceError(
+        raise LocationError(
             f"{shown}: the URL was given with {what}, which would be written down in many places; leave credentials "
             f"where the library of the file system looks for them, such as AWS_ACCESS_KEY_ID or ~/.aws for s3"
         )
     if scheme == "file":
         if host not in ("", "localhost"):
-            raise PlaceError(f"{shown}: files of another machine; write file:///folder")
+            raise LocationError(f"{shown}: files of another machine; write file:///folder")
         return Path(unquote(path))
     filesystem = _filesystem(scheme, shown)
     return RemotePath(filesystem, filesystem._strip_protocol(shown), shown)
 
 
-def source_of(place: Place) -> Any:
+def source_of(place: Location) -> Any:
     """Return what libraries can read a file from: its path, or its content opened."""
     return place if isinstance(place, Path) else place.open("rb")
 
 
-def beside(place: Place, suffix: str) -> Path:
+def beside(place: Location, suffix: str) -> Path:
     """Return the path of a file made from a result: beside it, or in the current directory for a URL."""
     if isinstance(place, RemotePath):
         return Path(f"{place.name.removesuffix('.sweep')}{suffix}")
@@ -319,6 +319,6 @@ def _filesystem(scheme: str, shown: str) -> Any:
         return fsspec.url_to_fs(shown, **options)[0]
     except ImportError as missing:
         extra = "pip install 'boulder-sweep[s3]'" if scheme in (*_S3, "memory") else one_line(missing)
-        raise PlaceError(f"{shown}: {scheme}:// needs another package: {extra}") from None
+        raise LocationError(f"{shown}: {scheme}:// needs another package: {extra}") from None
     except ValueError as unknown:
-        raise PlaceError(f"{shown} cannot be opened: {one_line(unknown)}") from None
+        raise LocationError(f"{shown} cannot be opened: {one_line(unknown)}") from None

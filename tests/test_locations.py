@@ -9,8 +9,8 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from boulder_sweep import places
-from boulder_sweep.places import PlaceError, RemotePath, beside, place_of
+from boulder_sweep import locations
+from boulder_sweep.locations import LocationError, RemotePath, beside, location_of
 from tests.waiting import HANG_GUARD_S, wait_until
 
 
@@ -24,7 +24,7 @@ from tests.waiting import HANG_GUARD_S, wait_until
     ],
 )
 def test_paths_and_file_urls_are_paths(text, path):
-    assert place_of(text) == Path(path)
+    assert location_of(text) == Path(path)
 
 
 @pytest.mark.parametrize(
@@ -39,8 +39,8 @@ def test_paths_and_file_urls_are_paths(text, path):
     ],
 )
 def test_a_url_with_credentials_is_refused_without_repeating_them(url):
-    with pytest.raises(PlaceError, match="leave credentials where the library") as refused:
-        place_of(url)
+    with pytest.raises(LocationError, match="leave credentials where the library") as refused:
+        location_of(url)
     assert "SECRET" not in str(refused.value)
     assert "AKIA" not in str(refused.value)
     assert refused.value.__cause__ is None
@@ -55,12 +55,12 @@ def test_a_url_with_credentials_is_refused_without_repeating_them(url):
     ],
 )
 def test_urls_that_cannot_be_opened_are_refused(url, words):
-    with pytest.raises(PlaceError, match=words):
-        place_of(url)
+    with pytest.raises(LocationError, match=words):
+        location_of(url)
 
 
 def test_a_url_behaves_like_a_path_and_can_be_sent():
-    place = place_of("memory://places/m30.sweep/")
+    place = location_of("memory://places/m30.sweep/")
     assert isinstance(place, RemotePath)
     assert str(place / "a.csv") == "memory://places/m30.sweep/a.csv"
     assert ((place / "a.csv").name, (place / "a.csv").suffix, (place / "a.csv").parent) == ("a.csv", ".csv", place)
@@ -80,13 +80,13 @@ def test_a_url_behaves_like_a_path_and_can_be_sent():
 
 def test_files_made_from_a_result_lie_beside_it_or_here():
     assert beside(Path("runs/m30.sweep"), ".png") == Path("runs/m30.png")
-    assert beside(place_of("memory://x/m30.sweep"), ".html") == Path("m30.html")
+    assert beside(location_of("memory://x/m30.sweep"), ".html") == Path("m30.html")
 
 
 def test_a_try_at_a_store_has_limits_of_its_own_and_other_options_stay(monkeypatch):
     """Without them botocore tries for minutes by itself."""
     monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"signature_version": "s3v4", "read_timeout": 9}})
-    config = place_of("s3://bucket/out")._filesystem.config_kwargs
+    config = location_of("s3://bucket/out")._filesystem.config_kwargs
     assert config == {
         "connect_timeout": 3,
         "read_timeout": 9,
@@ -96,9 +96,9 @@ def test_a_try_at_a_store_has_limits_of_its_own_and_other_options_stay(monkeypat
 
 
 def test_a_request_that_is_given_up_is_not_tried_again(monkeypatch):
-    monkeypatch.setattr(places, "REQUEST_S", 0.05)  # no answer comes, however long it is
-    monkeypatch.setattr(places, "FIRST_WAIT_S", HANG_GUARD_S)  # hang guard
-    place, asked = place_of("memory://places/out"), []
+    monkeypatch.setattr(locations, "REQUEST_S", 0.05)  # no answer comes, however long it is
+    monkeypatch.setattr(locations, "FIRST_WAIT_S", HANG_GUARD_S)  # hang guard
+    place, asked = location_of("memory://places/out"), []
 
     def fail(path):
         asked.append(path)
@@ -112,7 +112,7 @@ def test_a_request_that_is_given_up_is_not_tried_again(monkeypatch):
 
 
 def test_a_file_of_any_size_has_the_time_to_be_read(monkeypatch):
-    place, limits = place_of("memory://places/design.csv"), []
+    place, limits = location_of("memory://places/design.csv"), []
     monkeypatch.setattr(RemotePath, "read_bytes", lambda self, most=None: limits.append(most) or b"")
     for size in (10**9, 5):
         monkeypatch.setattr(place._filesystem, "info", lambda path, size=size: {"size": size, "type": "file"})
@@ -121,8 +121,8 @@ def test_a_file_of_any_size_has_the_time_to_be_read(monkeypatch):
 
 
 def test_a_list_of_many_pages_has_more_time_than_one_answer(monkeypatch):
-    monkeypatch.setattr(places, "REQUEST_S", 0.2)  # no answer comes, however long it is
-    place, end = place_of("memory://places/out"), threading.Event()
+    monkeypatch.setattr(locations, "REQUEST_S", 0.2)  # no answer comes, however long it is
+    place, end = location_of("memory://places/out"), threading.Event()
     monkeypatch.setattr(place._filesystem, "ls", lambda path, detail: end.wait(HANG_GUARD_S))  # hang guard
     with pytest.raises(TimeoutError, match="the store has not answered for 1 s"):
         place.names()
