@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from boulder_sweep.answers.boundary import boundary
 from boulder_sweep.answers.chance import Points, chance
 from boulder_sweep.answers.draws import Draws, threads
 from boulder_sweep.answers.need import Need, need
@@ -119,14 +118,9 @@ def measure(rows: int = ROWS, verified: int = VERIFIED, drawn: int = DRAWN) -> T
     draw_one(4096)
     chances = Timed.of(lambda: draw_one(drawn))
     table.rows.append(_row(f"chance of one design by {drawn:,} drawn", chances, drawn, drawn))
-    grid = load(GRID)
-    boundary(grid)
-    mapped = Timed.of(lambda: boundary(grid))
-    table.rows.append(_row(f"map of {grid.n_designs:,} designs", mapped, mapped.result.simulations, grid.n_designs))
     busy = os.getloadavg()[0]
     if busy > 1.5 * (os.cpu_count() or 1):
         table.notes.append(f"Other programs used the machine (load {busy:.0f}): idle, wall times are shorter.")
-    table.notes.append(f"The map needs {mapped.result.share:.1%} of the simulations of the whole grid.")
     return table
 
 

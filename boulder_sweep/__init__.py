@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from boulder_sweep.answers.need import Need, frontier, need
+    from boulder_sweep.answers.need import Need, need
     from boulder_sweep.answers.uncertainty import Uncertainty, uncertainty
     from boulder_sweep.impact.simulation import Trajectory, simulate
     from boulder_sweep.report.comparison import compare
@@ -35,7 +35,6 @@ __all__ = [
     "__version__",
     "compare",
     "export",
-    "frontier",
     "load",
     "need",
     "read",
@@ -50,7 +49,6 @@ __all__ = [
 _HOME = {
     "Need": "boulder_sweep.answers.need",
     "need": "boulder_sweep.answers.need",
-    "frontier": "boulder_sweep.answers.need",
     "Uncertainty": "boulder_sweep.answers.uncertainty",
     "uncertainty": "boulder_sweep.answers.uncertainty",
     "SettingsError": "boulder_sweep.settings",

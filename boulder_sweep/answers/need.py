@@ -248,7 +248,6 @@ def need(
     return Need(sweep, key, least_margin, table, simulated, chance)
 
 
-frontier = need
 """The same by its other name."""
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import click
 
@@ -17,7 +16,7 @@ EXAMPLES = """\b
 Examples:
   sweep plot m30-sizing.sweep
   sweep plot m30-sizing.sweep -o map.png --at boulder_width_m=1.8
-  sweep plot map.parquet --units us
+  sweep plot m30-sizing.sweep --units us
   sweep plot m30-sizing.sweep --across boulder_width_m
 """
 COLUMN = "COLUMN"
@@ -40,7 +39,7 @@ COLUMN = "COLUMN"
 def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes: Any) -> int:
     """Draw a map of the verdicts in OUT: embedment across, height up, one map for each soil.
 
-    OUT is the folder of a run, perhaps in progress, of which finished designs are drawn, or a file of `sweep boundary`.
+    OUT is the folder of a run, perhaps in progress, of which finished designs are drawn.
     COLUMN is the name of an input column of the table, embedment_ratio, or soil or vehicle where these have names.
     """
     given: dict[str, str] = {}
@@ -49,64 +48,32 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
             raise click.UsageError(f"--at {name} is given twice; give each column one value")
         given[name] = text
     from boulder_sweep.errors import PictureError
+    from boulder_sweep.store.finished import FinishedRows
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
+    from boulder_sweep.views.pieces import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
     from boulder_sweep.views.wording import terms_line
 
     require_matplotlib()
-    source = _of_map(out) if _is_map(Path(out)) else _of_run(out)
-    target = checked_kind(picture or beside(location_of(out.removesuffix(".parquet")), ".png"))
-    if source.rows_done == 0:
+    finished = FinishedRows(location_of(out))
+    target = checked_kind(picture or beside(location_of(out), ".png"))
+    if finished.rows_done == 0:
         raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
-    settings = source.settings
+    settings = finished.identity["settings"]
     sets = settings.get("labels", {}) if settings["order"] != "table" else {}
     held = {name: _held(name, text, sets) for name, text in given.items()}
-    judged = f" {source.judged_by[0].upper()}{source.judged_by[1:]}." if source.judged_by else ""
+    judged = finished.judged_by
+    judged = f" {judged[0].upper()}{judged[1:]}." if judged else ""
     words = {"title": settings["name"], "terms": f"{terms_line(settings)}{judged}"}
-    shown = draw_verdict_map(source.table, target, at=held, sets=sets, units=units, **words, **axes)
+    shown = draw_verdict_map(finished_pieces(finished), target, at=held, sets=sets, units=units, **words, **axes)
     for name, value in held.items():
         taken = shown.fixed.get(name, value)
         if abs(taken - value) > 1e-6 * abs(value):
             say(f"note: {name} is {taken:.6g} in this map, the value nearest to {value:.6g}")
-    if source.rows_done < source.rows:
+    if finished.rows_done < finished.rows:
         say(f"note: the run is not finished; {shown.total:,} designs are drawn")
     show(f"{target}: {shown.count:,} of {shown.total:,} designs")
     return 0
-
-
-class _Source(NamedTuple):
-    """What is drawn."""
-
-    table: Any
-    settings: dict[str, Any]
-    judged_by: str
-    rows_done: int
-    rows: int
-
-
-def _is_map(out: Path) -> bool:
-    """Whether this may be a file of `sweep boundary`: a Parquet file that is not part of the result of a run."""
-    from boulder_sweep.store.manifest import is_part_name
-
-    return out.suffix == ".parquet" and out.is_file() and not is_part_name(out.name)
-
-
-def _of_run(out: str) -> _Source:
-    """Return the result of a run."""
-    from boulder_sweep.store.finished import FinishedRows
-    from boulder_sweep.views.pieces import finished_pieces
-
-    finished = FinishedRows(location_of(out))
-    settings, done = finished.identity["settings"], finished.rows_done
-    return _Source(finished_pieces(finished), settings, finished.judged_by, done, finished.rows)
-
-
-def _of_map(out: str) -> _Source:
-    """Return the map in a file of `sweep boundary`."""
-    from boulder_sweep.answers.boundary import read_map
-
-    frame, settings, judged_by = read_map(out)
-    return _Source(frame, settings, judged_by, len(frame), len(frame))
 
 
 def _given(text: str) -> tuple[str, str]:

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from boulder_sweep import load, need, uncertainty
-from boulder_sweep.answers.boundary import boundary
 from boulder_sweep.answers.doubts import doubts
 from boulder_sweep.answers.printing import doubt_lines, need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.published import PUBLISHED
@@ -56,16 +55,9 @@ def lightest_of_grid(root: Path) -> str:
     return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass")))
 
 
-def which_of_site(root: Path) -> str:
+def capacity_of_site(root: Path) -> str:
     """Return what the designs of the site withstand as a terminal shows it."""
     return _fenced(reserve_lines(reserves(load(root / SITE))))
-
-
-def boundary_of_grid(root: Path) -> str:
-    """Return how many designs of the M30 grid its map needs."""
-    found = boundary(load(root / GRID))
-    words = f"{found.simulations:,} simulations for {len(found.verdict):,} designs: {found.share:.1%}"
-    return _fenced([f"{words}, {found.counts()['pass']:,} of them pass"])
 
 
 def uncertainty_of_site(root: Path) -> str:

@@ -313,5 +313,4 @@ def test_chart_is_drawn(tmp_path: Path) -> None:
 
 def test_public_name() -> None:
     assert boulder_sweep.need is need
-    assert boulder_sweep.frontier is need
     assert boulder_sweep.Need is Need

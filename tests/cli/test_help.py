@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ("new", "run", "check", "need", "uncertainty", "which", "boundary", "simulate", "status")
+COMMANDS = ("new", "run", "check", "need", "uncertainty", "capacity", "simulate", "status")
 HEAVY = ("numba", "pandas", "scipy", "pyarrow", "matplotlib", "joblib", "rich", "pint", "pydantic", "dask")
 BESIDE_THE_KERNELS = ("scipy.linalg", "pandas", "pyarrow", "matplotlib", "joblib", "rich", "dask", "bokeh", "jinja2")
 
@@ -51,7 +51,7 @@ def test_every_command_explains_itself_by_example(sweep, command):
 
 def test_files_named_in_the_help_exist(sweep):
     named = set()
-    for words in ([], ["run"], ["check"], ["need"], ["uncertainty"], ["which"], ["boundary"], ["simulate"]):
+    for words in ([], ["run"], ["check"], ["need"], ["uncertainty"], ["capacity"], ["simulate"]):
         named |= set(re.findall(r"configs/\w+\.yaml", sweep(*words, "--help")[1]))
     assert named
     assert all((ROOT / name).is_file() for name in named)

@@ -53,7 +53,7 @@ def test_from_the_file_to_every_place_that_shows_it(sweep, hostile):
         ["run", f"{folder}/grid.yaml", "-o", f"{folder}/out.sweep"],
         ["status", f"{folder}/out.sweep", "--verify"],
         ["explain", f"{folder}/out.sweep", "0"],
-        ["which", f"{folder}/grid.yaml"],
+        ["capacity", f"{folder}/grid.yaml"],
         ["need", f"{folder}/grid.yaml", "--own-readings"],
         ["plot", f"{folder}/out.sweep", "-o", f"{folder}/map.svg"],
         ["simulate", f"{folder}/grid.yaml", "--plot", f"{folder}/one.svg"],

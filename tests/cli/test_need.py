@@ -20,12 +20,6 @@ def test_table_fits_the_terminal(sweep):
         assert "simulations" in err
 
 
-def test_frontier_is_the_same_command_and_not_listed(sweep):
-    words = [CONFIG, "-q", "--own-readings", "--set", "boulder.height=3.4 m"]
-    assert sweep("frontier", *words) == sweep("need", *words)
-    assert "frontier" not in sweep("--help")[1]
-
-
 def test_columns_of_the_table(sweep):
     _, out, _ = sweep("need", CONFIG, "-q")
     head = out.splitlines()[0].split()

@@ -49,8 +49,7 @@ def compiled():
         ("run", SITE, *ONE),
         ("simulate", SITE, *ONE),
         ("need", SITE, *ONE, "--own-readings"),
-        ("which", SITE, *ONE),
-        ("boundary", SITE),
+        ("capacity", SITE, *ONE),
         ("uncertainty", SITE, *ONE, "--half-width", "0.2", "--set", "vehicle.speed={mean: 30 mph, cov: 5 %}"),
         ("tradeoff", SITE, *ONE, "--seconds", "0"),
     ],
@@ -67,9 +66,7 @@ def test_every_command_that_compiles_says_so_first(compiled, sweep, words, monke
     assert list(remembered) == ["design" if words[0] == "simulate" else "table"]
 
 
-@pytest.mark.parametrize(
-    "words", [("need", SITE, "--least", "phi"), ("uncertainty", SITE), ("boundary", SITE, "--set", "soil.density=1 lb")]
-)
+@pytest.mark.parametrize("words", [("need", SITE, "--least", "phi"), ("uncertainty", SITE)])
 def test_a_wrong_question_is_refused_before_anything_is_compiled(sweep, words, monkeypatch):
     compiled = []
     monkeypatch.setattr(Evaluation, "warm_up", compiled.append)

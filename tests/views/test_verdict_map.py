@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,16 +12,14 @@ import pytest
 from matplotlib.axes import Axes
 
 import boulder_sweep
-from boulder_sweep.answers.boundary import read_map
 from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import INPUT_COLUMNS
-from boulder_sweep.errors import PictureError, QuestionError
+from boulder_sweep.errors import PictureError
 from boulder_sweep.settings import load_text
 from boulder_sweep.views.labels import label, value_text
 from boulder_sweep.views.pieces import Kept, Pieces, pieces_of
 from boulder_sweep.views.slices import Slice, plane
 from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
-from boulder_sweep.views.wording import terms_line
 
 GRID = """\
 name: small grid
@@ -382,43 +379,6 @@ def test_a_map_in_us_units(named_soils: str) -> None:
     drawn = Path("us.svg").read_text()
     assert "<!-- boulder height [ft] -->" in drawn
     assert "speed\N{NO-BREAK SPACE}30\N{NO-BREAK SPACE}mph" in drawn, "values stay on one line, as they are"
-
-
-def test_a_file_of_sweep_boundary_is_drawn_as_the_run_is(named_soils: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert execute(["boundary", "named.yaml", "-q", "-o", "named.parquet"]) == 0
-    assert execute(["plot", "named.parquet"]) == 0
-    assert "named.png: 27 of 27 designs" in capsys.readouterr().out
-    settings = boulder_sweep.load("named.yaml").resolved()
-    run = boulder_sweep.read(named_soils).drop(columns="validity")  # a map of a boundary has no flags
-    words = {"title": settings["name"], "terms": terms_line(settings), "sets": settings["labels"]}
-    draw_verdict_map(run, Path("run.png"), **words)
-    assert Path("named.png").read_bytes() == Path("run.png").read_bytes()
-    boulder_sweep.read(named_soils).to_parquet("other.parquet")
-    assert execute(["plot", "other.parquet"]) == 2
-    assert "neither the folder of a run nor a file that `sweep boundary` wrote" in capsys.readouterr().err
-    Path("text.parquet").write_text("no table")
-    assert execute(["plot", "text.parquet"]) == 2
-    assert "cannot be read as a Parquet file" in capsys.readouterr().err
-
-
-def test_a_damaged_file_of_sweep_boundary_is_told(named_soils: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert execute(["boundary", "named.yaml", "-q", "-o", "named.parquet"]) == 0
-    content, whole, chance = Path("named.parquet").read_bytes(), read_map("named.parquet"), random.Random(22)
-    refusals, shown = 0, whole[0].to_csv()
-    for _ in range(120):  # most of the file are names, types and settings, which have no checksums of their own
-        flipped = bytearray(content)
-        flipped[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
-        Path("flipped.parquet").write_bytes(flipped)
-        try:
-            frame, found, _ = read_map("flipped.parquet")
-            assert (frame.to_csv(), found) == (shown, whole[1])
-        except QuestionError:
-            refusals += 1
-    assert refusals > 30
-    Path("flipped.parquet").write_bytes(content.replace(b"boulder_height_m", b"boulder\xffheight_m"))
-    capsys.readouterr()
-    assert execute(["plot", "flipped.parquet"]) == 2
-    assert capsys.readouterr().err.startswith("error: flipped.parquet cannot be read as a Parquet file: ")
 
 
 def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""``sweep which``: lines, JSON, Parquet."""
+"""``sweep capacity``: lines, JSON, Parquet."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ CONFIG = Path(__file__).parents[2] / "configs" / "site.yaml"
 
 
 def test_lines_json_and_parquet(sweep, tmp_path):
-    code, out, _ = sweep("which", CONFIG)
+    code, out, _ = sweep("capacity", CONFIG)
     assert code == 0
     assert all(len(line) <= 80 for line in out.splitlines())
     assert "simulated" in out
-    code, out, _ = sweep("which", CONFIG, "--json", "-o", tmp_path / "w.parquet")
+    code, out, _ = sweep("capacity", CONFIG, "--json", "-o", tmp_path / "w.parquet")
     rows = json.loads(out)["rows"]
     frame = pd.read_parquet(tmp_path / "w.parquet")
     assert code == 0
@@ -25,12 +25,19 @@ def test_lines_json_and_parquet(sweep, tmp_path):
 
 
 def test_rows_that_cannot_be_computed_give_exit_code_3(sweep, grid):
-    code, out, _ = sweep("which", grid, "--json")
+    code, out, _ = sweep("capacity", grid, "--json")
     assert code == 3
     assert [row["verdict"] for row in json.loads(out)["rows"]].count("error") == 6
 
 
 def test_an_object_in_us_units_is_refused(sweep, grid):
-    code, out, err = sweep("which", grid, "--json", "--units", "us")
+    code, out, err = sweep("capacity", grid, "--json", "--units", "us")
     assert (code, out) == (2, "")
     assert "leave out --units us or --json" in err
+
+
+def test_its_name_before_is_understood_and_not_listed(sweep):
+    assert sweep("which", CONFIG, "-q") == sweep("capacity", CONFIG, "-q")
+    listed = [line.split()[0] for line in sweep("--help")[1].splitlines() if line.startswith("  ")]
+    assert "capacity" in listed
+    assert "which" not in listed

@@ -1,4 +1,4 @@
-"""``sweep which``: which truck and soil every design withstands."""
+"""``sweep capacity``: which truck and soil every design withstands."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from boulder_sweep.cli.output import show
 
 EXAMPLES = """\b
 Examples:
-  sweep which configs/crash_tests.yaml
-  sweep which configs/site.yaml -o withstands.parquet
+  sweep capacity configs/crash_tests.yaml
+  sweep capacity configs/site.yaml -o withstands.parquet
 """
 
 
-@click.command("which", short_help="Which truck and soil every design withstands.", epilog=EXAMPLES)
+@click.command("capacity", short_help="Which truck and soil every design withstands.", epilog=EXAMPLES)
 @click.argument("grid", type=click.Path())
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all designs.")
@@ -25,7 +25,7 @@ Examples:
 @units_option
 @set_option
 @json_option
-def which(
+def capacity(
     grid: str, jobs: int | None, out: str | None, units: str, quiet: bool, overrides: tuple[str, ...], as_json: bool
 ) -> int:
     """Find how far speed, mass of the truck and friction angle may change before each verdict does.
