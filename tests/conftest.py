@@ -60,7 +60,7 @@ QUICK = (
     "test_rooms.py",
 )
 """Folders and files whose tests are marked ``quick``: together well under a minute, something of every room."""
-NOT_QUICK = ("judge/test_ground.py", "settings/test_fuzz.py")
+NOT_QUICK = ("soils/test_ground.py", "settings/test_fuzz.py")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

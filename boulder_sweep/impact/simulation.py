@@ -29,7 +29,6 @@ from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors, simul
 from boulder_sweep.columns import AT_REST, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
-from boulder_sweep.judge.ground import plain
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, Judged
 from boulder_sweep.judge.pilot import accuracy_of
@@ -38,6 +37,7 @@ from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import ReadingChoice, SolverSettings
+from boulder_sweep.soils import plain
 
 __all__ = ["Trajectory", "simulate"]
 

@@ -17,12 +17,12 @@ import numpy as np
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
-from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import AGREEING, FACTOR, agree, finer_controls, is_late, is_open, reported_step_s
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
+from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock

@@ -16,12 +16,12 @@ import numpy as np
 from boulder_kernels import ELASTIC, DesignTable, Readings, as_printed, corrected
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, plain_designs, sampled_designs, simulated
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.judge.verdict import judge
+from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
     from boulder_kernels import Control

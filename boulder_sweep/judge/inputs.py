@@ -8,8 +8,8 @@ import numpy as np
 
 from boulder_kernels import DesignTable, SecondSprings
 from boulder_sweep.designs import SECOND_SPRING
-from boulder_sweep.judge.ground import with_soil
 from boulder_sweep.settings.model import RESISTANCES, Ground
+from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock

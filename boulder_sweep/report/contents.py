@@ -32,8 +32,7 @@ from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, PARTS
 from boulder_sweep.report.rows import SIZES, Rows, Thinned, label_of
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.layers import WATER_KG_M3
-from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
+from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
 from boulder_sweep.settings.notes import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.views.wording import REASON_WORDS

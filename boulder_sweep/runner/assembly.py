@@ -1,4 +1,4 @@
-"""Blocks that finish in any order become parts in the order of the designs."""
+"""Blocks that finish in any order become parts in the order of the designs; how far workers may run ahead."""
 
 from __future__ import annotations
 
@@ -8,6 +8,41 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from boulder_sweep.judge.judged import Judged
+
+
+class Admission:
+    """Counts rows between being handed out and being staged on disk.
+
+    Parameters
+    ----------
+    limit
+        Most rows in progress; must exceed a full part, which is written only when complete.
+    """
+
+    def __init__(self, limit: int):
+        self.limit = limit
+        self._in_progress = 0
+        self._changed = threading.Condition()
+
+    def admit(self, rows: int) -> bool:
+        """Hand out rows if the limit allows; never waits."""
+        with self._changed:
+            if self._in_progress and self._in_progress + rows > self.limit:
+                return False
+            self._in_progress += rows
+            return True
+
+    def release(self, rows: int) -> None:
+        """Count rows as staged."""
+        with self._changed:
+            self._in_progress -= rows
+            self._changed.notify_all()
+
+    def wait(self, seconds: float) -> None:
+        """Wait until rows are released, at most this long."""
+        with self._changed:
+            self._changed.wait(seconds)
+
 
 COMMIT_EVERY_S = 5.0
 """How often a part is written before it is complete, so that a slow run shows progress and loses little [s]."""

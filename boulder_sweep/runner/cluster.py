@@ -17,8 +17,7 @@ from typing import Any
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
 from boulder_sweep.runner.backends import FETCH_S
-from boulder_sweep.runner.computing import Computation, failed_rows
-from boulder_sweep.runner.messages import Computed, Ended, Message, Note
+from boulder_sweep.runner.computing import Computation, Computed, Ended, Message, Note, failed_rows
 from boulder_sweep.runner.remote import Done, Work, check_fingerprints, compute, fingerprint, parts_of, received
 from boulder_sweep.runner.silence import Silence, answers, named, seen
 from boulder_sweep.store.writer import OutputFolder, StagedPart

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from boulder_sweep.runner.admission import Admission
+from boulder_sweep.runner.assembly import Admission
 from boulder_sweep.store.errors import DamagedError
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 

@@ -20,6 +20,9 @@ from boulder_sweep.text import one_line
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
 
+
+from boulder_sweep.store.writer import StagedPart
+
 MakeBlock = Callable[[int, int], "DesignBlock"]
 Evaluate = Callable[["DesignBlock"], Judged]
 _TRIES = 2
@@ -127,3 +130,26 @@ def verdict_counts(judged: Judged) -> dict[str, int]:
         found[FLAGGED] = flagged
         found["pass"] -= flagged
     return dict(sorted((key, count) for key, count in found.items() if count))
+
+
+class Computed(NamedTuple):
+    """Some rows are computed."""
+
+    rows: int
+
+
+class Note(NamedTuple):
+    """Something the user should know, such as a lost worker."""
+
+    text: str
+
+
+class Ended(NamedTuple):
+    """There will be no more messages."""
+
+    problem: BaseException | None
+    """What went wrong, if anything did."""
+
+
+Message = Computed | StagedPart | Note | Ended
+"""A `StagedPart` is a part that is written and waits to be committed."""

@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.firmness import firmness_of
-from boulder_sweep.runner.admission import Admission
-from boulder_sweep.runner.assembly import Assembly
+from boulder_sweep.runner.assembly import Admission, Assembly
 from boulder_sweep.runner.backends import DASK, start_failure
 from boulder_sweep.runner.cluster import Cluster, ClusterWorkers
-from boulder_sweep.runner.commands import repeat_command
 from boulder_sweep.runner.committer import Committer
-from boulder_sweep.runner.computing import Computation
+from boulder_sweep.runner.computing import Computation, Computed, Ended, Message, Note
 from boulder_sweep.runner.estimate import (
     Estimate,
     blocks,
@@ -31,13 +29,21 @@ from boulder_sweep.runner.estimate import (
     tasks,
 )
 from boulder_sweep.runner.interruption import Signals
-from boulder_sweep.runner.messages import Computed, Ended, Message, Note
 from boulder_sweep.runner.summary import Progress, progress_of
 from boulder_sweep.runner.threads import ThreadWorkers
 from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.provenance import cpu_name, file_metadata
 from boulder_sweep.store.writer import OutputFolder, StagedPart
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+
+import shlex
+from typing import TYPE_CHECKING
+
+from boulder_sweep.locations import Location
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -230,3 +236,32 @@ def _join(thread: threading.Thread, patience_s: float) -> None:
     """Wait for a thread, which may not have been started."""
     if thread.ident is not None:
         thread.join(patience_s)
+
+
+def repeat_command(sweep: Sweep) -> str:
+    """Return the command that computes the same table, the same on every machine."""
+    if sweep.path is None:
+        return "boulder_sweep.run(sweep, out)"
+    return shlex.join(["sweep", "run", sweep.path.name, *_overrides(sweep)])
+
+
+def resume_command(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
+    """Return the command that resumes a run with the given arguments."""
+    if sweep.path is None:
+        return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"
+    words = ["sweep", "run", str(sweep.path), "-o", str(out)]
+    if jobs is not None:
+        words += ["--jobs", str(jobs)]
+    if backend != "threading":
+        words += ["--backend", backend]
+    if scheduler is not None:
+        words += ["--scheduler", scheduler]
+    return shlex.join([*words, *_overrides(sweep), "--resume"])
+
+
+def _overrides(sweep: Sweep) -> list[str]:
+    """Return the options that replace entries of the file, as they were given."""
+    words = []
+    for entry in sweep.overrides:
+        words += entry.split("=", 1) if entry.startswith("--") else ["--set", entry]
+    return words

@@ -7,11 +7,9 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-from boulder_sweep.runner.admission import Admission
-from boulder_sweep.runner.assembly import Assembly, ReadyPart
+from boulder_sweep.runner.assembly import Admission, Assembly, ReadyPart
 from boulder_sweep.runner.backends import start_failure
-from boulder_sweep.runner.computing import Computation
-from boulder_sweep.runner.messages import Computed, Ended, Message
+from boulder_sweep.runner.computing import Computation, Computed, Ended, Message
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 
 

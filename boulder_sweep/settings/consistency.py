@@ -6,8 +6,7 @@ import math
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
-from boulder_sweep.settings.layers import WATER_KG_M3
-from boulder_sweep.settings.model import SolverSettings
+from boulder_sweep.settings.model import WATER_KG_M3, SolverSettings
 
 
 def check_complete(entries: Entries) -> None:

@@ -19,6 +19,8 @@ SWITCHES: dict[str, str] = {
 PRINTED = "printed"
 ACCURACIES = ("fast", "balanced", "fine")
 CLOSED_FORM = "closed_form"
+WATER_KG_M3 = 1000.0
+"""Density of water."""
 RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 

@@ -19,11 +19,10 @@ from boulder_sweep.store.manifest import (
     load,
     save,
 )
-from boulder_sweep.store.merging import recover_merge
 from boulder_sweep.store.provenance import PREFIX, differences
 from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
-from boulder_sweep.store.writer import OutputFolder
+from boulder_sweep.store.writer import OutputFolder, recover_merge
 from boulder_sweep.text import why
 
 

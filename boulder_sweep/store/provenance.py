@@ -32,10 +32,11 @@ _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 _DECIDING_SOURCES = (
     "designs.py",
     "columns.py",
+    "soils.py",
     "judge/*.py",
-    *(f"settings/{name}.py" for name in ("fields", "layers", "model", "notes")),
+    *(f"settings/{name}.py" for name in ("fields", "model", "notes")),
 )
-"""Modules, in addition to the kernels, whose code determines the rows: of the settings those that judge/ imports."""
+"""Modules, in addition to the kernels, whose code determines the rows: of the settings those that the others import."""
 
 
 def canonical(content: Any) -> str:

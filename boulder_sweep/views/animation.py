@@ -15,8 +15,7 @@ from boulder_sweep.errors import PictureError
 from boulder_sweep.store.files import replacing
 from boulder_sweep.text import ProgressCallback, script_data, why
 from boulder_sweep.views import figures
-from boulder_sweep.views.scene import SideView, samples_shown
-from boulder_sweep.views.shapes import STYLES, Shape
+from boulder_sweep.views.scene import STYLES, Shape, SideView, samples_shown
 from boulder_sweep.views.trajectory import require_samples
 from boulder_sweep.views.wording import design_line, verdict_line
 

@@ -14,11 +14,62 @@ import numpy as np
 from boulder_kernels.design import G, wedge_slope
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-from boulder_sweep.views.shapes import Shape
-from boulder_sweep.views.truck import truck_shapes
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
+
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from boulder_sweep.impact.trajectory import Trajectory
+
+
+from typing import NamedTuple
+
+
+class Shape(NamedTuple):
+    """One thing to draw; lengths in metres."""
+
+    kind: str
+    """``polygon``, ``line``, ``arrow``, ``circle`` or ``text``."""
+    style: str
+    """What it is, key of `STYLES`."""
+    points: tuple[tuple[float, float], ...]
+    """Corners; tail and head of an arrow; centre of a circle; place of a text."""
+    text: str = ""
+    radius: float = 0.0
+
+
+class Style(NamedTuple):
+    """Style of a shape."""
+
+    fill: str = "none"
+    line: str = "none"
+    width: float = 0.0
+    """Of the line, in points."""
+    dash: tuple[float, ...] = ()
+    size: float = 9.0
+    """Of a text, in points."""
+
+
+STYLES: dict[str, Style] = {
+    "soil": Style(fill="#EADFCB"),
+    "wedge": Style(fill="#CBB48A", line="#A68A5B", width=0.8),
+    "first_place": Style(line="#8A8A8A", width=1.0, dash=(4.0, 3.0)),
+    "boulder": Style(fill="#A9ABB0", line="#4B4D52", width=1.4),
+    "centre": Style(fill="#222222"),
+    "weight": Style(size=8.0, line="#4B4D52", width=1.8),
+    "truck": Style(fill="#7FB2D6", line="#2B5B7F", width=1.1),
+    "bed": Style(fill="#D7E6F1", line="#2B5B7F", width=1.1),
+    "window": Style(fill="#EAF3F9", line="#2B5B7F", width=0.8),
+    "wheel": Style(fill="#333333", line="#111111", width=0.8),
+    "bed_edge": Style(line="#CC79A7", width=2.4),
+    "limit": Style(line="#CC79A7", width=1.4, dash=(5.0, 3.0), size=8.0),
+    "soil_force": Style(size=8.0, line="#009E73", width=1.8),
+    "contact_force": Style(size=8.0, line="#D55E00", width=2.6),
+    "scale": Style(line="#222222", width=2.0, size=8.0),
+}
 
 SLICES = 8
 """Soil forces drawn along the buried face."""
@@ -166,3 +217,67 @@ def samples_shown(trajectory: Trajectory, most: int, every_s: float) -> np.ndarr
     duration = float(trajectory.time_s[-1])
     count = min(most, max(2, round(duration / every_s) + 1))
     return np.unique(np.round(np.linspace(0, last, count)).astype(int))
+
+
+CRUSH_ZONE_M = 1.7
+"""Length of the front that is drawn shorter when it is crushed."""
+LEAST_LEFT = 0.25
+"""Fraction of the zone that always remains visible."""
+WHEEL_RADIUS_M = 0.42
+BED_LENGTH_M = 6.0
+
+
+def truck_shapes(trajectory: Trajectory, sample: int) -> list[Shape]:
+    """Return the truck at one sample.
+
+    The damper's crush m_v (v_0 - v)/c_v stays, the spring's comes and goes with the force; together they are how far
+    the front is pushed in. Behind the crush zone everything moves with the vehicle.
+    """
+    design, inputs = trajectory.motion.design, trajectory.inputs
+    x_v = float(trajectory.vehicle_displacement_m[sample])
+    lost = design.v_0 - float(trajectory.vehicle_velocity_m_s[sample])
+    crush = design.m_v / design.c_v * lost + float(trajectory.contact_force_N[sample]) / design.k_v
+    bumper, hood, offset = (inputs[f"{name}_m"] for name in ("bumper_height", "hood_height", "bed_offset"))
+    zone = min(max(CRUSH_ZONE_M, crush / (1.0 - LEAST_LEFT)), offset)
+
+    def at(behind: float, height: float) -> tuple[float, float]:
+        """Location of a point given by its distance behind the undamaged front."""
+        left = min(behind / zone, 1.0)
+        return x_v - behind - min(crush, (1.0 - LEAST_LEFT) * zone) * (1.0 - left), height
+
+    roof = max(hood + 0.85, 2.2)
+    cab_back = max(offset - 0.25, zone)
+    cab = (
+        at(0.0, bumper),
+        at(0.0, hood - 0.25),
+        at(0.15, hood),
+        at(0.38 * cab_back, hood + 0.05),
+        at(0.55 * cab_back, roof),
+        at(cab_back, roof),
+        at(cab_back, bumper),
+    )
+    window = (
+        at(0.44 * cab_back, hood + 0.1),
+        at(0.57 * cab_back, roof - 0.15),
+        at(0.85 * cab_back, roof - 0.15),
+        at(0.85 * cab_back, hood + 0.1),
+    )
+    bed = (
+        at(offset, 1.05),
+        at(offset, 2.3),
+        at(offset + BED_LENGTH_M, 2.3),
+        at(offset + BED_LENGTH_M, 1.05),
+    )
+    frame = (at(cab_back, 0.7), at(cab_back, 1.05), at(offset + BED_LENGTH_M, 1.05), at(offset + BED_LENGTH_M, 0.7))
+    wheels = [
+        Shape("circle", "wheel", (at(behind, WHEEL_RADIUS_M),), radius=WHEEL_RADIUS_M)
+        for behind in (0.36 * cab_back, offset + 3.2)
+    ]
+    return [
+        Shape("polygon", "truck", frame),
+        Shape("polygon", "bed", bed),
+        Shape("polygon", "truck", cab),
+        Shape("polygon", "window", window),
+        Shape("line", "bed_edge", (at(offset, 0.75), at(offset, 2.45))),
+        *wheels,
+    ]

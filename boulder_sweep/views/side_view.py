@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.views import figures
-from boulder_sweep.views.scene import SideView
-from boulder_sweep.views.shapes import STYLES, Shape
+from boulder_sweep.views.scene import STYLES, Shape, SideView
 from boulder_sweep.views.trajectory import require_samples
 from boulder_sweep.views.wording import NOT_A_TEST, verdict_line
 

@@ -15,8 +15,8 @@ from boulder_kernels.soil import spring_force
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.pilot import sampled_designs
-from boulder_sweep.judge.resistance import with_law
 from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.soils import with_law
 
 Soil = Callable[[float, float], float]
 """From the displacement [m] at a depth [m] to the force of the soil per metre of depth [N/m]."""

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from boulder_sweep.columns import RATINGS
-from boulder_sweep.settings.defaults import default_of
+from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
-from boulder_sweep.settings.layers import LAYER_FIELDS, MOST_LAYERS
 from boulder_sweep.settings.leaf import MAX_AXIS
 from boulder_sweep.settings.model import (
     ACCURACIES,
@@ -22,6 +21,7 @@ from boulder_sweep.settings.model import (
     SWITCHES,
     UNLOADINGS,
 )
+from boulder_sweep.settings.starter import default_of
 from boulder_sweep.settings.units import EXPECTED
 
 FILE = Path("docs/sweep.schema.json")

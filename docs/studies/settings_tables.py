@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from boulder_sweep.columns import OUTCOMES, RATINGS
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.settings.defaults import default_of, default_text
 from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS
+from boulder_sweep.settings.starter import default_of, default_text
 from boulder_sweep.settings.units import EXPECTED
 
 DEFAULTS = {

@@ -13,9 +13,9 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import accuracy_of, sampled_designs
-from boulder_sweep.judge.resistance import LAWS
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import RESISTANCES, Ground, Layer
+from boulder_sweep.soils import LAWS
 
 DESIGNS = 4096
 TOP = ("soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3")

@@ -89,7 +89,7 @@ def test_no_threads_are_started_for_linear_algebra():
 
 FREED = """
 import resource, threading
-from boulder_sweep.cli.starting import start_light
+from boulder_sweep.cli.main import start_light
 start_light()
 import numpy as np
 

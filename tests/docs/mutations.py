@@ -21,10 +21,8 @@ _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kern
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
 _STAGES = "boulder_sweep/crash_tests/stiffening_wall.py"
-_RESISTANCE, _LIFT, _UPLIFT = (
-    f"boulder_sweep/{name}.py" for name in ("judge/resistance", "judge/uplift", "impact/uplift")
-)
-_GROUND = "boulder_sweep/judge/ground.py"
+_RESISTANCE, _LIFT, _UPLIFT = (f"boulder_sweep/{name}.py" for name in ("soils", "judge/uplift", "impact/uplift"))
+_GROUND = "boulder_sweep/soils.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
 
 _REMEMBERING, _MEMORY, _UNLOADING = (

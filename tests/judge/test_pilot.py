@@ -9,8 +9,7 @@ import pytest
 
 from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, finer_step_s
 from boulder_sweep.judge.evaluation import control_of
-from boulder_sweep.judge.pilot import accuracy_of, pilot, pilot_size
-from boulder_sweep.judge.sampling import sampled_rows
+from boulder_sweep.judge.pilot import accuracy_of, pilot, pilot_size, sampled_rows
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.store.manifest import load as load_manifest

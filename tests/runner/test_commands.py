@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 
 import boulder_sweep
-from boulder_sweep.runner.commands import repeat_command, resume_command
+from boulder_sweep.runner.running import repeat_command, resume_command
 from tests.runner.grids import grid
 
 RWG = Path(__file__).parents[2] / "configs" / "rwg.yaml"

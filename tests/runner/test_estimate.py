@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner import sweeper
-from boulder_sweep.runner.admission import Admission
+from boulder_sweep.runner.assembly import Admission
 from boulder_sweep.runner.estimate import (
     LARGEST_BLOCK,
     Estimate,

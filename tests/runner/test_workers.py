@@ -13,13 +13,11 @@ import pytest
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.judged import Judged, not_computed
-from boulder_sweep.runner.admission import Admission
-from boulder_sweep.runner.assembly import Assembly
+from boulder_sweep.runner.assembly import Admission, Assembly
 from boulder_sweep.runner.backends import check_backend
 from boulder_sweep.runner.committer import COMMIT_SHARE, GAP_S, Committer
-from boulder_sweep.runner.computing import Computation, EncodedPart
+from boulder_sweep.runner.computing import Computation, Computed, EncodedPart, Ended
 from boulder_sweep.runner.estimate import blocks
-from boulder_sweep.runner.messages import Computed, Ended
 from boulder_sweep.runner.threads import ThreadWorkers
 from boulder_sweep.store.manifest import Manifest, Part, part_name
 from boulder_sweep.store.writer import StagedPart

@@ -19,8 +19,7 @@ from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.views import animation
-from boulder_sweep.views.scene import SLICES, SideView, samples_shown
-from boulder_sweep.views.shapes import STYLES, Shape
+from boulder_sweep.views.scene import SLICES, STYLES, Shape, SideView, samples_shown
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

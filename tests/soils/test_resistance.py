@@ -13,9 +13,9 @@ from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.resistance import LAWS, broms, kp_squared, width_capped, with_law
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import PRESETS, RESISTANCES
+from boulder_sweep.soils import LAWS, broms, kp_squared, width_capped, with_law
 from boulder_sweep.views.wording import LAW_WORDS, design_line
 from tests import oracle
 from tests.answers.designs import site
