@@ -8,7 +8,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.report import write_explorer, write_report
 from boulder_sweep.settings.model import RESISTANCES
-from tests.judge.test_ground import IN_FILE
+from tests.soils.test_ground import IN_FILE
 
 LAYERS, COHESION, WATER, SLOPE = IN_FILE
 SOILS = {
