@@ -17,6 +17,7 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -138,13 +139,14 @@ def _of_code(names: Sequence[str]) -> Counts:
     number = numba.float64
     control = numba.typeof(bk.Control(STEP_S, HORIZON, ROTATION_LIMIT, 0, False))
     simulated = numba.typeof(np.zeros((2, 2))), numba.typeof(bk.corrected()), control
+    nothing = numba.types.none
     lines = numba.types.NamedTuple([number] * len(soil.Kinematics._fields), soil.Kinematics)
     of_design = [numba.int64 if name == "elements" else number for name in bk.Constants._fields]
     constants = numba.types.NamedTuple(of_design, bk.Constants)
     found: dict[str, tuple[Any, tuple[Any, ...]]] = {
         "attempt_steps": (lanes.attempt_steps, (number[::1],)),
         "simulate_lanes": (lanes.simulate_lanes, simulated),
-        "simulate_rows": (table.simulate_rows, simulated),
+        "simulate_rows": (table.simulate_rows, (simulated[0], nothing, nothing, nothing, *simulated[1:])),
         "element_sums": (soil.element_sums, (lines, constants)),
     }
     counts: Counts = {}
@@ -184,9 +186,10 @@ def _of_calls() -> Counts:
     control = bk.Control(STEP_S, HORIZON, ROTATION_LIMIT, 0, False)
     counts: Counts = {}
     with np.errstate(all="ignore"):
-        ways = (("lanes", bk.simulate_table, designs), ("one by one", simulate_rows, np.stack(designs)))
-        for name, simulate, given in ways:
-            tally = _calls_of(simulate, given, bk.corrected(), control)
+        one_by_one = partial(simulate_rows, np.stack(designs), None, None, None)
+        ways = (("lanes", partial(bk.simulate_table, designs)), ("one by one", one_by_one))
+        for name, simulate in ways:
+            tally = _calls_of(simulate, bk.corrected(), control)
             counts |= {f"calls of {called}, {name}": count for called, count in tally.items() if count}
     return counts
 

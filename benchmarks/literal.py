@@ -15,12 +15,18 @@ import numpy as np
 from boulder_kernels import Constants, DesignTable, Readings
 from boulder_kernels.dense_output import Track, displacement_at, slope_at, track
 from boulder_kernels.design import constants_of, design_in
-from boulder_kernels.dynamics import Acceleration, State
-from boulder_kernels.restoring import holding_moment
-from boulder_kernels.soil import soil_kinematics, soil_reaction
-from boulder_kernels.tableau import STAGES, A
-from boulder_kernels.trigonometry import sine_versine
-from boulder_kernels.vehicle import contact_displacement, contact_lever, spring_compression
+from boulder_kernels.dormand_prince import STAGES, A
+from boulder_kernels.dynamics import (
+    Acceleration,
+    State,
+    contact_displacement,
+    contact_lever,
+    holding_moment,
+    spring_compression,
+)
+from boulder_kernels.numerics import sine_versine
+from boulder_kernels.soil import soil_kinematics
+from boulder_kernels.soil_laws import soil_reaction
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 _A = np.array(A)

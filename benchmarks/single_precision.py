@@ -33,18 +33,17 @@ from .timing import machine, timed, versions
 
 PACKAGE = "boulder_kernels_single"
 SOURCES = Path(bk.__file__).parent
-KEPT = ("design", "readings", "stability")
+KEPT = ("design", "stability")
 """Modules that stay in double precision: what is computed once per design."""
 ORDER = (
-    *("readings", "design", "stability", "trigonometry", "roots", "modes", "vehicle", "restoring", "tableau"),
-    *("soil_records", "layered", "memory", "layered_soil", "remembering_soil", "soil"),
-    *("dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "transitions"),
-    *("energy", "settling", "after_step", "second_spring", "unloading", "onset", "workspace", "impact"),
-    *("lane_events", "lane_steps", "lane_starts", "lanes"),
+    *("design", "stability", "numerics", "modes", "soil", "layered", "layered_soil", "plastic"),
+    *("soil_laws", "dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "energy", "settling"),
+    *("after_step", "second_spring", "unloading", "onset", "workspace", "impact"),
+    *("lane_events", "lane_steps", "lanes"),
 )
 CHANGES = {
-    "soil_records": (("TINY = 1e-30", "TINY = 1e-15"),),  # its square must not be zero
     "soil": (
+        ("TINY = 1e-30", "TINY = 1e-15"),  # its square must not be zero
         ("    if c.elements > 0:\n        return element_sums(k, c)\n", ""),
         ("    if c.elements > 0:\n        return summed_potential(A, slope_x, c)\n", ""),
     ),
@@ -99,6 +98,7 @@ def _decorators() -> types.ModuleType:
     module.exact_kernel = decorator({"nsz"})
     module.exact_inlined = decorator({"nsz"}, inline=True)
     module.function_of = _jit.function_of
+    module.unless_none = _jit.unless_none
     module.summing_kernel = decorator({"contract", "nsz", "reassoc"})
     return module
 

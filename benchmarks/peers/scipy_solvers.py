@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 
 from boulder_kernels import Constants, DesignTable
 from boulder_kernels.design import design_at, element_depth
-from boulder_kernels.dynamics import State
-from boulder_kernels.vehicle import contact_displacement, contact_lever, spring_compression
+from boulder_kernels.dynamics import State, contact_displacement, contact_lever, spring_compression
 
 from ..designs import HORIZON, ROTATION_LIMIT
 from ..literal import literal_acceleration, literal_net_moment

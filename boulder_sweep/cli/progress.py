@@ -21,17 +21,18 @@ if TYPE_CHECKING:
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
 COMPILED = {
-    "table": ("lanes.simulate_lanes", 15.0),
-    "design": ("impact.simulate_design", 20.0),
-    "elements-table": ("table.simulate_rows", 20.0),
-    "springs-table": ("table.simulate_rows_on_springs", 20.0),
-    "springs-design": ("impact.simulate_on_springs", 20.0),
-    "layers-table": ("table.simulate_layered_rows", 30.0),
-    "layers-design": ("impact.simulate_layered", 30.0),
-    "memory-table": ("impact.simulate_with_springs", 30.0),
-    "memory-design": ("impact.simulate_with_springs", 30.0),
+    "table": ("lanes.simulate_lanes", None, 15.0),
+    "design": ("impact.simulate", None, 20.0),
+    "elements-table": ("table.simulate_rows", None, 20.0),
+    "springs-table": ("table.simulate_rows", "second_spring.reached", 20.0),
+    "springs-design": ("impact.simulate", "second_spring.reached", 20.0),
+    "layers-table": ("table.simulate_rows", "layered.in_layer", 30.0),
+    "layers-design": ("impact.simulate", "layered.in_layer", 30.0),
+    "plastic-table": ("impact.simulate_motion", "plastic.push", 30.0),
+    "plastic-design": ("impact.simulate_motion", "plastic.push", 30.0),
 }
-"""Kernels for tables, and for one design over time: the function that is compiled last, and seconds where unknown."""
+"""Kernels for tables, and for one design over time: the function that is compiled last, one that is compiled for this
+kind of problem only, and seconds where unknown."""
 
 
 def kernels_for(sweep: Sweep, of: Literal["table", "design"] = "table") -> str:
@@ -39,7 +40,7 @@ def kernels_for(sweep: Sweep, of: Literal["table", "design"] = "table") -> str:
     from boulder_sweep.designs import SECOND_SPRING
 
     if sweep.model.unloading != "elastic":
-        return f"memory-{of}"
+        return f"plastic-{of}"
     if not sweep.model.ground.is_proportional:
         return f"layers-{of}"
     if SECOND_SPRING in sweep.plan.columns:
@@ -59,10 +60,11 @@ def cold_start(kernels: str | None) -> str | None:
         return None
     from boulder_kernels._jit import CACHE_FOLDER, INSIDE
 
-    function, seconds = COMPILED[kernels]
+    function, special, seconds = COMPILED[kernels]
     if CACHE_FOLDER is not None:
-        found = (path.relative_to(CACHE_FOLDER) for path in Path(CACHE_FOLDER).rglob(f"{function}-*.nbc"))
-        if any(INSIDE not in path.parts for path in found):
+        entries = (path.relative_to(CACHE_FOLDER) for path in Path(CACHE_FOLDER).rglob(f"{function}-*.nbc"))
+        compiled = any(INSIDE not in path.parts for path in entries)
+        if compiled and (special is None or any(Path(CACHE_FOLDER).rglob(f"{special}-*.nbc"))):
             return None
         with suppress(OSError, ValueError):  # no earlier compilation on this machine
             seconds = float(_remembered(kernels).read_text())

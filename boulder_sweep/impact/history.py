@@ -11,7 +11,6 @@ from boulder_kernels import Constants, Design, Readings, Record, SecondSpring
 from boulder_kernels.dynamics import Acceleration, State, acceleration
 from boulder_kernels.energy import stored_energies
 from boulder_kernels.layered import SoilLayers
-from boulder_kernels.memory import RememberingConstants, at_sample
 from boulder_kernels.modes import (
     FREE,
     HELD,
@@ -24,6 +23,7 @@ from boulder_kernels.modes import (
     Switches,
     switches_of,
 )
+from boulder_kernels.plastic import PlasticConstants, at_sample
 from boulder_kernels.second_spring import on_second_spring, spent_energy
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
 from boulder_kernels.unloading import plastic_work
@@ -274,7 +274,7 @@ def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarra
         elements = len(soil.ratio)
         at = np.minimum((ratio * elements).astype(int), elements - 1)
         spring, ultimate, drag = (elements * values[at] for values in (soil.stiffness, soil.ultimate, soil.drag))
-        if isinstance(c, RememberingConstants):
+        if isinstance(c, PlasticConstants):
             front, back = c.memory.front[at], c.memory.back[at]
     ahead = np.clip(spring * (displacement - front), 0.0, ultimate)
     behind = np.clip(spring * (back - displacement), 0.0, ultimate)

@@ -11,21 +11,17 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import (
-    ELASTIC,
     Control,
     DesignTable,
     Outcome,
     OutcomeTable,
     Readings,
     Record,
-    SecondSpring,
     no_record,
 )
 from boulder_kernels.design import design_at
-from boulder_kernels.layered import LayeredTable, constants_at
 from boulder_kernels.outcomes import empty_outcomes, write_outcome
-from boulder_kernels.plastic import simulate_plastic
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors, simulate_row
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors, problem_at, simulate_impact
 from boulder_sweep.columns import AT_REST, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
@@ -122,29 +118,19 @@ def simulate(
     control = _control(evaluation.control, decided)
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
-    second = None if designs.springs is None else SecondSpring(*(float(column[0]) for column in designs.springs))
-    outcome, c = _simulated(designs.table, how, control, record, second)
+    problem = problem_at(designs.table, 0, control, designs.springs, len(record.times))
+    outcome, c, *_ = simulate_impact(problem, how, control, record)
     row = _outcome_row(outcome)
     if control.error_estimate:
-        coarser, _ = _simulated(designs.table, how, control._replace(refined=False), no_record(), second)
+        coarse_control = control._replace(refined=False)
+        alike = problem_at(designs.table, 0, coarse_control, designs.springs)
+        coarser = simulate_impact(alike, how, coarse_control, no_record()).outcome
         _estimate(row, _outcome_row(coarser), plain(designs.table), how)
     judged = judge(row, designs, evaluation.limits, reported_step_s(control))
     if judged.verdict[0] != ERROR:
         judged = _as_decided(judged, decided)
-    motion = Motion(one, how, c, control, _kept(record, times, outcome), outcome, second)
+    motion = Motion(one, how, c, control, _kept(record, times, outcome), outcome, problem.second)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
-
-
-def _simulated(
-    table: DesignTable, readings: Readings, control: Control, record: Record, second: SecondSpring | None
-) -> tuple[Outcome, Any]:
-    """Simulate one design; return also the constants of its motion, with what its soil remembered at each sample."""
-    if control.unloading != ELASTIC:
-        layers = table.layers[0] if isinstance(table, LayeredTable) else None
-        found = simulate_plastic(design_at(table, 0), readings, control, record, second, layers)
-        return found.outcome, found.constants
-    outcome = simulate_row(table, 0, readings, control, record, second)
-    return outcome, constants_at(table, 0, readings, control.elements)
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:

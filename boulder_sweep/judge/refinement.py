@@ -16,8 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from boulder_kernels import Control, OutcomeTable, Status
-from boulder_kernels.memory import ELASTIC
+from boulder_kernels import ELASTIC, Control, OutcomeTable, Status
 from boulder_sweep.columns import REASONS
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, finer_step_s
 from boulder_sweep.judge.judged import NUMERICAL_ERROR, OVERTURNS, PASS, Judged

@@ -19,23 +19,22 @@ from boulder_kernels import (
     Control,
     Design,
     DesignTable,
-    Outcome,
     OutcomeTable,
+    Problem,
     Readings,
     Record,
     SecondSpring,
-    Status,
-    constants_of,
+    simulate,
 )
 from boulder_kernels._jit import array_kernel, inlined
-from boulder_kernels.design import constants_with, design_in
+from boulder_kernels.design import design_in
 from boulder_kernels.dynamics import State, acceleration
 from boulder_kernels.energy import stored_energies
-from boulder_kernels.impact import failed, simulate_on_springs, simulate_with_springs
-from boulder_kernels.layered import SoilLayers, bounds_of_layers, fill_layers, layered
+from boulder_kernels.layered import SoilLayers
 from boulder_kernels.modes import Modes, switches_of
 from boulder_kernels.outcomes import write_outcome
 from boulder_kernels.second_spring import on_second_spring, spent_energy
+from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
@@ -93,37 +92,6 @@ def layers_from(t: np.ndarray) -> SoilLayers:
     return SoilLayers(t[0], t[1], t[2], t[3], t[4])
 
 
-@inlined
-def constants_inside(design: Design, layers: np.ndarray, soil: Any, readings: Readings) -> Any:
-    """Return the constants of a design in layers of soil: `boulder_kernels.layered.constants_in`.
-
-    Not that function, since it returns them in memory, and they hold addresses.
-    """
-    mass, b = fill_layers(design, layers, soil), bounds_of_layers(soil)
-    return layered(constants_with(design, readings, b.elements, mass, b.K_soil, b.R_soil, b.x_yield), soil)
-
-
-@inlined
-def simulate_inside(
-    design: Design,
-    second: SecondSpring,
-    layers: np.ndarray,
-    soil: SoilLayers,
-    readings: Readings,
-    control: Control,
-    record: Record,
-) -> Outcome:
-    """Simulate one impact in layers of soil, or in a uniform soil where there are none."""
-    if len(layers) == 0:
-        outcome = simulate_on_springs(design, readings, control, record, second)
-    elif design.H - design.d <= design.e_bumper:
-        outcome = failed(Status.NO_CONTACT.value)
-    else:
-        c = constants_inside(design, layers, soil, readings)
-        outcome = simulate_with_springs(c, readings, control, record, second)
-    return outcome
-
-
 @array_kernel
 def outcomes(
     designs_at: Any, n: int, layers_at: Any, m: int, soil_at: Any, settings_at: Any, fine_at: Any, coarse_at: Any
@@ -161,8 +129,12 @@ def outcomes(
         for solution in range(2 if estimated else 1):
             refined = estimated and solution == 0
             control = control_from(s, refined)
-            found = simulate_inside(design, second, layers[row], soil, readings, control, record)
-            write_outcome(coarser if solution else finer, row, found)
+            if m == 0:
+                outcome = simulate(Problem(design, None, second), readings, control, record)
+            else:
+                profile = SoilProfile(layers[row], soil, None)
+                outcome = simulate(Problem(design, profile, second), readings, control, record)
+            write_outcome(coarser if solution else finer, row, outcome)
     if not estimated:
         return
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
@@ -279,10 +251,13 @@ def history(
     out[:] = np.nan
     record.states[:] = np.nan
     layers, soil = carray(layers_at, (1, m, 6))[0], layers_from(carray(soil_at, (5, m)))
-    simulate_inside(design, second, layers, soil, readings, control, record)
     centre = carray(centre_at, (2,))
     if m == 0:
-        write_history(constants_of(design, readings, control.elements), design, second, readings, record, out, centre)
+        simulate(Problem(design, None, second), readings, control, record)
+        uniform = constants_in(design, readings, control.elements, None)
+        write_history(uniform, design, second, readings, record, out, centre)
     else:
-        c = constants_inside(design, layers, soil, readings)
+        profile = SoilProfile(layers, soil, None)
+        simulate(Problem(design, profile, second), readings, control, record)
+        c = constants_in(design, readings, control.elements, profile)
         write_history(c, design, second, readings, record, out, centre)

@@ -6,11 +6,10 @@ subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, 
 """
 
 from ._jit import source_hash
-from .design import Constants, Design, DesignTable, constants_of
-from .impact import Control, Record, no_record, simulate_design
-from .memory import ELASTIC, PLASTIC, PLASTIC_WITH_GAP
+from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected
+from .impact import Control, Problem, Record, no_record, simulate, simulate_design
 from .outcomes import SIMULATED, Maxima, Outcome, OutcomesAtRest, OutcomeTable, Status
-from .readings import Readings, as_printed, corrected
+from .plastic import ELASTIC, PLASTIC, PLASTIC_WITH_GAP
 from .second_spring import SecondSpring, SecondSprings
 from .table import simulate_table
 
@@ -27,6 +26,7 @@ __all__ = [
     "Outcome",
     "OutcomeTable",
     "OutcomesAtRest",
+    "Problem",
     "Readings",
     "Record",
     "SecondSpring",
@@ -36,6 +36,7 @@ __all__ = [
     "constants_of",
     "corrected",
     "no_record",
+    "simulate",
     "simulate_design",
     "simulate_table",
     "source_hash",

@@ -38,9 +38,74 @@ from typing import Any
 import llvmlite.binding
 import numba
 from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.runtime._nrt_python import c_helpers
+from numba.extending import overload
 
-from ._compiler import InsideCompiler, KernelCompiler
+NEEDLESS = {
+    "WithLifting",
+    "InlineClosureLikes",
+    "RewriteDynamicRaises",
+    "MakeFunctionToJitFunction",
+    "InlineInlinables",
+    "FindLiterallyCalls",
+    "LiteralUnroll",
+    "LiteralPropagationSubPipelinePass",
+    "NopythonRewrites",
+    "NoPythonSupportedFeatureValidation",
+    "AnnotateTypes",
+    "DumpParforDiagnostics",
+}
+"""Steps of Numba's compiler that kernels do without, by name."""
+REPEATED = "DeadBranchPrune"
+"""A step that Numba takes three times; the last one finds everything that the others do."""
+ENVIRONMENT = "_ZN08NumbaEnv"
+"""What the names begin with of the variables by which compiled functions find Python's objects."""
+
+
+class KernelCompiler(Compiler):
+    """Numba's compiler without the steps that kernels do not need."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the steps, as Numba asks for them."""
+        (steps,) = super().define_pipelines()
+        kept = [(step, reason) for step, reason in steps.passes if step.__name__ not in NEEDLESS]
+        repeated = [place for place, (step, _) in enumerate(kept) if step.__name__ == REPEATED]
+        steps.passes = [entry for place, entry in enumerate(kept) if place not in repeated[:-1]]
+        steps.finalize()
+        return [steps]
+
+
+class InsideCompiler(KernelCompiler):
+    """The same for kernels that other kernels call."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the steps, and let the result be kept without machine code."""
+        state = self.state
+        state.library = _Taken(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().define_pipelines()
+
+
+class _Taken(JITCodeLibrary):
+    """Optimised code that is taken into that of others.
+
+    In place of its machine code there are only the variables that Numba sets wherever it has compiled a function or
+    loaded it from the disk.
+    """
+
+    def _finalize_final_module(self) -> None:
+        code = self._final_module
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        variables = [str(known) for known in code.global_variables if known.name.startswith(ENVIRONMENT)]
+        head = str(self._codegen._create_empty_module(self.name))
+        self._final_module = llvmlite.binding.parse_assembly("\n".join([head, *variables]))
+        self._final_module.name = code.name
+        super()._finalize_final_module()
+        self._final_module = code
+
 
 SETTINGS: Any = numba.config
 """Numba's settings, which it fills in at run time."""
@@ -307,3 +372,36 @@ def function_of(source: str, **names: Any) -> Callable[..., Any]:
     """Return the function that a source text defines, with the names it refers to: for what `overload` writes out."""
     exec(source, names)
     return names[source[len("def ") : source.index("(")]]
+
+
+def unless_none(names: str, function: Callable[..., Any], otherwise: str, **known: Any) -> Callable[..., Any]:
+    """Return a function that calls another unless its last argument is None; inside kernels chosen when compiled.
+
+    What is not needed is not compiled, and the two may give results of different types: an ``if`` in a kernel allows
+    neither.
+
+    Parameters
+    ----------
+    names
+        Names of the arguments, separated by blanks.
+    function
+        Called with them.
+    otherwise
+        Expression of them for None.
+    known
+        What else it refers to, by name.
+    """
+    arguments = ", ".join(names.split())
+    when_none = function_of(f"def when_none({arguments}):\n return {otherwise}", **known)
+    unless = function_of(f"def unless({arguments}):\n return function({arguments})", function=function)
+
+    def call(*given: Any) -> Any:
+        """Call the one for these arguments."""
+        return (when_none if given[-1] is None else function)(*given)
+
+    def choose(*given: Any) -> Callable[..., Any]:
+        """Return the one for arguments of these Numba types."""
+        return when_none if isinstance(given[-1], numba.types.NoneType) else unless
+
+    overload(call, inline="always", strict=False)(choose)
+    return call

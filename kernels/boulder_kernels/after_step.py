@@ -11,18 +11,15 @@ import numpy as np
 
 from ._jit import inlined, kernel
 from .dense_output import DenseOutput, state_at
-from .design import Constants
-from .dynamics import Acceleration, State, acceleration
+from .design import Constants, Readings
+from .dynamics import Acceleration, State, acceleration, signed_arm
 from .events import begin_search, first_event, gaps_within, go_on_searching, least_gap, tolerance_of, weights_of
 from .gaps import LIMIT, GapFactors, gap_factors, gaps_at, gaps_of
 from .modes import Modes, Switches, switches_of
+from .numerics import ITERATIONS, sine_versine
 from .outcomes import Compression, Maxima, Status, compression_of, grown, highest, updated_maxima
-from .readings import Readings
-from .restoring import signed_arm
-from .roots import ITERATIONS
 from .settling import barrier_energy, boulder_energy, inside_maxima, stays_below
 from .soil import soil_kinematics
-from .trigonometry import sine_versine
 
 RUNNING = -1
 """Status of a simulation that has not ended."""

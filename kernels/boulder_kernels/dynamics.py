@@ -1,4 +1,17 @@
-"""The state of an impact and its rate (Eqs 10, 11, 52)."""
+"""The state of an impact and its rate (Eqs 10, 11, 52), with the forces of the truck and of the weight.
+
+**The truck** is a Maxwell element, a spring and a damper in series (Eqs 17, 18, 40-48). Eq 45,
+x_v''' + (k_v/c_v) x_v'' + (k_v/m_v) x_v' = (k_v/m_v) x_c' with x_c the contact point on the boulder, is an exact
+derivative. Integrated once from the state at impact (x_v = x_c = x_v'' = 0, x_v' = v_0) it reads
+
+    m_v x_v'' = -F_v,   F_v = k_v u,   u = x_v - x_c - (m_v/c_v) (v_0 - x_v')        (Eqs 17, 18, 41, 46)
+
+where u is the compression of the spring and the last term the crush of the damper, which takes up the momentum
+the truck has lost. So the acceleration of the truck is not a state of its own, the crush is permanent by
+itself, and after a separation contact resumes from zero force exactly when u returns to zero.
+
+**The weight** gives the restoring moment of Eqs 37-39, or the couple that stands in its place.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +20,65 @@ from typing import NamedTuple
 from ._jit import inlined
 from .design import Constants
 from .modes import Switches
-from .restoring import couple_moment
-from .soil import soil_kinematics, soil_reaction
-from .trigonometry import sine_versine
-from .vehicle import contact_displacement, contact_lever, spring_compression
+from .numerics import sine_versine
+from .soil import soil_kinematics
+from .soil_laws import soil_reaction
+
+
+@inlined
+def contact_lever(sin: float, versin: float, c: Constants) -> float:
+    """Lever of the contact force about the centre of mass, R_v cos(gamma_v + theta) [m] (Eqs 5, 6, 48).
+
+    In Cartesian form h cos(theta) + g_x sin(theta), right in every quadrant. Printed, the struck face lies on the
+    right of the centre of mass (g_x = -c_x); truly it is the left face (g_x = c_x).
+    """
+    return c.h - c.h * versin + c.g_x * sin
+
+
+@inlined
+def contact_displacement(x_b: float, sin: float, versin: float, c: Constants) -> float:
+    """Displacement x_c of the contact point on the boulder [m]: x_b plus the integral of the lever over theta."""
+    return x_b + c.h * sin + c.g_x * versin
+
+
+@inlined
+def spring_compression(x_v: float, v_v: float, x_c: float, c: Constants) -> float:
+    """Compression u of the vehicle's spring [m]; below zero the truck has come off (Eq 45, integrated).
+
+    On a second spring it is counted from where that exerts no force, u - u_0 (Eq 111).
+    """
+    return x_v - x_c - c.tau_v * (c.v_0 - v_v) - c.u_0
+
+
+@inlined
+def couple_moment(sin: float, versin: float, switches: Switches, c: Constants) -> float:
+    """Moment of the couple of the weight in the present mode, b (C_cos cos + w sin) [N m].
+
+    Corrected reading: m_b g (L/2 cos(theta) - H/2 sin|theta|) towards theta = 0, the weight at the boulder's own
+    centre against the corner it turns about; it vanishes at the classical tipping angle, tan(theta) = L/H.
+    Printed reading: the limit m_b g R_N |cos(gamma_N + theta)| of Eq 37.
+    """
+    return switches.couple * (c.C_cos - c.C_cos * versin + switches.couple_sin * sin)
+
+
+@inlined
+def signed_arm(sin: float, versin: float, c: Constants) -> float:
+    """Printed reading: m_b g (d_N cos(theta) + l_n sin(theta)), the moment of Eq 37 before its modulus [N m]."""
+    return c.C_cos - c.C_cos * versin + c.C_sin * sin
+
+
+@inlined
+def holding_moment(sin: float, versin: float, c: Constants) -> float:
+    """Largest moment that the restoring moment can balance [N m] (Eq 37; seated: m_b g L/2).
+
+    Printed, m_b g R_N |cos(gamma_N + theta)| = m_b g |d_N cos(theta) + l_n sin(theta)|. Corrected, it is asked for
+    only at theta = 0.
+    """
+    return abs(signed_arm(sin, versin, c))
 
 
 class State(NamedTuple):
-    """State of the motion; the acceleration of the truck follows from it (see `boulder_kernels.vehicle`)."""
+    """State of the motion; the acceleration of the truck follows from it (see `boulder_kernels.dynamics`)."""
 
     x_b: float
     """Displacement of the common centre of mass of boulder and soil [m]."""

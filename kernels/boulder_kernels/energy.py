@@ -12,12 +12,11 @@ from typing import NamedTuple
 from ._jit import kernel
 from .dense_output import DenseOutput, state_at
 from .design import Constants
-from .dynamics import State, acceleration
+from .dynamics import State, acceleration, contact_displacement, contact_lever, couple_moment, spring_compression
 from .modes import Modes, Switches
-from .restoring import couple_moment
-from .soil import drag_power, soil_energy, soil_kinematics
-from .trigonometry import sine_versine
-from .vehicle import contact_displacement, contact_lever, spring_compression
+from .numerics import sine_versine
+from .soil import soil_kinematics
+from .soil_laws import drag_power, soil_energy
 
 GAUSS_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 GAUSS_WEIGHTS = (0.17392742256872692, 0.32607257743127305, 0.32607257743127305, 0.17392742256872692)

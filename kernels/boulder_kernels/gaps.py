@@ -11,12 +11,10 @@ from typing import NamedTuple
 
 from ._jit import inlined
 from .design import Constants
-from .dynamics import State
+from .dynamics import State, contact_displacement, signed_arm, spring_compression
 from .modes import FREE, HELD, LIMITED_FORWARD, SEATED, TURNING_BACK, TURNING_FORWARD, Modes
-from .restoring import signed_arm
+from .numerics import sine_versine
 from .soil import soil_kinematics
-from .trigonometry import sine_versine
-from .vehicle import contact_displacement, spring_compression
 
 CONTACT = 0
 """Truck and boulder separate, or touch again."""

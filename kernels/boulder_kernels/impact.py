@@ -25,16 +25,14 @@ from .after_step import (
     rate_of,
 )
 from .dense_output import DenseOutput, dense_output, state_at
-from .design import Constants, Design, constants_of, is_computable
+from .design import Constants, Design, Readings, is_computable
 from .dormand_prince import step
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import NONE, SHORTEN, locate_limit
-from .layered import constants_in
-from .memory import ELASTIC
+from .events import NONE, SHORTEN, change_mode, initial_modes, locate_limit
 from .modes import Modes, Switches
 from .onset import first_length
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
-from .readings import Readings
+from .plastic import ELASTIC, memory_of
 from .second_spring import (
     STIFFENS,
     SecondSpring,
@@ -47,8 +45,8 @@ from .second_spring import (
     stiffest,
 )
 from .settling import NO_PROOF, boulder_energy, proof_is_possible
+from .soil_laws import constants_in
 from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
-from .transitions import change_mode, initial_modes
 from .unloading import forget, note, rate_after, remember, until_rest
 
 FULL_TURN = math.pi
@@ -90,7 +88,7 @@ class Control(NamedTuple):
     """Whether a design that needs more steps than are allowed is simulated all the same, see
     `boulder_kernels.last_resort`."""
     unloading: int = ELASTIC
-    """How the soil unloads: ELASTIC, or PLASTIC or PLASTIC_WITH_GAP by elements that remember, of which there must be
+    """How the soil unloads: ELASTIC, or PLASTIC or PLASTIC_WITH_GAP by plastic elements, of which there must be
     some. Their simulations go on until the boulder is at rest, and are not ended by a proof before the horizon."""
 
 
@@ -145,7 +143,7 @@ def write_samples(
         states = record.states[written]
         states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
         states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
-        note(written, c)
+        note(written, memory_of(c))
         record.turning[written] = modes.turning
         record.touching[written] = modes.touching
         so_far = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
@@ -194,14 +192,31 @@ def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
     return Ending(control.theta_limit, control.horizon, longest, stopping, proof_is_possible(readings))
 
 
+class Problem(NamedTuple):
+    """One impact to be simulated."""
+
+    design: Design
+    """The design, SI."""
+    profile: Any
+    """`SoilProfile` of its soil; None for the uniform elastic soil of the design."""
+    second: Any
+    """`SecondSpring` of its vehicle; None for a vehicle without."""
+
+
 @kernel
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
+    """Simulate one impact of a vehicle with one spring in a uniform elastic soil; see `simulate`."""
+    return simulate(Problem(design, None, None), readings, control, record)
+
+
+@kernel
+def simulate(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact with a fixed time step, each step cut where a mode changes.
 
     Parameters
     ----------
-    design
-        The design, SI.
+    problem
+        Design, soil and vehicle. Kernels are compiled for each kind of soil and vehicle.
     readings
         Which formulas are read as printed.
     control
@@ -221,46 +236,23 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
     adds to the solution, so the order of the method is kept. A motion that became non-finite is retried with a
     shorter step.
     """
-    return simulate_on_springs(design, readings, control, record, None)
-
-
-@kernel
-def simulate_on_springs(
-    design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None
-) -> Outcome:
-    """Simulate one impact as `simulate_design`, of a vehicle that may have a second spring."""
-    if design.H - design.d <= design.e_bumper:
+    if misses(problem.design):
         return failed(Status.NO_CONTACT.value)
-    return simulate_with_springs(constants_of(design, readings, control.elements), readings, control, record, second)
+    c = constants_in(problem.design, readings, control.elements, problem.profile)
+    return simulate_motion(c, readings, control, record, problem.second)
+
+
+@inlined
+def misses(design: Design) -> bool:
+    """Whether the truck passes over the boulder."""
+    return design.H - design.d <= design.e_bumper
 
 
 @kernel
-def simulate_layered(
-    design: Design,
-    layers: np.ndarray,
-    soil: Any,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    second: SecondSpring | None,
-) -> Outcome:
-    """Simulate one impact in a soil of layers; see `simulate_on_springs` and `boulder_kernels.layered.constants_in`."""
-    if design.H - design.d <= design.e_bumper:
-        return failed(Status.NO_CONTACT.value)
-    return simulate_with_springs(constants_in(design, layers, soil, readings), readings, control, record, second)
-
-
-@kernel
-def simulate_with(c: Constants, readings: Readings, control: Control, record: Record) -> Outcome:
-    """Simulate one impact of known constants; see `simulate_design`, which also asks whether the truck hits at all."""
-    return simulate_with_springs(c, readings, control, record, None)
-
-
-@kernel
-def simulate_with_springs(
+def simulate_motion(
     c: Constants, readings: Readings, control: Control, record: Record, second: SecondSpring | None
 ) -> Outcome:
-    """Simulate one impact as `simulate_with`, of a vehicle that may have a second spring."""
+    """Simulate one impact of known constants; see `simulate`, which also asks whether the truck hits at all."""
     if not is_computable(c) or not is_second_spring(c, second):
         return failed(Status.INVALID.value)
     theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
@@ -285,11 +277,12 @@ def simulate_by_steps(
     record: Record,
     second: SecondSpring | None,
 ) -> Outcome:
-    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate_design`.
+    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate`.
 
     A step in which the crush reaches a second spring is cut there, as at an event.
     """
-    forget(c)
+    memory = memory_of(c)
+    forget(memory)
     ending = ending_of(control, readings, h_apart)
     budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
     h_full = h_touching
@@ -333,7 +326,7 @@ def simulate_by_steps(
                     kept = kept_up_to(float(STIFFENS), tau, t, y_end, start, m, dense, switches, c)
                 provable_kept = provable_so_far(kept, c.k_v, second.k_2)
             decided = decide(t, h, y, provable_kept, barrier, horizon, ending, c)
-            decided = until_rest(decided, kept.y, ending, c)
+            decided = until_rest(decided, kept.y, ending, c, memory)
             end = compression_at(kept.y, switches, c)
         h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
         if recording or not control.stop_at_limit:
@@ -345,14 +338,14 @@ def simulate_by_steps(
             if recording:
                 written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
                 exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
-        remember(y, kept.y, kept.tau * h, c)
+        remember(y, kept.y, kept.tau * h, c, memory)
         t = decided.t
         if decided.status != RUNNING:
             if decided.status == Status.LIMIT.value:
                 m = at_limit(m, t, theta_stop)
                 t_limit = t if control.stop_at_limit else t_limit
             return Outcome(decided.status, m, t_limit, t, attempts)
-        y, k1, start = kept.y, rate_after(k_end, kept.y, switches, c), end
+        y, k1, start = kept.y, rate_after(k_end, kept.y, switches, c, memory), end
         if kept.event > NONE:
             if second is not None and kept.event == STIFFENS:
                 c = on_second_spring(c, second.k_2, offset_of(start.u, c.k_v, second.k_2))

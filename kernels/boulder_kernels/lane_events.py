@@ -12,10 +12,12 @@ import numpy as np
 from ._jit import inlined, kernel
 from .after_step import RUNNING, Ending, Kept, at_limit, decide, enter_modes, is_finite, kept_up_to, rate_of
 from .dense_output import DenseOutput, dense_output
+from .design import Readings
 from .events import (
     NONE,
     SHORTEN,
     begin_search,
+    change_mode,
     first_event,
     gaps_within,
     go_on_searching,
@@ -24,10 +26,8 @@ from .events import (
     weights_of,
 )
 from .gaps import gaps_at
+from .numerics import ITERATIONS
 from .outcomes import Status, compression_at
-from .readings import Readings
-from .roots import ITERATIONS
-from .transitions import change_mode
 from .workspace import (
     ATTEMPTS_LEFT,
     BARRIER,

@@ -8,30 +8,41 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._jit import kernel
-from .after_step import passed_maxima, passes
+from ._jit import inlined, kernel
+from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
+from .design import Readings, constants_of, design_in, is_computable
 from .dormand_prince import step
+from .events import AT_END, TOLERANCE, initial_modes, needs_moment
+from .impact import Control, attempt_budget, ending_of, first_step
+from .modes import TURNING_FORWARD, Modes
+from .onset import first_length
 from .outcomes import (
     STATUS,
     Outcome,
     Status,
+    compression_at,
+    no_maxima,
     write_outcome,
 )
-from .settling import boulder_energy
+from .settling import NO_PROOF, boulder_energy
+from .stability import ACCEPTED
 from .workspace import (
     ATTEMPTS_LEFT,
     ATTENTION,
     BARRIER,
     COMPRESSION,
     CONSTANTS,
+    DESIGN,
     END,
     END_STATE,
     FACTORS,
     HORIZON,
     LANES,
     MAXIMA,
+    MODES,
     START,
     STATE,
+    STATUS_OF_LANE,
     STEP,
     STEP_FULL,
     SWITCHES,
@@ -100,3 +111,103 @@ def write_lane(ws: np.ndarray, lane: int, status: int, out: np.ndarray, row: int
     else:
         t_limit = t if status == Status.LIMIT.value else np.nan
         write_outcome(out, row, Outcome(status, load(mine, MAXIMA, 0), t_limit, t, 0))
+
+
+@kernel
+def compute_constants(
+    ws: np.ndarray, designs: np.ndarray, first: int, readings: Readings, control: Control, longest: float
+) -> None:
+    """Work out constants and steps of designs, and whether they can be simulated; arguments: see `start_designs`."""
+    align_stack()
+    # Loads from another array would keep the loop from being vectorised.
+    for lane in range(LANES):
+        store(ws, DESIGN, lane, design_in(designs, first + lane))
+    for lane in range(LANES):
+        design = load(ws, DESIGN, lane)
+        c = constants_of(design, readings, 0)
+        h_full, status = first_step(control, control.theta_limit, c)
+        status = RUNNING if status == ACCEPTED else status
+        status = status if is_computable(c) else Status.INVALID.value
+        status = Status.NO_CONTACT.value if design.H - design.d <= design.e_bumper else status
+        store(ws, CONSTANTS, lane, c)
+        put(ws, STEP_FULL, lane, min(h_full, longest))
+        put(ws, STATUS_OF_LANE, lane, float(status))
+
+
+@kernel
+def stand_still(ws: np.ndarray, readings: Readings, control: Control) -> None:
+    """Put every lane at the instant of impact."""
+    align_stack()
+    for lane in range(LANES):
+        c, h_full = load(ws, CONSTANTS, lane), field(ws, STEP_FULL, lane)
+        y, modes = initial_state(c), initial_modes(readings, c)
+        switches, factors = enter_modes(modes, readings, control.theta_limit, control.locate_yield, c)
+        store(ws, MODES, lane, modes)
+        store(ws, SWITCHES, lane, switches)
+        store(ws, FACTORS, lane, factors)
+        store(ws, STATE, lane, y)
+        store(ws, START, lane, rate_of(y, switches, c))
+        store(ws, COMPRESSION, lane, compression_at(y, switches, c))
+        store(ws, MAXIMA, lane, no_maxima())
+        put(ws, TIME, lane, 0.0)
+        put(ws, STEP, lane, min(first_length(h_full, factors, c), control.horizon))
+        put(ws, ATTEMPTS_LEFT, lane, attempt_budget(h_full, ending_of(control, readings, h_full).longest))
+        put(ws, BARRIER, lane, NO_PROOF)
+        put(ws, HORIZON, lane, control.horizon)
+
+
+@kernel
+def take_over_first_steps(ws: np.ndarray, readings: Readings, control: Control) -> None:
+    """Accept the steps that meet no event but that the boulder begins to turn at their end; leave the others undone."""
+    align_stack()
+    for lane in range(LANES):
+        c, s, g = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane), load(ws, FACTORS, lane)
+        y, y_end, k_end = load(ws, STATE, lane), load(ws, END_STATE, lane), load(ws, END, lane)
+        start, h = load(ws, COMPRESSION, lane), field(ws, STEP, lane)
+        beyond = AT_END * TOLERANCE * c.C_cos if needs_moment(g) & (k_end.M > 0.0) else 0.0
+        passing, end = passes(y, y_end, k_end, g, s, c, beyond)
+        turning = Modes(TURNING_FORWARD, True, 1.0, 1.0, 0, 0)
+        following, factors = enter_modes(turning, readings, control.theta_limit, control.locate_yield, c)
+        m = passed_maxima(load(ws, MAXIMA, lane), 0.0, h, y, y_end, start, end, s)
+        fresh = rate_of(y_end, following, c)
+        if passing & (h < control.horizon) & (y_end.v_v > 0.0):
+            put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
+            store(ws, STATE, lane, y_end)
+            store(ws, COMPRESSION, lane, end)
+            store(ws, MAXIMA, lane, m)
+            put(ws, TIME, lane, h)
+            put(ws, STEP, lane, min(field(ws, STEP_FULL, lane), control.horizon - h))
+            if needs_moment(g) & (c.C_cos < k_end.M):
+                store(ws, MODES, lane, turning)
+                store(ws, SWITCHES, lane, following)
+                store(ws, FACTORS, lane, factors)
+                store(ws, START, lane, fresh)
+            else:
+                store(ws, START, lane, k_end)
+
+
+@inlined
+def start_designs(
+    ws: np.ndarray, designs: np.ndarray, first: int, readings: Readings, control: Control, longest: float
+) -> None:
+    """Put as many designs as there are lanes into a group.
+
+    Parameters
+    ----------
+    ws
+        The workspace, from the group on.
+    designs, first
+        Designs as of `simulate_lanes`, at least as many as lanes, and the row of that in the first lane.
+    readings, control
+        As of `simulate_lanes`.
+    longest
+        Longest step that has not failed yet [s]; the one asked for at first.
+
+    Notes
+    -----
+    A lane is left with the status RUNNING, or with that of a design that needs no integration or allows none.
+    """
+    compute_constants(ws, designs, first, readings, control, longest)
+    stand_still(ws, readings, control)
+    attempt_steps(ws)
+    take_over_first_steps(ws, readings, control)

@@ -4,7 +4,7 @@ All groups of lanes are stepped in turn (`boulder_kernels.lane_steps`). A lane w
 hands its design over to a group of events and goes on with another at once: one that returns from there, else the next
 of the table, so that no lane waits. A group of events is worked out when it is full (`boulder_kernels.lane_events`);
 there are two, because designs return from one while the other is being filled. The next of the table are started side
-by side, too (`boulder_kernels.lane_starts`). What a lane computes does not depend on the others, only when and where it
+by side, too (`boulder_kernels.lane_steps`). What a lane computes does not depend on the others, only when and where it
 does so.
 """
 
@@ -16,12 +16,11 @@ import numpy as np
 
 from ._jit import array_kernel, inlined, kernel
 from .after_step import RUNNING
+from .design import Readings
 from .impact import Control, ending_of
 from .lane_events import conclude, start_steps, work_out
-from .lane_starts import start_designs
-from .lane_steps import attempt_steps, take_over_steps, write_lane
+from .lane_steps import attempt_steps, start_designs, take_over_steps, write_lane
 from .outcomes import STATUS, Status, empty_outcomes
-from .readings import Readings
 from .stability import MOST_STEPS, RETRY
 from .workspace import (
     ATTENTION,

@@ -14,20 +14,21 @@ Three things make such designs affordable.
 from __future__ import annotations
 
 from ._jit import kernel
-from .design import Constants, Design, constants_of, is_computable
+from .design import Constants, Readings, constants_of, is_computable
 from .impact import (
     STEP_RATIO,
     Control,
     Outcome,
+    Problem,
     Record,
     failed,
     first_step,
+    misses,
+    simulate,
     simulate_by_steps,
-    simulate_on_springs,
 )
 from .outcomes import Status
-from .readings import Readings
-from .second_spring import SecondSpring, is_second_spring, stiffest, times, with_spring
+from .second_spring import is_second_spring, stiffest, times, with_spring
 from .stability import ACCEPTED, Rates, rates_of, stable_step
 
 DAMPED = 16.0
@@ -54,37 +55,25 @@ def longest_step(theta_limit: float, c: Constants) -> float:
 
 
 @kernel
-def simulate_last_resort(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
+def simulate_last_resort(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
+
+    Of two springs each is made softer only as far as it is too stiff to follow.
 
     Parameters
     ----------
-    design
-        The design, SI.
-    readings
-        Which formulas are read as printed.
-    control
-        As of `boulder_kernels.impact.simulate_design`.
-    record
-        A record that keeps nothing.
+    problem
+        Design and vehicle; the soil is the uniform elastic soil of the design.
+    readings, control, record
+        As of `boulder_kernels.impact.simulate`; the record keeps nothing.
     """
-    return last_resort_on_springs(design, readings, control, record, None)
-
-
-@kernel
-def last_resort_on_springs(
-    design: Design, readings: Readings, control: Control, record: Record, second: SecondSpring | None
-) -> Outcome:
-    """Simulate one impact as `simulate_last_resort`, of a vehicle that may have a second spring.
-
-    Of two springs each is made softer only as far as it is too stiff to follow.
-    """
+    design, second = problem.design, problem.second
     c = constants_of(design, readings, control.elements)
-    if design.H - design.d <= design.e_bumper or not is_computable(c) or not is_second_spring(c, second):
-        return simulate_on_springs(design, readings, control, record, second)
+    if misses(design) or not is_computable(c) or not is_second_spring(c, second):
+        return simulate(problem, readings, control, record)
     _, status = first_step(control, control.theta_limit, stiffest(c, second))
     if status == ACCEPTED:
-        return simulate_on_springs(design, readings, control, record, second)
+        return simulate(problem, readings, control, record)
     c = stiffest(c, second)
     factor = spring_to_follow(rates_of(control.theta_limit, c), control)
     softer = times(second, factor)

@@ -7,34 +7,28 @@ p_1 is the paper's K_p^2 rho_s g (Eq 27).
 
 A displacement at which all of the soil yields does not exist then. The soil is either N elements with numbers of their
 own, or the layers themselves, for which `boulder_kernels.layered_soil` is exact: arrays beside the constants of the
-design, and `boulder_kernels.soil` chooses by their type.
+design, and `boulder_kernels.soil_laws` chooses by their type.
 """
 
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from ._jit import array_kernel, exact_kernel, function_of
+from ._jit import array_kernel, exact_kernel
 from .design import (
     Constants,
     Design,
     DesignTable,
     SoilMass,
-    constants_of,
-    constants_with,
-    design_at,
     element_depth,
     element_mass,
     spring_per_depth,
     ultimate_pressure,
     wedge_slope,
 )
-from .readings import Readings
 
 TO, DENSITY, FRICTION, SUBGRADE, PRESSURE, PRESSURE_SLOPE = range(6)
 """Columns of the layers of a design, shape (M, 6), from the top down: depth of the lower boundary [m], density that has
@@ -83,17 +77,6 @@ bounds: K_soil and R_soil are those of the stiffest and of the heaviest element 
 displacement at which an element reaches its ultimate resistance."""
 LayeredTable = _record("LayeredTable", (*DesignTable._fields, "layers"))
 """Many designs in soils of layers: the fields of `DesignTable`, and ``layers`` of shape (n, M, 6)."""
-
-
-def layered(c: Constants, soil: SoilElements) -> Any:
-    """Return constants together with the elements of their soil."""
-    return LayeredConstants(*c, soil)
-
-
-@overload(layered, inline="always", strict=False)
-def _layered(c: Any, soil: Any) -> Callable[..., Any]:
-    values = ", ".join(f"c.{name}" for name in Constants._fields)
-    return function_of(f"def layered(c, soil):\n return Record({values}, soil)", Record=LayeredConstants)
 
 
 @exact_kernel
@@ -222,74 +205,6 @@ def bounds_of_layers(soil: SoilLayers) -> Bounds:
                 x_yield = max(x_yield, (soil.P_0[m] / end + soil.P_1[m]) / soil.K[m])
         low = high
     return Bounds(0, K_soil, R_soil, x_yield)
-
-
-def fill_soil(design: Design, layers: np.ndarray, soil: Any) -> SoilMass:
-    """Fill elements or layers, whichever they are."""
-    return (fill_layers if isinstance(soil, SoilLayers) else fill_elements)(design, layers, soil)
-
-
-def bounds_of(soil: Any) -> Bounds:
-    """Bounds of elements or layers, whichever they are."""
-    return (bounds_of_layers if isinstance(soil, SoilLayers) else bounds_of_elements)(soil)
-
-
-@overload(fill_soil, inline="always", strict=False)
-def _fill_soil(design: Any, layers: Any, soil: Any) -> Callable[..., Any]:
-    if soil.instance_class is SoilLayers:
-        return lambda design, layers, soil: fill_layers(design, layers, soil)
-    return lambda design, layers, soil: fill_elements(design, layers, soil)
-
-
-@overload(bounds_of, inline="always", strict=False)
-def _bounds_of(soil: Any) -> Callable[..., Any]:
-    if soil.instance_class is SoilLayers:
-        return lambda soil: bounds_of_layers(soil)
-    return lambda soil: bounds_of_elements(soil)
-
-
-@exact_kernel
-def constants_in(design: Design, layers: np.ndarray, soil: Any, readings: Readings) -> Any:
-    """Constants of the motion of one design in a soil of layers.
-
-    Parameters
-    ----------
-    design
-        The design, SI; density, friction angle and subgrade reaction of its soil are those of the layers.
-    layers
-        Layers of its soil, shape (M, 6).
-    soil
-        Elements or layers to fill, see `empty_soil`; the constants keep them.
-    readings
-        Which formulas are read as printed.
-
-    Returns
-    -------
-    LayeredConstants
-        Non-finite or non-positive where the design is impossible, as of `boulder_kernels.design.is_computable`.
-    """
-    mass = fill_soil(design, layers, soil)
-    b = bounds_of(soil)
-    return layered(constants_with(design, readings, b.elements, mass, b.K_soil, b.R_soil, b.x_yield), soil)
-
-
-def empty_soil(layers: int, elements: int) -> SoilLayers | SoilElements:
-    """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact."""
-    if elements > 0:
-        return SoilElements(*np.empty((4, elements)))
-    return SoilLayers(*np.empty((5, layers)))
-
-
-def constants_at(table: DesignTable, row: int, readings: Readings, elements: int) -> Any:
-    """Constants of one row of a table, `Constants` or `LayeredConstants`; see `boulder_kernels.design.constants_of`."""
-    if isinstance(table, LayeredTable):
-        return layered_constants(design_at(table, row), table.layers[row], readings, elements)
-    return constants_of(design_at(table, row), readings, elements)
-
-
-def layered_constants(design: Design, layers: np.ndarray, readings: Readings, elements: int) -> Any:
-    """Constants of one design in a soil of layers, by N elements or, where N is 0, exactly; see `constants_in`."""
-    return constants_in(design, layers, empty_soil(len(layers), elements), readings)
 
 
 @array_kernel

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ._jit import inlined, kernel, summing_kernel
 from .layered import SoilElements, SoilLayers
-from .soil_records import TINY, Kinematics, Potential, Reaction
+from .soil import TINY, Kinematics, Potential, Reaction
 
 GAUSS = 1.0 / math.sqrt(3.0)
 """Nodes of the two-point Gauss rule are plus and minus this, its weights 1."""

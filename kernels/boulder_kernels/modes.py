@@ -18,8 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ._jit import inlined
-from .design import Constants
-from .readings import Readings
+from .design import Constants, Readings
 
 SEATED = 0
 """Gravity reading: theta_b = 0 and at rest; the weight balances the other moments."""

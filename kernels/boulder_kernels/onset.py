@@ -13,8 +13,8 @@ from ._jit import exact_inlined
 from .design import Constants
 from .events import AT_END, TOLERANCE, needs_moment
 from .gaps import GapFactors
-from .soil import soil_reaction
-from .soil_records import Kinematics
+from .soil import Kinematics
+from .soil_laws import soil_reaction
 
 SMALL = 1e-5
 """Share of the displacement at which the soil yields, or of the depth where that is less, by which it is moved to find

@@ -12,10 +12,9 @@ import numpy as np
 from ._jit import array_kernel, inlined, kernel
 from .dense_output import DenseOutput, displacement_at, state_at, turning_point
 from .design import Constants
-from .dynamics import State
+from .dynamics import State, contact_displacement, contact_lever, spring_compression
 from .modes import Switches
-from .trigonometry import sine_versine
-from .vehicle import contact_displacement, contact_lever, spring_compression
+from .numerics import sine_versine
 
 
 class Status(IntEnum):
@@ -128,7 +127,7 @@ class OutcomeTable(NamedTuple):
 
 _record: Any = namedtuple
 OutcomesAtRest = _record("OutcomesAtRest", (*OutcomeTable._fields, "theta_rest", "swing_back", "rest_error"))
-"""The fields of `OutcomeTable`, and for soil that remembers, NaN where nothing is known of it: the rotation in which
+"""The fields of `OutcomeTable`, and for plastic soil, NaN where nothing is known of it: the rotation in which
 the boulder comes to rest, signed, how far it swings back from its largest rotation, and by how much that rest may
 be wrong, by the numerical error and by the energy that is left at the end of the simulation [rad]."""
 OUTCOME_FIELDS = OutcomeTable._fields

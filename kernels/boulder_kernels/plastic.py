@@ -1,109 +1,173 @@
-"""Impacts in soil that remembers, one design after another, and where their boulders come to rest."""
+"""Plastic soil elements: their memory, force, least work and plastic work, with and without a gap (Eqs 121 to 123).
+
+The paper's soil is elastic: it gives back all that its springs took up. Here each spring is in series with a slider
+that gives way at the ultimate resistance, and what the slider has moved stays. An element then presses by
+
+    F = k clip(u - u_f, 0, y) - k clip(u_b - u, 0, y),    y = F_u / k
+
+where u_f is the displacement at which its front comes to bear and u_b that at which its back does. Without a gap the
+soil sticks to the boulder on both sides, and both are the same, the plastic displacement u_p. With a gap each side
+keeps its own: u_f >= 0 grows with the largest displacement, u_b <= 0 with the least, and between them there is no soil
+force at all.
+
+What an element remembers changes with the motion, so it is held in arrays that are written as the simulation goes on.
+A step is integrated with what was remembered at its start: as long as an element moves one way, its force is that of
+an elastic one that starts there.
+"""
 
 from __future__ import annotations
 
+from collections import namedtuple
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import overload
 
-from .design import Design, DesignTable, design_at
-from .dynamics import State
-from .impact import Control, Record, failed, no_record, simulate_with_springs
-from .layered import LayeredTable, layered_constants, uniform_layers
-from .memory import LAST, PLASTIC_WITH_GAP, SWING, remembering
-from .outcomes import SIMULATED, Outcome, OutcomesAtRest, Status, empty_outcomes, write_outcome
-from .readings import Readings
-from .second_spring import SecondSpring, SecondSprings
-from .settling import proof_is_possible
-from .unloading import rest_of
+from ._jit import kernel, summing_kernel
+from .design import Constants
+from .layered import SoilElements
+from .layered_soil import power_of_elements
+from .soil import Kinematics, Potential, Reaction
 
-
-class PlasticImpact(NamedTuple):
-    """One impact in soil that remembers."""
-
-    outcome: Outcome
-    constants: Any
-    """`RememberingConstants` of the design, with what its soil remembers in the end and remembered at every sample."""
-    theta_rest: float
-    """Rotation in which the boulder comes to rest [rad]; NaN where nothing is known of it."""
-    doubt: float
-    """By how much it may be another, by the energy that is left [rad]."""
-    swing_back: float
-    """How far the boulder has swung back from its largest rotation [rad]."""
+ELASTIC, PLASTIC, PLASTIC_WITH_GAP = range(3)
+"""How the soil unloads, see `boulder_kernels.impact.Control`."""
 
 
-def simulate_plastic(
-    design: Design,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    second: SecondSpring | None = None,
-    layers: np.ndarray | None = None,
-) -> PlasticImpact:
-    """Simulate one impact in soil that remembers.
+class Memory(NamedTuple):
+    """What N soil elements remember, and what is kept of the motion because of it."""
 
-    Parameters
-    ----------
-    design
-        The design, SI.
-    readings
-        Which formulas are read as printed.
-    control
-        As of `boulder_kernels.impact.simulate_design`; ``unloading`` and ``elements`` must not be 0. No step is cut
-        where the soil yields, because what yields depends on what it remembers.
-    record
-        Filled with the time history at the times it names.
-    second
-        Second spring of the vehicle, if it has one.
-    layers
-        Layers of the soil, shape (M, 6), see `boulder_kernels.layered`; that of the design by default.
-    """
-    layers = uniform_layers(design) if layers is None else layers
-    layered = layered_constants(design, layers, readings, control.elements)
-    c = remembering(layered, control.unloading == PLASTIC_WITH_GAP, len(record.times))
-    if design.H - design.d <= design.e_bumper:
-        return PlasticImpact(failed(Status.NO_CONTACT.value), c, np.nan, np.nan, np.nan)
-    outcome = simulate_with_springs(c, readings, control._replace(locate_yield=False), record, second)
-    y = State(*c.memory.so_far[LAST:])
-    if outcome.status not in SIMULATED or outcome.status == Status.LIMIT:
-        return PlasticImpact(outcome, c, np.nan, np.nan, np.nan)
-    swing_back = float(c.memory.so_far[SWING])
-    if y.v_v > 0.0 or not proof_is_possible(readings):
-        return PlasticImpact(outcome, c, np.nan, np.nan, swing_back)
-    rest = rest_of(y, control.theta_limit, c)
-    return PlasticImpact(outcome, c, rest.theta, rest.doubt, swing_back)
+    front: np.ndarray
+    """Displacement u_f beyond which the front of each element is pressed [m], shape (N,)."""
+    back: np.ndarray
+    """Displacement u_b below which its back is pressed [m], shape (N,); never more than u_f."""
+    gap: bool
+    """Whether a gap opens, else both are the same."""
+    so_far: np.ndarray
+    """Plastic work [J], rotation of largest modulus [rad], swing back from it [rad], and the state at the end of the
+    last step in the order of `State`; shape (9,)."""
+    samples: np.ndarray
+    """u_f, u_b and the plastic work at each sample of a record, shape (n, 2 N + 1)."""
 
 
-def simulate_plastic_rows(
-    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
-) -> Any:
-    """Simulate every design of a table once in soil that remembers.
+WORK, PEAK, SWING, LAST = range(4)
+"""Places in `Memory.so_far`; from LAST on, the state."""
 
-    Returns
-    -------
-    OutcomesAtRest
-        Arrays of shape (n,); ``rest_error`` without a numerical error.
-    """
-    n = len(table.L)
-    out, rest = empty_outcomes(n), np.full((3, n), np.nan)
-    for row in range(n):
-        second = None if springs is None else SecondSpring(springs.k_2[row], springs.s_2[row])
-        layers = table.layers[row] if isinstance(table, LayeredTable) else None
-        found = simulate_plastic(design_at(table, row), readings, control, no_record(), second, layers)
-        write_outcome(out, row, found.outcome)
-        rest[:, row] = found.theta_rest, found.swing_back, found.doubt
-    return OutcomesAtRest(out[0].astype(np.int8), *out[1:], *rest)
+_record: Any = namedtuple
+PlasticConstants = _record("PlasticConstants", (*Constants._fields, "soil", "memory"))
+"""The fields of `boulder_kernels.layered.LayeredConstants`, and ``memory``, the `Memory`."""
 
 
-def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
-    """Add the numerical error to the doubt of where boulders come to rest.
+def memory_of(c: Any) -> Memory | None:
+    """Return what the soil of constants remembers; None for elastic soil."""
+    return c.memory if isinstance(c, PlasticConstants) else None
+
+
+@overload(memory_of, inline="always", strict=False)
+def _memory_of(c: Any) -> Callable[..., Any]:
+    return (lambda c: c.memory) if c.instance_class is PlasticConstants else (lambda c: None)
+
+
+def empty_memory(elements: int, gap: bool, samples: int = 0) -> Memory:
+    """Return the memory of N elements that have not been pushed.
 
     Parameters
     ----------
-    coarse, fine
-        `OutcomesAtRest` by a step and by a third of it; the error goes into the finer.
-    safety
-        Factor from the difference of the two to the error.
+    elements
+        Number N of elements.
+    gap
+        Whether a gap opens behind the boulder.
+    samples
+        Number of samples of the record that goes with it.
     """
-    differing = np.maximum(abs(coarse.theta_rest - fine.theta_rest), abs(coarse.swing_back - fine.swing_back))
-    fine.rest_error[:] += safety * differing
+    n = elements
+    return Memory(np.zeros(n), np.zeros(n), gap, np.zeros(LAST + 6), np.zeros((samples, 2 * n + 1)))
+
+
+def at_sample(c: Any, sample: int) -> Any:
+    """Return constants with what their soil remembered at a sample of the record; elastic ones as they are."""
+    if not isinstance(c, PlasticConstants):
+        return c
+    memory, n = c.memory, c.soil.ratio.size
+    row = memory.samples[sample]
+    so_far = memory.so_far.copy()
+    so_far[WORK] = row[-1]
+    return c._replace(memory=memory._replace(front=row[:n], back=row[n:-1], so_far=so_far))
+
+
+@kernel
+def push(n: int, u: float, y: float, memory: Memory) -> float:
+    """Push element n to a displacement, and return by how much its sliders have moved [m].
+
+    Parameters
+    ----------
+    n
+        Index of the element.
+    u
+        Displacement [m], reached from the last one without turning back in between.
+    y
+        Displacement at which its spring reaches the ultimate resistance [m].
+    memory
+        What the elements remember; changed.
+    """
+    front, back = memory.front[n], memory.back[n]
+    if memory.gap:
+        memory.front[n] = max(front, u - y)
+        memory.back[n] = min(back, u + y)
+        return memory.front[n] - front + back - memory.back[n]
+    memory.front[n] = memory.back[n] = min(max(front, u - y), u + y)
+    return abs(memory.front[n] - front)
+
+
+@summing_kernel
+def reaction_of_plastic_elements(k: Kinematics, soil: SoilElements, memory: Memory) -> Reaction:
+    """Sum force and moment over plastic elements (Eqs 19, 20, 36, 121, 122)."""
+    F = M = 0.0
+    for n in range(soil.ratio.size):
+        ratio, stiffness, ultimate = soil.ratio[n], soil.stiffness[n], soil.ultimate[n]
+        displacement = k.A - k.slope_x * ratio
+        velocity = k.B - k.slope_v * ratio
+        ahead = min(max(stiffness * (displacement - memory.front[n]), 0.0), ultimate)
+        behind = min(max(stiffness * (memory.back[n] - displacement), 0.0), ultimate)
+        F_n = behind - ahead - soil.drag[n] * velocity * abs(velocity)
+        F += F_n
+        M -= F_n * (k.lever_d * ratio + k.q)
+    return Reaction(F, M)
+
+
+@kernel
+def potential_of_plastic_elements(A: float, slope_x: float, soil: SoilElements, memory: Memory) -> Potential:
+    """Least work that pushes elements to a displacement from where they would rest, given what they remember.
+
+    It is what their springs hold and what their sliders would take; see `closed_potential`, and `slider_energy` for
+    the second part alone. A sum of convex functions of the displacement, as without memory.
+    """
+    V = V_A = V_X = 0.0
+    for n in range(soil.ratio.size):
+        ratio, stiffness, ultimate = soil.ratio[n], soil.stiffness[n], soil.ultimate[n]
+        displacement = A - slope_x * ratio
+        ahead, behind = max(displacement - memory.front[n], 0.0), max(memory.back[n] - displacement, 0.0)
+        pressed = ahead - behind
+        over = max(ahead + behind - ultimate / stiffness, 0.0)
+        force = min(max(stiffness * pressed, -ultimate), ultimate)
+        V += 0.5 * stiffness * (pressed * pressed - over * over)
+        V_A += force
+        V_X -= ratio * force
+    return Potential(V, V_A, V_X)
+
+
+@kernel
+def power_of_plastic_elements(k: Kinematics, soil: SoilElements, memory: Memory) -> float:
+    """Power that the drag of plastic elements takes out of the motion [W]: that of elastic ones."""
+    return power_of_elements(k, soil)
+
+
+@kernel
+def slider_energy(k: Kinematics, soil: SoilElements, memory: Memory) -> float:
+    """Part of `potential_of_plastic_elements` that the sliders take since the memory was written: plastic work [J]."""
+    work = 0.0
+    for n in range(soil.ratio.size):
+        displacement = k.A - k.slope_x * soil.ratio[n]
+        pressed = max(displacement - memory.front[n], 0.0) + max(memory.back[n] - displacement, 0.0)
+        work += soil.ultimate[n] * max(pressed - soil.ultimate[n] / soil.stiffness[n], 0.0)
+    return work

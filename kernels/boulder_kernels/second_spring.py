@@ -28,8 +28,8 @@ from .after_step import Kept
 from .dense_output import DenseOutput, state_at
 from .design import Constants, Design
 from .modes import Switches
+from .numerics import ITERATIONS, Bracket, narrowed, next_guess
 from .outcomes import Compression, Maxima, compression_at, highest
-from .roots import ITERATIONS, Bracket, narrowed, next_guess
 
 STIFFENS = 8
 """Event: the crush reaches the second spring. Numbered after those of `boulder_kernels.gaps`."""

@@ -26,21 +26,16 @@ turn back freely, and a truck that the air pulls on, feed energy. It does happen
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
-from numba.extending import overload
-
-from ._jit import inlined, kernel
-from .design import Constants
-from .dynamics import State
-from .memory import RememberingConstants
+from ._jit import inlined, kernel, unless_none
+from .design import Constants, Readings
+from .dynamics import State, contact_displacement, spring_compression
+from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
 from .outcomes import Maxima
-from .readings import Readings
-from .roots import ITERATIONS, Bracket, narrowed, next_guess
-from .soil import Potential, soil_kinematics, soil_potential
-from .trigonometry import sine_versine
-from .vehicle import contact_displacement, spring_compression
+from .plastic import Memory, memory_of
+from .soil import Potential, soil_kinematics
+from .soil_laws import soil_potential
 
 NO_PROOF = -1e300
 """Barrier of a motion that nothing has been proved of: no energy is below it."""
@@ -105,15 +100,15 @@ def least_elastic_energy(slope_x: float, c: Constants) -> float:
 
 
 @kernel
-def least_remembering_energy(slope_x: float, c: Any) -> float:
-    """Lower bound of the least work that brings soil that remembers to a rotation, wherever the boulder stands [J].
+def least_plastic_energy(slope_x: float, c: Any) -> float:
+    """Lower bound of the least work that brings plastic soil to a rotation, wherever the boulder stands [J].
 
     Parameters
     ----------
     slope_x
         Decrease of displacement over the depth, sin(theta) d [m].
     c
-        `RememberingConstants` of the design.
+        `PlasticConstants` of the design.
 
     Notes
     -----
@@ -142,26 +137,27 @@ def least_remembering_energy(slope_x: float, c: Any) -> float:
     return least
 
 
-def least_soil_energy(slope_x: float, c: Any) -> float:
-    """Lower bound of the energy of the soil at a rotation by a modulus, wherever the boulder stands [J].
-
-    Parameters
-    ----------
-    slope_x
-        Decrease of displacement over the depth, sin|theta| d [m]; not negative.
-    c
-        Constants of the design.
-    """
-    if isinstance(c, RememberingConstants):
-        return min(least_remembering_energy(slope_x, c), least_remembering_energy(-slope_x, c))
-    return least_elastic_energy(slope_x, c)
+@kernel
+def least_plastic_energy_either_way(slope_x: float, c: Any, memory: Memory) -> float:
+    """Return the lesser of `least_plastic_energy` for a rotation forward and back."""
+    return min(least_plastic_energy(slope_x, c), least_plastic_energy(-slope_x, c))
 
 
-@overload(least_soil_energy, inline="always", strict=False)
-def _least_soil_energy(slope_x: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is RememberingConstants:
-        return lambda slope_x, c: min(least_remembering_energy(slope_x, c), least_remembering_energy(-slope_x, c))
-    return lambda slope_x, c: least_elastic_energy(slope_x, c)
+least_soil_energy = unless_none(
+    "slope_x c memory",
+    least_plastic_energy_either_way,
+    "least_elastic_energy(slope_x, c)",
+    least_elastic_energy=least_elastic_energy,
+)
+"""Lower bound of the energy of the soil at a rotation by a modulus, wherever the boulder stands [J].
+
+Parameters
+----------
+slope_x
+    Decrease of displacement over the depth, sin|theta| d [m]; not negative.
+c, memory
+    Constants of the design, and their memory; None for elastic soil.
+"""
 
 
 @inlined
@@ -176,7 +172,7 @@ def energy_to_turn(theta_max: float, c: Constants) -> float:
         Constants of a design whose restoring moment is the couple of the weight.
     """
     sin, versin = sine_versine(theta_max)
-    return c.C_cos * sin + c.C_sin * versin + least_soil_energy(c.d * sin, c)
+    return c.C_cos * sin + c.C_sin * versin + least_soil_energy(c.d * sin, c, memory_of(c))
 
 
 @inlined

@@ -19,25 +19,50 @@ points along the depth, and the drag one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
-
-from numba.extending import overload
+from typing import NamedTuple
 
 from ._jit import inlined, kernel, summing_kernel
 from .design import Constants
-from .layered import LayeredConstants, SoilLayers
-from .layered_soil import (
-    potential_of_elements,
-    potential_of_layers,
-    power_of_elements,
-    power_of_layers,
-    reaction_of_elements,
-    reaction_of_layers,
-)
-from .memory import Memory, RememberingConstants
-from .remembering_soil import potential_of_remembering, reaction_of_remembering
-from .soil_records import TINY, Kinematics, Potential, Reaction
+
+TINY = 1e-30
+"""Stands in for a slope of zero, so that a break point at infinity is clamped and not 0/0."""
+
+
+class Reaction(NamedTuple):
+    """Force and moment of the soil on the boulder."""
+
+    F: float
+    """Sum of F_n [N] (Eq 19)."""
+    M: float
+    """Sum of M_n about the common centre of mass [N m] (Eq 20)."""
+
+
+class Kinematics(NamedTuple):
+    """Displacement and velocity of the soil along the depth, as lines."""
+
+    A: float
+    """Displacement at the soil line [m]."""
+    slope_x: float
+    """Decrease of displacement over the whole depth, sin(theta) d [m]."""
+    B: float
+    """Velocity at the soil line [m/s]."""
+    slope_v: float
+    """Decrease of velocity over the whole depth, omega cos(theta) d [m/s]."""
+    q: float
+    """Depth of the centre of mass relative to the soil line as a lever, l_n sin - z_0 cos [m]."""
+    lever_d: float
+    """Increase of the lever over the whole depth, cos(theta) d [m]."""
+
+
+class Potential(NamedTuple):
+    """Elastic energy of the soil and its slopes."""
+
+    V: float
+    """Energy stored in the springs [J]."""
+    V_A: float
+    """Its derivative by the displacement at the soil line [N]."""
+    V_X: float
+    """Its derivative by the decrease of displacement over the depth [N]."""
 
 
 @inlined
@@ -150,16 +175,6 @@ def uniform_reaction(k: Kinematics, c: Constants) -> Reaction:
     return closed_form(k, c)
 
 
-def soil_reaction(k: Kinematics, c: Any) -> Reaction:
-    """Force and moment of the soil that the constants describe, see `LayeredConstants`."""
-    if isinstance(c, LayeredConstants):
-        of_soil = reaction_of_layers if isinstance(c.soil, SoilLayers) else reaction_of_elements
-        return of_soil(k, c.soil)
-    if isinstance(c, RememberingConstants):
-        return reaction_of_remembering(k, c.soil, c.memory)
-    return uniform_reaction(k, c)
-
-
 @inlined
 def closed_potential(A: float, slope_x: float, c: Constants) -> Potential:
     """Elastic energy of the soil for N -> infinity, a convex function of the two numbers that fix its displacement.
@@ -216,16 +231,6 @@ def uniform_potential(A: float, slope_x: float, c: Constants) -> Potential:
     return closed_potential(A, slope_x, c)
 
 
-def soil_potential(A: float, slope_x: float, c: Any) -> Potential:
-    """Elastic energy of the soil by the same representation as the forces, a convex function of both displacements."""
-    if isinstance(c, LayeredConstants):
-        of_soil = potential_of_layers if isinstance(c.soil, SoilLayers) else potential_of_elements
-        return of_soil(A, slope_x, c.soil)
-    if isinstance(c, RememberingConstants):
-        return potential_of_remembering(A, slope_x, c.soil, c.memory)
-    return uniform_potential(A, slope_x, c)
-
-
 @kernel
 def uniform_drag_power(k: Kinematics, c: Constants) -> float:
     """Power that the drag of a uniform soil takes out of the motion [W] (Eqs 34-36)."""
@@ -241,62 +246,3 @@ def uniform_drag_power(k: Kinematics, c: Constants) -> float:
     if k.B * (k.B - k.slope_v) >= 0.0:
         return c.R_soil * 0.25 * (top + base) * (top * top + base * base)
     return c.R_soil * 0.25 * (top**4 + base**4) / (top + base)
-
-
-def drag_power(k: Kinematics, c: Any) -> float:
-    """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
-    if isinstance(c, LayeredConstants | RememberingConstants):
-        of_soil = power_of_layers if isinstance(c.soil, SoilLayers) else power_of_elements
-        return of_soil(k, c.soil)
-    return uniform_drag_power(k, c)
-
-
-def _record_of(c: Any) -> Any:
-    """The last record of constants that have one beside those of `Constants`, from their Numba type; else None.
-
-    It is `SoilElements`, `SoilLayers` or `Memory`, and tells how the soil is computed.
-    """
-    return c[-1].instance_class if c.instance_class in (LayeredConstants, RememberingConstants) else None
-
-
-# Inside kernels the three are chosen when they are compiled, by the type of the constants.
-
-
-@overload(soil_reaction, inline="always", strict=False)
-def _soil_reaction(k: Any, c: Any) -> Callable[..., Any]:
-    record = _record_of(c)
-    if record is SoilLayers:
-        return lambda k, c: reaction_of_layers(k, c.soil)
-    if record is Memory:
-        return lambda k, c: reaction_of_remembering(k, c.soil, c.memory)
-    if record is not None:
-        return lambda k, c: reaction_of_elements(k, c.soil)
-    return lambda k, c: uniform_reaction(k, c)
-
-
-@overload(soil_potential, inline="always", strict=False)
-def _soil_potential(A: Any, slope_x: Any, c: Any) -> Callable[..., Any]:
-    record = _record_of(c)
-    if record is SoilLayers:
-        return lambda A, slope_x, c: potential_of_layers(A, slope_x, c.soil)
-    if record is Memory:
-        return lambda A, slope_x, c: potential_of_remembering(A, slope_x, c.soil, c.memory)
-    if record is not None:
-        return lambda A, slope_x, c: potential_of_elements(A, slope_x, c.soil)
-    return lambda A, slope_x, c: uniform_potential(A, slope_x, c)
-
-
-@overload(drag_power, inline="always", strict=False)
-def _drag_power(k: Any, c: Any) -> Callable[..., Any]:
-    record = _record_of(c)
-    if record is SoilLayers:
-        return lambda k, c: power_of_layers(k, c.soil)
-    if record is not None:
-        return lambda k, c: power_of_elements(k, c.soil)
-    return lambda k, c: uniform_drag_power(k, c)
-
-
-@kernel
-def soil_energy(k: Kinematics, c: Constants) -> float:
-    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces."""
-    return soil_potential(k.A, k.slope_x, c).V

@@ -16,8 +16,8 @@ import numpy as np
 
 from ._jit import exact_inlined
 from .design import Constants
+from .numerics import sine_versine
 from .outcomes import Status
-from .trigonometry import sine_versine
 
 STABLE_OSCILLATION = 1.5
 """Largest step times angular frequency. On the imaginary axis the method amplifies by 0.3 % a step there (its limit

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, kernel
-from .design import DesignTable, design_at, design_in
-from .impact import Control, Record, no_record, simulate_design, simulate_layered, simulate_on_springs
+from ._jit import array_kernel, kernel, unless_none
+from .design import DesignTable, Readings, design_at, design_in
+from .dynamics import State
+from .impact import Control, Problem, Record, failed, misses, no_record, simulate, simulate_motion
 from .lanes import simulate_lanes
-from .last_resort import last_resort_on_springs, simulate_last_resort
-from .layered import LayeredTable, empty_soil
-from .memory import ELASTIC
-from .outcomes import Outcome, OutcomeTable, Status, empty_outcomes, write_outcome
-from .plastic import add_rest_error, simulate_plastic_rows
-from .readings import Readings
+from .last_resort import simulate_last_resort
+from .layered import LayeredTable
+from .outcomes import (
+    SIMULATED,
+    Outcome,
+    OutcomesAtRest,
+    OutcomeTable,
+    Status,
+    empty_outcomes,
+    write_outcome,
+)
+from .plastic import ELASTIC, LAST, PLASTIC_WITH_GAP, SWING, empty_memory, memory_of
 from .second_spring import SecondSpring, SecondSprings
+from .settling import proof_is_possible
+from .soil_laws import SoilProfile, constants_in, empty_soil, profile_of
+from .unloading import rest_of
 
 SAFETY = 1.5
 """Factor from the difference of two solutions to the error that is reported: it makes the estimate hold for 99 % and
@@ -29,58 +39,42 @@ LEAST_ROTATION = 1e-4
 
 
 @array_kernel
-def simulate_rows(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
-    """Simulate designs one by one, with any representation of the soil; arguments: see `simulate_lanes`."""
-    out = empty_outcomes(designs.shape[1])
-    for row in range(designs.shape[1]):
-        write_outcome(out, row, simulate_design(design_in(designs, row), readings, control, no_record()))
-    return out
+def take_profile(row: int, soil: Any, layers: np.ndarray) -> SoilProfile:
+    """Return the soil of one design of a table in layers, shape (n, M, 6)."""
+    return SoilProfile(layers[row], soil, None)
+
+
+@kernel
+def take_second_spring(row: int, springs: np.ndarray) -> SecondSpring:
+    """Return the second spring of one vehicle, from rows as of `SecondSprings`."""
+    return SecondSpring(springs[0, row], springs[1, row])
+
+
+profile_in = unless_none("row soil layers", take_profile, "None")
+"""The soil of one design of a table; None for the uniform soil of the design."""
+second_spring_in = unless_none("row springs", take_second_spring, "None")
+"""The second spring of one vehicle; None for a vehicle without."""
 
 
 @array_kernel
-def simulate_rows_last_resort(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
-    """The same for designs that need more steps than are allowed, see `boulder_kernels.last_resort`."""
-    out = empty_outcomes(designs.shape[1])
-    for row in range(designs.shape[1]):
-        write_outcome(out, row, simulate_last_resort(design_in(designs, row), readings, control, no_record()))
-    return out
-
-
-@array_kernel
-def simulate_rows_on_springs(
-    designs: np.ndarray, springs: np.ndarray, readings: Readings, control: Control
-) -> np.ndarray:
-    """Simulate designs one by one, whose vehicles have a second spring: rows of `springs` as of `SecondSprings`."""
-    out = empty_outcomes(designs.shape[1])
-    for row in range(designs.shape[1]):
-        design, second = design_in(designs, row), SecondSpring(springs[0, row], springs[1, row])
-        if control.last_resort:
-            found = last_resort_on_springs(design, readings, control, no_record(), second)
-        else:
-            found = simulate_on_springs(design, readings, control, no_record(), second)
-        write_outcome(out, row, found)
-    return out
-
-
-@array_kernel
-def simulate_layered_rows(
+def simulate_rows(
     designs: np.ndarray,
-    layers: np.ndarray,
+    layers: np.ndarray | None,
     soil: Any,
     springs: np.ndarray | None,
     readings: Readings,
     control: Control,
 ) -> np.ndarray:
-    """Simulate designs in soils of layers one by one.
+    """Simulate designs one by one, in any elastic soil.
 
     Parameters
     ----------
     designs
         As of `simulate_lanes`.
     layers
-        Layers of every design, shape (n, M, 6), see `boulder_kernels.layered`.
+        Layers of every design, shape (n, M, 6), see `boulder_kernels.layered`; None for uniform soils.
     soil
-        Elements or layers that every design fills anew.
+        Elements or layers that every design fills anew; None for uniform soils.
     springs
         Rows as of `SecondSprings`, or None for vehicles without a second spring.
     readings, control
@@ -88,33 +82,83 @@ def simulate_layered_rows(
     """
     out = empty_outcomes(designs.shape[1])
     for row in range(designs.shape[1]):
-        design = design_in(designs, row)
-        if springs is None:
-            found = simulate_layered(design, layers[row], soil, readings, control, no_record(), None)
-        else:
-            second = SecondSpring(springs[0, row], springs[1, row])
-            found = simulate_layered(design, layers[row], soil, readings, control, no_record(), second)
-        write_outcome(out, row, found)
+        profile, second = profile_in(row, soil, layers), second_spring_in(row, springs)
+        outcome = simulate(Problem(design_in(designs, row), profile, second), readings, control, no_record())
+        write_outcome(out, row, outcome)
     return out
 
 
-def simulate_row(
-    table: DesignTable,
-    row: int,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    second: SecondSpring | None = None,
-) -> Outcome:
-    """Simulate one row of a table with its time history; arguments: see `simulate_table` and `simulate_design`."""
+@array_kernel
+def simulate_rows_last_resort(
+    designs: np.ndarray, springs: np.ndarray | None, readings: Readings, control: Control
+) -> np.ndarray:
+    """The same for designs that need more steps than are allowed, see `boulder_kernels.last_resort`."""
+    out = empty_outcomes(designs.shape[1])
+    for row in range(designs.shape[1]):
+        problem = Problem(design_in(designs, row), None, second_spring_in(row, springs))
+        write_outcome(out, row, simulate_last_resort(problem, readings, control, no_record()))
+    return out
+
+
+class Impact(NamedTuple):
+    """One impact of a table; of a boulder in plastic soil also where it comes to rest, else NaN."""
+
+    outcome: Outcome
+    constants: Any
+    """Constants of the design, with what plastic soil remembers in the end and remembered at every sample."""
+    theta_rest: float
+    """Rotation in which the boulder comes to rest [rad]; NaN where nothing is known of it."""
+    doubt: float
+    """By how much it may be another, by the energy that is left [rad]."""
+    swing_back: float
+    """How far the boulder has swung back from its largest rotation [rad]."""
+
+
+def problem_at(
+    table: DesignTable, row: int, control: Control, springs: SecondSprings | None = None, samples: int = 0
+) -> Problem:
+    """Return one row of a table as a problem, with room for as many samples as a record has."""
     design = design_at(table, row)
-    if isinstance(table, LayeredTable):
-        layers = table.layers[row]
-        soil = empty_soil(len(layers), control.elements)
-        return simulate_layered(design, layers, soil, readings, control, record, second)
-    if second is not None:
-        return simulate_on_springs(design, readings, control, record, second)
-    return simulate_design(design, readings, control, record)
+    second = None if springs is None else SecondSpring(springs.k_2[row], springs.s_2[row])
+    layers = table.layers[row] if isinstance(table, LayeredTable) else None
+    memory = None
+    if control.unloading != ELASTIC:
+        memory = empty_memory(control.elements, control.unloading == PLASTIC_WITH_GAP, samples)
+    return Problem(design, profile_of(design, layers, control.elements, memory), second)
+
+
+def simulate_impact(problem: Problem, readings: Readings, control: Control, record: Record) -> Impact:
+    """Simulate one impact, and find where a boulder in plastic soil comes to rest; arguments: see `simulate`.
+
+    In plastic soil no step is cut where the soil yields, because what yields depends on what it remembers.
+    """
+    c = constants_in(problem.design, readings, control.elements, problem.profile)
+    if memory_of(c) is None:
+        return Impact(simulate(problem, readings, control, record), c, np.nan, np.nan, np.nan)
+    if misses(problem.design):
+        return Impact(failed(Status.NO_CONTACT.value), c, np.nan, np.nan, np.nan)
+    outcome = simulate_motion(c, readings, control._replace(locate_yield=False), record, problem.second)
+    y = State(*c.memory.so_far[LAST:])
+    if outcome.status not in SIMULATED or outcome.status == Status.LIMIT:
+        return Impact(outcome, c, np.nan, np.nan, np.nan)
+    swing_back = float(c.memory.so_far[SWING])
+    if y.v_v > 0.0 or not proof_is_possible(readings):
+        return Impact(outcome, c, np.nan, np.nan, swing_back)
+    rest = rest_of(y, control.theta_limit, c)
+    return Impact(outcome, c, rest.theta, rest.doubt, swing_back)
+
+
+def simulate_plastic_rows(
+    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None
+) -> Any:
+    """Simulate every design of a table once in plastic soil; ``rest_error`` is without a numerical error."""
+    n = len(table.L)
+    out, rest = empty_outcomes(n), np.full((3, n), np.nan)
+    for row in range(n):
+        impact = simulate_impact(problem_at(table, row, control, springs), readings, control, no_record())
+        write_outcome(out, row, impact.outcome)
+        rest[:, row] = impact.theta_rest, impact.swing_back, impact.doubt
+    return OutcomesAtRest(out[0].astype(np.int8), *out[1:], *rest)
 
 
 def simulate_once(
@@ -122,19 +166,19 @@ def simulate_once(
 ) -> OutcomeTable:
     """Simulate every design of a table once: in lanes where they can be, else one by one."""
     if control.unloading != ELASTIC:
-        return simulate_plastic_rows(table, readings, control, springs)
+        outcomes: OutcomeTable = simulate_plastic_rows(table, readings, control, springs)
+        return outcomes
+    designs = np.stack(table[: len(DesignTable._fields)])
+    stacked = None if springs is None else np.stack(springs)
     if isinstance(table, LayeredTable):
         soil = empty_soil(table.layers.shape[1], control.elements)
-        stacked = None if springs is None else np.stack(springs)
-        out = simulate_layered_rows(np.stack(table[:-1]), table.layers, soil, stacked, readings, control)
-        return OutcomeTable(out[0].astype(np.int8), *out[1:])
-    if springs is not None:
-        out = simulate_rows_on_springs(np.stack(table), np.stack(springs), readings, control)
-        return OutcomeTable(out[0].astype(np.int8), *out[1:])
-    simulate = simulate_lanes if control.elements == 0 and control.stop_at_limit else simulate_rows
-    if control.last_resort:
-        simulate = simulate_rows_last_resort
-    out = simulate(np.stack(table), readings, control)
+        out = simulate_rows(designs, table.layers, soil, stacked, readings, control)
+    elif control.last_resort:
+        out = simulate_rows_last_resort(designs, stacked, readings, control)
+    elif springs is None and control.elements == 0 and control.stop_at_limit:
+        out = simulate_lanes(designs, readings, control)
+    else:
+        out = simulate_rows(designs, None, None, stacked, readings, control)
     return OutcomeTable(out[0].astype(np.int8), *out[1:])
 
 
@@ -182,6 +226,20 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
         fine.x_error[row] = safety * x
 
 
+def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
+    """Add the numerical error to the doubt of where boulders come to rest.
+
+    Parameters
+    ----------
+    coarse, fine
+        `OutcomesAtRest` by a step and by a third of it; the error goes into the finer.
+    safety
+        Factor from the difference of the two to the error.
+    """
+    differing = np.maximum(abs(coarse.theta_rest - fine.theta_rest), abs(coarse.swing_back - fine.swing_back))
+    fine.rest_error[:] += safety * differing
+
+
 def simulate_table(
     table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
 ) -> OutcomeTable:
@@ -202,7 +260,7 @@ def simulate_table(
     Returns
     -------
     OutcomeTable
-        Arrays of shape (n,), in the order of the designs; `OutcomesAtRest` for soil that remembers.
+        Arrays of shape (n,), in the order of the designs; `OutcomesAtRest` for plastic soil.
     """
     out = simulate_once(table, readings, control, springs)
     if not control.error_estimate:

@@ -1,4 +1,4 @@
-"""A motion in soil that remembers: what it remembers after a step, and where the boulder rests (Eqs 121 to 124).
+"""A motion in plastic soil: what the soil remembers after a step, and where the boulder rests (Eqs 121 to 124).
 
 **Steps.** A step is integrated with the memory at its start, which is exact as long as an element moves one way. Where
 one turns back within a step, the memory is written with the displacement at which it turned, by the cubic through both
@@ -7,7 +7,7 @@ order, as of a kink that no step lands on.
 
 **Rest.** With the drag as the only damping, which falls with the square of the speed, a boulder rings for a long time.
 But from what the soil remembers now, the least work that brings it to another displacement is that of the straight way
-there (`boulder_kernels.soil.potential_of_remembering`): to push an element to and fro takes more. So the energy
+there (`boulder_kernels.plastic.potential_of_plastic_elements`): to push an element to and fro takes more. So the energy
 argument of `boulder_kernels.settling` holds with the potential about the present memory, at any time. The boulder
 will come to rest where this potential with its weight is least, and until then it stays between the two angles that its
 energy does not suffice to pass. The half that is farther away is the doubt of where it will rest. A simulation goes
@@ -17,22 +17,17 @@ on until that is less than REST, or its longest time is over; then the doubt tha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba.extending import overload
-
-from ._jit import kernel
+from ._jit import kernel, unless_none
 from .after_step import RUNNING, Decided, Ending, rate_of
-from .design import Constants
 from .dynamics import Acceleration, State
-from .memory import LAST, PEAK, SWING, WORK, RememberingConstants, push
 from .modes import Switches
+from .numerics import sine_versine
 from .outcomes import Status, highest
-from .remembering_soil import slider_energy
-from .settling import boulder_energy, least_remembering_energy
+from .plastic import LAST, PEAK, SWING, WORK, Memory, memory_of, push, slider_energy
+from .settling import boulder_energy, least_plastic_energy
 from .soil import soil_kinematics
-from .trigonometry import sine_versine
 
 REST = math.radians(0.1)
 """A boulder is at rest that provably stays this close to where it will be in the end [rad]."""
@@ -55,9 +50,8 @@ class Rest(NamedTuple):
 
 
 @kernel
-def forgotten(c: Any) -> None:
+def clear(memory: Memory) -> None:
     """Make the soil forget everything."""
-    memory = c.memory
     for n in range(memory.front.size):
         memory.front[n] = memory.back[n] = 0.0
     for i in range(memory.so_far.size):
@@ -65,7 +59,7 @@ def forgotten(c: Any) -> None:
 
 
 @kernel
-def remembered(y: State, y_end: State, h: float, c: Any) -> None:
+def write_memory(y: State, y_end: State, h: float, c: Any, memory: Memory) -> None:
     """Write what the soil remembers after a step.
 
     Parameters
@@ -75,9 +69,11 @@ def remembered(y: State, y_end: State, h: float, c: Any) -> None:
     h
         Length of that [s].
     c
-        `RememberingConstants` of the design; their memory is written.
+        Constants of the design.
+    memory
+        What the soil remembers; written.
     """
-    soil, memory = c.soil, c.memory
+    soil = c.soil
     sin, versin = sine_versine(y.theta_b)
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
     sin, versin = sine_versine(y_end.theta_b)
@@ -98,7 +94,7 @@ def remembered(y: State, y_end: State, h: float, c: Any) -> None:
 
 def plastic_work(y: State, c: Any) -> tuple[float, float]:
     """Plastic work of the soil [J] (Eq 123): up to the start of the step that a state is in, and since then."""
-    if not isinstance(c, RememberingConstants):
+    if memory_of(c) is None:
         return 0.0, 0.0
     sin, versin = sine_versine(y.theta_b)
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
@@ -125,9 +121,9 @@ def swing(theta: float, so_far: Any) -> None:
 
 
 @kernel
-def noted(sample: int, c: Any) -> None:
+def keep_sample(sample: int, memory: Memory) -> None:
     """Keep what the soil remembers beside a sample of the record."""
-    memory, n = c.memory, c.soil.ratio.size
+    n = memory.front.size
     row = memory.samples[sample]
     for i in range(n):
         row[i], row[n + i] = memory.front[i], memory.back[i]
@@ -138,7 +134,7 @@ def noted(sample: int, c: Any) -> None:
 def resting_energy(theta: float, c: Any) -> float:
     """Lower bound of the potential energy at a rotation, wherever x_b, given what the soil remembers [J]."""
     sin, versin = sine_versine(theta)
-    return c.C_cos * abs(sin) + c.C_sin * versin + least_remembering_energy(c.d * sin, c)
+    return c.C_cos * abs(sin) + c.C_sin * versin + least_plastic_energy(c.d * sin, c)
 
 
 @kernel
@@ -162,7 +158,7 @@ def not_passed(theta: float, side: float, E: float, theta_limit: float, c: Any) 
 
 @kernel
 def rest_of(y: State, theta_limit: float, c: Any) -> Rest:
-    """Where a boulder comes to rest that a state leaves in soil that remembers.
+    """Where a boulder comes to rest that a state leaves in plastic soil.
 
     Parameters
     ----------
@@ -171,7 +167,7 @@ def rest_of(y: State, theta_limit: float, c: Any) -> Rest:
     theta_limit
         Limit of rotation [rad].
     c
-        `RememberingConstants` of a design whose readings allow a proof, see `boulder_kernels.settling`.
+        `PlasticConstants` of a design whose readings allow a proof, see `boulder_kernels.settling`.
     """
     E = boulder_energy(y, c)
     first, last = not_passed(y.theta_b, -1.0, E, theta_limit, c), not_passed(y.theta_b, 1.0, E, theta_limit, c)
@@ -192,7 +188,13 @@ def rest_of(y: State, theta_limit: float, c: Any) -> Rest:
 
 
 @kernel
-def going_on(decided: Decided, y: State, ending: Ending, c: Any) -> Decided:
+def rate_with_memory(k_end: Acceleration, y: State, switches: Switches, c: Any, memory: Memory) -> Acceleration:
+    """Acceleration at the start of a step in plastic soil, by what it remembers now."""
+    return rate_of(y, switches, c)
+
+
+@kernel
+def go_on_until_rest(decided: Decided, y: State, ending: Ending, c: Any, memory: Memory) -> Decided:
     """Go on with a motion that is decided but not at rest."""
     if decided.status != Status.BELOW_LIMIT.value or decided.t >= ending.longest:
         return decided
@@ -201,69 +203,15 @@ def going_on(decided: Decided, y: State, ending: Ending, c: Any) -> Decided:
     return Decided(RUNNING, decided.t, decided.barrier, min(decided.horizon + ending.extension, ending.longest))
 
 
-# What a simulation calls after its steps; nothing at all where the soil does not remember.
+# What a simulation calls about its steps; nothing at all where the memory is None, as for elastic soil.
 
-
-def forget(c: Any) -> None:
-    """Begin anew: soil that remembers forgets what was."""
-    if isinstance(c, RememberingConstants):
-        forgotten(c)
-
-
-def remember(y: State, y_end: State, h: float, c: Any) -> None:
-    """Write what the soil remembers after a step; see `remembered`."""
-    if isinstance(c, RememberingConstants):
-        remembered(y, y_end, h, c)
-
-
-def note(sample: int, c: Any) -> None:
-    """Keep what the soil remembers beside a sample of the record."""
-    if isinstance(c, RememberingConstants):
-        noted(sample, c)
-
-
-def rate_after(k_end: Acceleration, y: State, switches: Switches, c: Any) -> Acceleration:
-    """Acceleration at the start of the next step: that at the end of the last one, unless the soil remembers it."""
-    if isinstance(c, RememberingConstants):
-        return rate_of(y, switches, c)
-    return k_end
-
-
-def until_rest(decided: Decided, y: State, ending: Ending, c: Constants) -> Decided:
-    """Where the soil remembers, go on until the boulder is at rest; see `going_on`."""
-    if isinstance(c, RememberingConstants):
-        return going_on(decided, y, ending, c)
-    return decided
-
-
-@overload(forget, inline="always", strict=False)
-def _forget(c: Any) -> Callable[..., Any]:
-    return (lambda c: forgotten(c)) if c.instance_class is RememberingConstants else (lambda c: None)
-
-
-@overload(remember, inline="always", strict=False)
-def _remember(y: Any, y_end: Any, h: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is RememberingConstants:
-        return lambda y, y_end, h, c: remembered(y, y_end, h, c)
-    return lambda y, y_end, h, c: None
-
-
-@overload(note, inline="always", strict=False)
-def _note(sample: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is RememberingConstants:
-        return lambda sample, c: noted(sample, c)
-    return lambda sample, c: None
-
-
-@overload(rate_after, inline="always", strict=False)
-def _rate_after(k_end: Any, y: Any, switches: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is RememberingConstants:
-        return lambda k_end, y, switches, c: rate_of(y, switches, c)
-    return lambda k_end, y, switches, c: k_end
-
-
-@overload(until_rest, inline="always", strict=False)
-def _until_rest(decided: Any, y: Any, ending: Any, c: Any) -> Callable[..., Any]:
-    if c.instance_class is RememberingConstants:
-        return lambda decided, y, ending, c: going_on(decided, y, ending, c)
-    return lambda decided, y, ending, c: decided
+forget = unless_none("memory", clear, "None")
+"""Begin anew: plastic soil forgets what was."""
+remember = unless_none("y y_end h c memory", write_memory, "None")
+"""Write what the soil remembers after a step."""
+note = unless_none("sample memory", keep_sample, "None")
+"""Keep what the soil remembers beside a sample of the record."""
+rate_after = unless_none("k_end y switches c memory", rate_with_memory, "k_end")
+"""Acceleration at the start of the next step: that at the end of the last one, unless the soil remembers it."""
+until_rest = unless_none("decided y ending c memory", go_on_until_rest, "decided")
+"""Where the soil is plastic, go on with a motion that is decided until the boulder is at rest."""

@@ -23,8 +23,8 @@ from .design import Constants, Design
 from .dynamics import Acceleration, State
 from .gaps import GapFactors, Gaps
 from .modes import Modes, Switches
+from .numerics import Bracket
 from .outcomes import Compression, Maxima
-from .roots import Bracket
 
 LANES = 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take

@@ -17,7 +17,7 @@ from benchmarks.flops import (
 )
 from benchmarks.peak import ITERATIONS, PeakLoop
 from boulder_kernels import lanes
-from boulder_kernels.tableau import AA, STAGES, A
+from boulder_kernels.dormand_prince import AA, STAGES, A
 from boulder_kernels.workspace import SIZE
 
 

@@ -103,7 +103,7 @@ SPRING = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 900
         ((SPRING,), ("springs-table", "springs-design")),
         (("soil.cohesion=5 kPa",), ("layers-table", "layers-design")),
         (("soil.slope=10 deg",), ("table", "design")),
-        (("model.unloading=plastic", SPRING), ("memory-table", "memory-design")),
+        (("model.unloading=plastic", SPRING), ("plastic-table", "plastic-design")),
     ],
 )
 def test_kernels_are_named_by_what_the_file_asks_for(overrides, kernels):

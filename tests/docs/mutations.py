@@ -16,7 +16,6 @@ class Mutation(NamedTuple):
 
 
 _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/soil.py"
-_VEHICLE, _RESTORING = "kernels/boulder_kernels/vehicle.py", "kernels/boulder_kernels/restoring.py"
 _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
@@ -25,9 +24,7 @@ _RESISTANCE, _LIFT, _UPLIFT = (f"boulder_sweep/{name}.py" for name in ("soils", 
 _GROUND = "boulder_sweep/soils.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
 
-_REMEMBERING, _MEMORY, _UNLOADING = (
-    f"kernels/boulder_kernels/{name}.py" for name in ("remembering_soil", "memory", "unloading")
-)
+_PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return (1.0 + half) / (1.0 - half)", "return (1.0 - half) / (1.0 + half)"),
@@ -65,15 +62,15 @@ MUTATIONS = (
     Mutation((34, 36), _SOIL, "velocity * abs(velocity)", "velocity * velocity"),
     Mutation((35,), _SOIL, "v_b - omega_b * q", "v_b + omega_b * q"),
     Mutation(
-        (37,), _RESTORING, "c.C_cos - c.C_cos * versin + c.C_sin * sin", "c.C_cos - c.C_cos * versin - c.C_sin * sin"
+        (37,), _DYNAMICS, "c.C_cos - c.C_cos * versin + c.C_sin * sin", "c.C_cos - c.C_cos * versin - c.C_sin * sin"
     ),
     Mutation((38,), _MODES, "net, couple, couple_sin = 1.0, 0.0, 0.0", "net, couple, couple_sin = 0.0, 0.0, 0.0"),
     Mutation((39,), _MODES, "couple, couple_sin = -modes.corner", "couple, couple_sin = modes.corner"),
     Mutation((39,), _MODES, "net = 1.0 - modes.corner", "net = 1.0 + modes.corner"),
-    Mutation((37, 39), _RESTORING, "switches.couple_sin * sin", "switches.couple_sin * sin * sin"),
-    Mutation((40, 45), _VEHICLE, "c.tau_v * (c.v_0 - v_v)", "c.tau_v * c.v_0"),
+    Mutation((37, 39), _DYNAMICS, "switches.couple_sin * sin", "switches.couple_sin * sin * sin"),
+    Mutation((40, 45), _DYNAMICS, "c.tau_v * (c.v_0 - v_v)", "c.tau_v * c.v_0"),
     Mutation((41, 46, 47), _DYNAMICS, "F_v = s.k_contact * u", "F_v = s.k_truck * u"),
-    Mutation((45, 48), _VEHICLE, "return c.h - c.h * versin + c.g_x * sin", "return c.h - c.h * versin - c.g_x * sin"),
+    Mutation((45, 48), _DYNAMICS, "return c.h - c.h * versin + c.g_x * sin", "return c.h - c.h * versin - c.g_x * sin"),
     Mutation(
         (47,), _MODES, "if modes.touching or not readings.separation_released else 0.0", "if modes.touching else 0.0"
     ),
@@ -110,13 +107,13 @@ MUTATIONS = (
     ),
     Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
     Mutation((111,), _SECOND, "k_m=c.k_m * (k_2 / c.k_v)", "k_m=c.k_m"),
-    Mutation((111,), _VEHICLE, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
+    Mutation((111,), _DYNAMICS, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
     Mutation((111,), _STAGES, "(a_2 - w.a * v_2) * odd", "(a_2 + w.a * v_2) * odd"),
     Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),
-    Mutation((121,), _REMEMBERING, "F_n = behind - ahead", "F_n = -behind - ahead"),
-    Mutation((122,), _MEMORY, "= max(front, u - y)", "= max(front, u)"),
-    Mutation((122,), _MEMORY, "min(max(front, u - y), u + y)", "min(max(front, u), u + y)"),
-    Mutation((123,), _REMEMBERING, "work += soil.ultimate[n] * max(", "work += 0.5 * soil.ultimate[n] * max("),
-    Mutation((124,), _REMEMBERING, "(pressed * pressed - over * over)", "(pressed * pressed)"),
+    Mutation((121,), _PLASTIC, "F_n = behind - ahead", "F_n = -behind - ahead"),
+    Mutation((122,), _PLASTIC, "= max(front, u - y)", "= max(front, u)"),
+    Mutation((122,), _PLASTIC, "min(max(front, u - y), u + y)", "min(max(front, u), u + y)"),
+    Mutation((123,), _PLASTIC, "work += soil.ultimate[n] * max(", "work += 0.5 * soil.ultimate[n] * max("),
+    Mutation((124,), _PLASTIC, "(pressed * pressed - over * over)", "(pressed * pressed)"),
     Mutation((124,), _UNLOADING, "c.C_cos * abs(sin) + c.C_sin", "c.C_cos * abs(sin) - c.C_sin"),
 )

@@ -53,8 +53,8 @@ def changed(pattern: str, replacement: str) -> str:
         (r"`inertia`", "`inertness`", "unknown reading"),
         (
             r"^(\| 49 \|[^|]*\|[^|]*\|)[^|]*\|",
-            r"\1 `boulder_kernels.trigonometry.sine_versine` |",
-            "49: boulder_kernels.trigonometry.sine_versine do not mention it",
+            r"\1 `boulder_kernels.numerics.sine_versine` |",
+            "49: boulder_kernels.numerics.sine_versine do not mention it",
         ),
     ],
 )

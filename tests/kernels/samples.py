@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import itertools
 from math import exp, log, radians
+from typing import Any
 
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.dynamics import State
-from boulder_kernels.vehicle import contact_displacement, spring_compression
+from boulder_kernels.dynamics import State, contact_displacement, spring_compression
+from boulder_kernels.plastic import Memory, empty_memory
+from boulder_kernels.soil_laws import constants_in, profile_of
+from boulder_kernels.table import Impact, simulate_impact
 from tests import oracle
 
 BUMPER = 0.5  # height of the underside of the bumper [m]
@@ -130,3 +133,17 @@ def control(
 def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether two arrays of floats are equal bit for bit, NaN and the sign of zero included."""
     return a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
+def layered_constants(
+    design: bk.Design, layers: np.ndarray, readings: bk.Readings, elements: int, memory: Memory | None = None
+) -> Any:
+    """Constants of one design in layers of soil, by elements or, where there are none, exactly."""
+    return constants_in(design, readings, elements, profile_of(design, layers, elements, memory))
+
+
+def simulate_plastic(design: bk.Design, readings: bk.Readings, how: bk.Control, record: bk.Record) -> Impact:
+    """Simulate one impact in plastic soil."""
+    memory = empty_memory(how.elements, how.unloading == bk.PLASTIC_WITH_GAP, len(record.times))
+    problem = bk.Problem(design, profile_of(design, None, how.elements, memory), None)
+    return simulate_impact(problem, readings, how, record)

@@ -12,10 +12,9 @@ from boulder_kernels.after_step import enter_modes, keep_step, rate_of
 from boulder_kernels.dense_output import dense_output
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import State
-from boulder_kernels.events import SHORTEN
+from boulder_kernels.events import SHORTEN, change_mode
 from boulder_kernels.modes import Modes
 from boulder_kernels.outcomes import compression_at, no_maxima
-from boulder_kernels.transitions import change_mode
 
 from .samples import compression
 

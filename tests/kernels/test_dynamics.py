@@ -5,7 +5,14 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State, acceleration
+from boulder_kernels.dynamics import (
+    State,
+    acceleration,
+    couple_moment,
+    holding_moment,
+    signed_arm,
+)
+from boulder_kernels.events import initial_modes, mode_at_rest
 from boulder_kernels.modes import (
     FREE,
     HELD,
@@ -17,12 +24,6 @@ from boulder_kernels.modes import (
     Modes,
     switches_of,
 )
-from boulder_kernels.restoring import (
-    couple_moment,
-    holding_moment,
-    signed_arm,
-)
-from boulder_kernels.transitions import initial_modes, mode_at_rest
 from tests import oracle
 from tests.oracle.dynamics import Contact, Rotation, loads, rate
 from tests.oracle.events import first_modes, rest_modes

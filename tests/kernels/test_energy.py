@@ -12,10 +12,9 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State
+from boulder_kernels.dynamics import State, signed_arm
 from boulder_kernels.energy import exchange_rates, stored_energies
 from boulder_kernels.modes import FREE, TURNING_BACK, TURNING_FORWARD, Modes, switches_of
-from boulder_kernels.restoring import signed_arm
 from tests import oracle
 from tests.oracle.dynamics import Rotation, loads
 from tests.oracle.energy import ledger, path_rates
@@ -172,7 +171,8 @@ WRONG_SOILS = """
 import json
 import boulder_kernels as bk
 from boulder_kernels import dynamics
-from boulder_kernels.soil import Kinematics, Reaction, soil_reaction
+from boulder_kernels.soil import Kinematics, Reaction
+from boulder_kernels.soil_laws import soil_reaction
 from tests import oracle
 from tests.kernels.samples import design_of
 from tests.kernels.test_energy import audit, imbalance

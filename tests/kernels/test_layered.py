@@ -8,18 +8,12 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.layered import LayeredTable, layered_constants, uniform_layers
-from boulder_kernels.soil import (
-    closed_form,
-    drag_power,
-    soil_energy,
-    soil_potential,
-    soil_reaction,
-    uniform_drag_power,
-    uniform_potential,
-)
-from boulder_kernels.table import simulate_row, simulate_table
+from boulder_kernels.layered import LayeredTable, uniform_layers
+from boulder_kernels.soil import closed_form, uniform_drag_power, uniform_potential
+from boulder_kernels.soil_laws import drag_power, soil_energy, soil_potential, soil_reaction
+from boulder_kernels.table import problem_at, simulate_table
 from tests import oracle
+from tests.kernels.samples import layered_constants
 from tests.oracle.ground import ultimate_pressure
 from tests.oracle.inputs import Ground, Layer
 from tests.oracle.records import recorded_impact
@@ -155,7 +149,8 @@ def test_whole_impacts_in_one_layer() -> None:
 def test_whole_impact_is_that_of_the_oracle() -> None:
     design = design_of(LAYERED)
     layered = LayeredTable(*table_of([design]), layers_of(LAYERED)[None])
-    limit = simulate_row(layered, 0, READINGS, control(h=1e-3, horizon=0.4), bk.no_record())
+    how = control(h=1e-3, horizon=0.4)
+    limit = bk.simulate(problem_at(layered, 0, how), READINGS, how, bk.no_record())
     exact = recorded_impact(LAYERED, oracle.CORRECTED, elements=500, horizon=0.4, land_on_kinks=False, rtol=1e-8)
     assert limit.maxima.theta == pytest.approx(exact.max_rotation.value, rel=2e-4)
     assert limit.maxima.x_b == pytest.approx(exact.max_displacement.value, rel=2e-4)

@@ -12,8 +12,13 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import design_in
 from boulder_kernels.lane_events import begin_searches, keep_steps, search_on, start_steps
-from boulder_kernels.lane_starts import compute_constants, stand_still, take_over_first_steps
-from boulder_kernels.lane_steps import attempt_steps, take_over_steps
+from boulder_kernels.lane_steps import (
+    attempt_steps,
+    compute_constants,
+    stand_still,
+    take_over_first_steps,
+    take_over_steps,
+)
 from boulder_kernels.lanes import simulate_lanes
 from boulder_kernels.workspace import LANES, SIZE, WHOLE
 

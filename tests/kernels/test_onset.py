@@ -9,14 +9,13 @@ from boulder_kernels.after_step import RUNNING, enter_modes, initial_state, pass
 from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import Acceleration
-from boulder_kernels.events import AT_END, TOLERANCE
-from boulder_kernels.lane_starts import start_designs
+from boulder_kernels.events import AT_END, TOLERANCE, initial_modes
+from boulder_kernels.lane_steps import start_designs
 from boulder_kernels.lanes import start_again
-from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, layered_constants, uniform_layers
-from boulder_kernels.memory import remembering
+from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.modes import SEATED, TURNING_FORWARD
 from boulder_kernels.onset import BEHIND, first_length, onset_of
-from boulder_kernels.transitions import initial_modes
+from boulder_kernels.plastic import empty_memory
 from boulder_kernels.workspace import (
     CONSTANTS,
     EVENTS,
@@ -33,6 +32,7 @@ from boulder_kernels.workspace import (
     load,
 )
 from tests import oracle
+from tests.kernels.samples import layered_constants
 from tests.oracle import dynamics, events, restoring
 
 from .samples import control, design_of, inputs_of, random_designs, table_of
@@ -96,7 +96,7 @@ def test_a_step_to_the_onset_ends_just_behind_it() -> None:
 
 
 def test_the_onset_is_the_same_by_every_law_of_the_soil() -> None:
-    """In one layer, by elements, in soil that remembers, and with cohesion; in a softer layer it is another."""
+    """In one layer, by elements, in plastic soil, and with cohesion; in a softer layer it is another."""
     known = onset_of(constants_of(RWG, CORRECTED, 0))
     layers = uniform_layers(RWG)
     assert onset_of(layered_constants(RWG, layers, CORRECTED, 0)) == pytest.approx(known, rel=1e-9)
@@ -105,7 +105,8 @@ def test_the_onset_is_the_same_by_every_law_of_the_soil() -> None:
     assert onset_of(layered_constants(RWG, strong, CORRECTED, 0)) == pytest.approx(known, rel=1e-9)
     for elements in (200, 400):
         in_layers = layered_constants(RWG, layers, CORRECTED, elements)
-        for c in (constants_of(RWG, CORRECTED, elements), in_layers, remembering(in_layers, False)):
+        plastic = layered_constants(RWG, layers, CORRECTED, elements, empty_memory(elements, False))
+        for c in (constants_of(RWG, CORRECTED, elements), in_layers, plastic):
             assert onset_of(c) == pytest.approx(known, rel=20.0 / elements**2)
     soft = np.vstack([layers, layers])
     soft[0, TO], soft[0, SUBGRADE] = 0.5 * RWG.d, 0.01 * RWG.beta

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State, acceleration
+from boulder_kernels.dynamics import State, acceleration, signed_arm
 from boulder_kernels.gaps import CONTACT, CORNER, COUPLE, ROTATION
 from boulder_kernels.modes import (
     FREE,
@@ -18,7 +18,6 @@ from boulder_kernels.modes import (
     Modes,
     switches_of,
 )
-from boulder_kernels.restoring import signed_arm
 from tests import oracle
 from tests.oracle.dynamics import motion_of
 

@@ -11,7 +11,6 @@ from boulder_kernels.after_step import Kept
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import State
 from boulder_kernels.energy import stored_energies
-from boulder_kernels.impact import simulate_on_springs
 from boulder_kernels.modes import TURNING_FORWARD, Modes, switches_of
 from boulder_kernels.outcomes import compression_at, no_maxima
 from boulder_kernels.second_spring import (
@@ -38,7 +37,7 @@ READINGS = {"corrected": bk.corrected(), "as_printed": bk.as_printed()}
 
 
 def by_kernels(design: bk.Design, second: SecondSpring, readings: bk.Readings = CORRECTED) -> bk.Outcome:
-    return simulate_on_springs(design, readings, FINE, bk.no_record(), second)
+    return bk.simulate(bk.Problem(design, None, second), readings, FINE, bk.no_record())
 
 
 def by_oracle(design: bk.Design, second: SecondSpring, readings: bk.Readings = CORRECTED) -> Summary:
@@ -124,7 +123,7 @@ def test_a_located_kink_costs_no_order(s_2: float) -> None:
             np.full((n, 4), np.nan),
             np.zeros(n),
         )
-        simulate_on_springs(design, CORRECTED, control(h, 0.1), record, second)
+        bk.simulate(bk.Problem(design, None, second), CORRECTED, control(h, 0.1), record)
         assert record.offset[0] == 0.0 < record.offset[-1]
         return record.states[-1]
 
@@ -155,7 +154,7 @@ def test_rows_are_the_single_impacts() -> None:
     how = bk.Control(2e-3, 1.0, float(np.radians(20.0)), 0, False)
     out = bk.simulate_table(table_of(designs), CORRECTED, how, springs)
     for row, (design, second) in enumerate(zip(designs, seconds, strict=True)):
-        one = simulate_on_springs(design, CORRECTED, how, bk.no_record(), second)
+        one = bk.simulate(bk.Problem(design, None, second), CORRECTED, how, bk.no_record())
         assert (out.status[row], out.theta_max[row], out.crush_max[row]) == (
             one.status,
             one.maxima.theta,

@@ -10,6 +10,7 @@ import boulder_kernels as bk
 from boulder_kernels import Design, Status
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import State
+from boulder_kernels.numerics import sine_versine
 from boulder_kernels.outcomes import Maxima
 from boulder_kernels.settling import (
     NO_PROOF,
@@ -19,8 +20,7 @@ from boulder_kernels.settling import (
     energy_to_turn,
     proof_is_possible,
 )
-from boulder_kernels.soil import soil_potential
-from boulder_kernels.trigonometry import sine_versine
+from boulder_kernels.soil_laws import soil_potential
 from tests import oracle
 from tests.oracle.restoring import gravity_energy
 from tests.oracle.soil import Motion

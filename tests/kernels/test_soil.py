@@ -14,11 +14,10 @@ from boulder_kernels.soil import (
     closed_form,
     drag_force,
     element_sums,
-    soil_energy,
     soil_kinematics,
-    soil_reaction,
     spring_force,
 )
+from boulder_kernels.soil_laws import soil_energy, soil_reaction
 from tests import oracle
 from tests.oracle.soil import Motion, Soil, drag_forces, polar, spring_constants, stretch, ultimate_forces
 

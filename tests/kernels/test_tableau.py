@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import RK45
 
-from boulder_kernels import tableau
+from boulder_kernels import dormand_prince as tableau
 
 A = np.array(tableau.A)
 AA = np.array(tableau.AA)

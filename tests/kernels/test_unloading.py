@@ -17,13 +17,18 @@ import boulder_kernels as bk
 from boulder_kernels import unloading
 from boulder_kernels.dynamics import State
 from boulder_kernels.layered import SoilElements
-from boulder_kernels.memory import LAST, Memory, push
-from boulder_kernels.plastic import simulate_plastic
-from boulder_kernels.remembering_soil import potential_of_remembering, reaction_of_remembering, slider_energy
-from boulder_kernels.soil import soil_kinematics
-from boulder_kernels.soil_records import Kinematics, Reaction
+from boulder_kernels.plastic import (
+    LAST,
+    Memory,
+    potential_of_plastic_elements,
+    push,
+    reaction_of_plastic_elements,
+    slider_energy,
+)
+from boulder_kernels.soil import Kinematics, Reaction, soil_kinematics
 from boulder_kernels.unloading import rest_of
 from tests import oracle
+from tests.kernels.samples import simulate_plastic
 from tests.oracle.records import recorded_impact
 from tests.oracle.restoring import gravity_energy
 from tests.oracle.soil import Motion, Soil
@@ -55,7 +60,7 @@ def forces_along(path: list[float], gap: bool) -> list[float]:
     for u in path:
         plain(push)(0, u, 1.0, memory)
         k = Kinematics(A=u, slope_x=0.0, B=0.0, slope_v=0.0, q=1.0, lever_d=0.0)
-        found.append(-plain(reaction_of_remembering)(k, soil, memory).F)
+        found.append(-plain(reaction_of_plastic_elements)(k, soil, memory).F)
     return found
 
 
@@ -107,7 +112,7 @@ def test_sums_are_those_of_the_oracle_whatever_was_remembered(gap: bool) -> None
         slopes = [(line[-1] - line[0]) / per for line in (dx, v, lever)]
         starts = [line[0] - s * elements.ratio[0] for line, s in zip((dx, v, lever), slopes, strict=True)]
         k = Kinematics(starts[0], -slopes[0], starts[1], -slopes[1], starts[2], slopes[2])
-        found = plain(reaction_of_remembering)(k, elements, memory_of(N, gap)._replace(front=front, back=back))
+        found = plain(reaction_of_plastic_elements)(k, elements, memory_of(N, gap)._replace(front=front, back=back))
         assert pytest.approx(known.F, rel=1e-9, abs=1e-6 * elements.ultimate.sum()) == found.F
         assert pytest.approx(known.M, rel=1e-9, abs=1e-6 * elements.ultimate.sum()) == found.M
 
@@ -121,7 +126,7 @@ def test_no_way_takes_less_work_than_the_straight_one(gap: bool) -> None:
         for u in rng.normal(0.0, 2.0, 3):
             plain(push)(0, u, 1.0, memory)
         at, end = float(u), float(rng.normal())
-        needed = [plain(potential_of_remembering)(place, 0.0, soil, memory).V for place in (at, end)]
+        needed = [plain(potential_of_plastic_elements)(place, 0.0, soil, memory).V for place in (at, end)]
         work = 0.0
         for target in (*rng.normal(0.0, 2.0, rng.integers(0, 4)), end):
             fine = np.linspace(at, target, 101)
@@ -129,7 +134,7 @@ def test_no_way_takes_less_work_than_the_straight_one(gap: bool) -> None:
             for u in fine:
                 plain(push)(0, u, 1.0, memory)
                 k = Kinematics(u, 0.0, 0.0, 0.0, 1.0, 0.0)
-                forces.append(-plain(reaction_of_remembering)(k, soil, memory).F)
+                forces.append(-plain(reaction_of_plastic_elements)(k, soil, memory).F)
             work += sum(
                 0.5 * (a + b) * (v - u) for (a, b), (u, v) in zip(pairwise(forces), pairwise(fine), strict=True)
             )
@@ -145,15 +150,15 @@ def test_work_is_stored_or_taken_by_the_sliders(gap: bool) -> None:
         for u in np.linspace(at, target, 401)[1:]:
             taken += plain(push)(0, u, 1.0, memory)  # times 1 N
             k = Kinematics(u, 0.0, 0.0, 0.0, 1.0, 0.0)
-            now = -plain(reaction_of_remembering)(k, soil, memory).F
+            now = -plain(reaction_of_plastic_elements)(k, soil, memory).F
             work, at, force = work + 0.5 * (force + now) * (u - at), u, now
-        stored = plain(potential_of_remembering)(at, 0.0, soil, memory)
+        stored = plain(potential_of_plastic_elements)(at, 0.0, soil, memory)
         assert stored.V + taken == pytest.approx(work, abs=2e-3)
         assert pytest.approx(force, abs=1e-12) == stored.V_A
         assert plain(slider_energy)(k, soil, memory) == pytest.approx(0.0, abs=1e-12)
         pushed = memory.front[0] + 3.0  # 1 m by the spring, 2 m by the slider
         assert plain(slider_energy)(Kinematics(pushed, 0.0, 0.0, 0.0, 1.0, 0.0), soil, memory) == pytest.approx(2.0)
-        stored = plain(potential_of_remembering)(pushed, 0.0, soil, memory)
+        stored = plain(potential_of_plastic_elements)(pushed, 0.0, soil, memory)
         assert pytest.approx(2.5) == stored.V
 
 
@@ -215,7 +220,7 @@ def test_estimated_errors_cover_the_true_ones(law: int) -> None:
 
 
 def test_the_weight_is_lifted_to_where_the_boulder_rests(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(unloading, "least_remembering_energy", lambda slope_x, c: 1000.0 * slope_x)
+    monkeypatch.setattr(unloading, "least_plastic_energy", lambda slope_x, c: 1000.0 * slope_x)
     lumped = oracle.constants(oracle.RWG, oracle.CORRECTED, N)
     c = bk.constants_of(design_of(oracle.RWG), bk.corrected(), N)
     for theta in (-0.3, 0.0, 0.1, 0.5):
@@ -231,7 +236,7 @@ def test_the_place_of_rest_is_where_forces_balance() -> None:
     sin, versin = math.sin(found.theta_rest), 1.0 - math.cos(found.theta_rest)
 
     def reaction(x_b: float) -> Reaction:
-        return reaction_of_remembering(soil_kinematics(x_b, 0.0, 0.0, sin, versin, c), c.soil, c.memory)
+        return reaction_of_plastic_elements(soil_kinematics(x_b, 0.0, 0.0, sin, versin, c), c.soil, c.memory)
 
     x_b = brentq(lambda x: reaction(x).F, -1.0, 1.0, xtol=1e-14)
     weight = c.C_cos * math.cos(found.theta_rest) + c.C_sin * sin  # the couple that turns it back
@@ -265,7 +270,7 @@ def test_without_the_compiler_it_is_the_same() -> None:
     code = (
         "import numpy as np; from math import radians; import boulder_kernels as bk\n"
         "from tests import oracle; from tests.kernels.samples import design_of\n"
-        "from boulder_kernels.plastic import simulate_plastic\n"
+        "from tests.kernels.samples import simulate_plastic\n"
         "how = bk.Control(0.01, 0.5, radians(20.0), 6, False, unloading=2)\n"
         "found = simulate_plastic(design_of(oracle.RWG), bk.corrected(), how, bk.no_record())\n"
         "print(found.outcome.maxima.theta, found.theta_rest, found.doubt, found.swing_back)\n"

@@ -8,13 +8,14 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State, acceleration
-from boulder_kernels.modes import TURNING_FORWARD, Modes, switches_of
-from boulder_kernels.vehicle import (
+from boulder_kernels.dynamics import (
+    State,
+    acceleration,
     contact_displacement,
     contact_lever,
     spring_compression,
 )
+from boulder_kernels.modes import TURNING_FORWARD, Modes, switches_of
 from tests import oracle
 from tests.oracle.constants import impact_lever
 from tests.oracle.vehicle import crush_force, jerk

@@ -1,0 +1,221 @@
+"""The laws of the soil in one table: the functions that the motion asks of each, and which design gets which.
+
+A law is one `SoilLaw`. Which one holds follows from the type of the constants of a design: plain `Constants` are those
+of a uniform soil, others carry the record of their soil. Inside kernels the function is chosen when they are compiled,
+so a uniform soil has the code it would have if there were no other.
+
+To add a law: write its record and functions in a module beside `boulder_kernels.layered_soil`, and a line in `LAWS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+
+from ._jit import exact_inlined, function_of, kernel, unless_none
+from .design import Constants, Design, Readings, SoilMass, constants_of, constants_with
+from .layered import (
+    Bounds,
+    LayeredConstants,
+    SoilElements,
+    SoilLayers,
+    bounds_of_elements,
+    bounds_of_layers,
+    fill_elements,
+    fill_layers,
+    uniform_layers,
+)
+from .layered_soil import (
+    potential_of_elements,
+    potential_of_layers,
+    power_of_elements,
+    power_of_layers,
+    reaction_of_elements,
+    reaction_of_layers,
+)
+from .plastic import (
+    Memory,
+    PlasticConstants,
+    potential_of_plastic_elements,
+    power_of_plastic_elements,
+    reaction_of_plastic_elements,
+)
+from .soil import Kinematics, Potential, Reaction, uniform_drag_power, uniform_potential, uniform_reaction
+
+
+class SoilLaw(NamedTuple):
+    """A law of the soil; its functions take the records of the soil, those of a uniform soil its `Constants`."""
+
+    reaction: Callable[..., Reaction]
+    """Force and moment, of `Kinematics`."""
+    potential: Callable[..., Potential]
+    """Elastic energy and its slopes, convex in the displacement at the soil line and its decrease over the depth."""
+    drag_power: Callable[..., float]
+    """Power that the drag takes out of the motion [W], of `Kinematics`."""
+    fill: Callable[[Design, np.ndarray, Any], SoilMass] | None = None
+    """Works out the record from the layers of a design, and returns the soil lumped on the boulder."""
+    bounds: Callable[[Any], Bounds] | None = None
+    """Bounds of the soil as a whole: stiffness, drag and displacement at which all of it has yielded."""
+
+
+UNIFORM = SoilLaw(uniform_reaction, uniform_potential, uniform_drag_power)
+LAWS: dict[type, SoilLaw] = {
+    SoilElements: SoilLaw(
+        reaction_of_elements, potential_of_elements, power_of_elements, fill_elements, bounds_of_elements
+    ),
+    SoilLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers, fill_layers, bounds_of_layers),
+    Memory: SoilLaw(reaction_of_plastic_elements, potential_of_plastic_elements, power_of_plastic_elements),
+}
+"""The law of each record of a soil, the last of those that constants carry."""
+
+
+def type_of(record: Any) -> type:
+    """Return the type of a record, which may be a value or, inside kernels, its Numba type."""
+    kind: type = getattr(record, "instance_class", type(record))
+    return kind
+
+
+def records_of(c: Any) -> tuple[str, ...]:
+    """Names of the records of the soil that constants carry."""
+    carries = type_of(c) in (LayeredConstants, PlasticConstants)
+    return tuple(type_of(c)._fields[len(Constants._fields) :]) if carries else ()  # type: ignore[attr-defined]
+
+
+def law_of(c: Any) -> SoilLaw:
+    """Return the law of the soil of constants, or of the record of a soil."""
+    return LAWS.get(type_of(c[-1] if records_of(c) else c), UNIFORM)
+
+
+def by_law(field: str, *names: str) -> Callable[..., Any]:
+    """Return a function that calls that of the law of its last argument, for Python and for kernels.
+
+    Parameters
+    ----------
+    field
+        Field of `SoilLaw`.
+    names
+        Names of the arguments. The last is constants, whose records are passed on in their place, or a record.
+    """
+
+    def call(*arguments: Any) -> Any:
+        """Call the function of the law of these arguments."""
+        c = arguments[-1]
+        if type(c) is Constants:
+            return uniform(*arguments)
+        records = c[len(Constants._fields) :] if records_of(c) else (c,)
+        return getattr(law_of(c), field)(*arguments[:-1], *records)
+
+    def write_call(*arguments: Any) -> Callable[..., Any]:
+        """Return the call for arguments of these Numba types."""
+        records = [f"{names[-1]}.{record}" for record in records_of(arguments[-1])]
+        passed = ", ".join([*names[:-1], *(records or names[-1:])])
+        source = f"def {field}_by_law({', '.join(names)}):\n return of_law({passed})"
+        return function_of(source, of_law=getattr(law_of(arguments[-1]), field))
+
+    uniform = getattr(UNIFORM, field)
+    overload(call, inline="always", strict=False)(write_call)
+    return call
+
+
+soil_reaction = by_law("reaction", "k", "c")
+"""Force and moment of the soil at lines ``k`` of displacement, velocity and lever (Eqs 19, 20)."""
+soil_potential = by_law("potential", "A", "slope_x", "c")
+"""Elastic energy of the soil by the same representation as the forces, a convex function of both displacements [m]."""
+drag_power = by_law("drag_power", "k", "c")
+"""Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
+fill_soil = by_law("fill", "design", "layers", "soil")
+"""Work out a record from the layers of a design, shape (M, 6), and return the soil lumped on the boulder."""
+bounds_of = by_law("bounds", "soil")
+"""`Bounds` of a soil as a whole, by its record."""
+
+
+@kernel
+def soil_energy(k: Kinematics, c: Constants) -> float:
+    """Elastic energy stored in the springs of the soil [J], by the same representation as the forces."""
+    V: float = soil_potential(k.A, k.slope_x, c).V
+    return V
+
+
+class SoilProfile(NamedTuple):
+    """The soil of one design where it is not that of its `Design` all the way down, or not elastic."""
+
+    layers: np.ndarray
+    """Layers from the top down, shape (M, 6), see `boulder_kernels.layered`."""
+    soil: Any
+    """`SoilElements` or `SoilLayers`, worked out from the layers by whoever computes the constants."""
+    memory: Memory | None
+    """Memory of plastic elements; None for elastic soil."""
+
+
+def with_records(c: Constants, soil: Any, memory: Memory | None) -> Any:
+    """Return constants together with the records of their soil."""
+    return LayeredConstants(*c, soil) if memory is None else PlasticConstants(*c, soil, memory)
+
+
+@overload(with_records, inline="always", strict=False)
+def _with_records(c: Any, soil: Any, memory: Any) -> Callable[..., Any]:
+    values = ", ".join(f"c.{name}" for name in Constants._fields)
+    if hasattr(memory, "instance_class"):
+        source, record = f"def with_records(c, soil, memory):\n return Record({values}, soil, memory)", PlasticConstants
+    else:
+        source, record = f"def with_records(c, soil, memory):\n return Record({values}, soil)", LayeredConstants
+    return function_of(source, Record=record)
+
+
+@exact_inlined
+def constants_in_profile(design: Design, readings: Readings, elements: int, profile: SoilProfile) -> Any:
+    """Constants of the motion of one design in layers of soil, or in plastic soil; see `constants_in`."""
+    mass = fill_soil(design, profile.layers, profile.soil)
+    b = bounds_of(profile.soil)
+    c = constants_with(design, readings, b.elements, mass, b.K_soil, b.R_soil, b.x_yield)
+    return with_records(c, profile.soil, profile.memory)
+
+
+constants_in = unless_none(
+    "design readings elements profile",
+    constants_in_profile,
+    "constants_of(design, readings, elements)",
+    constants_of=constants_of,
+)
+"""Constants of the motion of one design in its soil.
+
+Parameters
+----------
+design
+    The design, SI; density, friction angle and subgrade reaction of a soil in layers are those of the layers.
+readings
+    Which formulas are read as printed.
+elements
+    Number N of elements of a uniform soil, or 0 for the closed form.
+profile
+    Its `SoilProfile`, whose records the constants keep; None for the uniform elastic soil of the design.
+
+Returns
+-------
+Constants, LayeredConstants or PlasticConstants
+    Non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
+"""
+
+
+def empty_soil(layers: int, elements: int) -> SoilLayers | SoilElements:
+    """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact."""
+    if elements > 0:
+        return SoilElements(*np.empty((4, elements)))
+    return SoilLayers(*np.empty((5, layers)))
+
+
+def profile_of(
+    design: Design, layers: np.ndarray | None, elements: int, memory: Memory | None = None
+) -> SoilProfile | None:
+    """Return the soil of a design in layers, by N elements or, where N is 0, exactly.
+
+    Without layers it is the uniform soil of the design: None where it is elastic, else its only layer.
+    """
+    if layers is None:
+        if memory is None:
+            return None
+        layers = uniform_layers(design)
+    return SoilProfile(layers, empty_soil(len(layers), elements), memory)
