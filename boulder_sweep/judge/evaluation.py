@@ -18,8 +18,8 @@ from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Second
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import ERROR, PASS, Judged, joined, not_computed, with_rows
-from boulder_sweep.judge.refinement import AGREEING, FACTOR, agree, finer_controls, is_late, is_open, reported_step_s
+from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
+from boulder_sweep.judge.refinement import RowStates, finer_controls, reported_step_s, rows_of
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 from boulder_sweep.soils import with_soil
@@ -133,43 +133,25 @@ class Evaluation:
         then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         """
-        found, outcomes = self._once(designs, self.control)
-        steps_s = np.full(designs.size, reported_step_s(self.control))
-        wanting = AGREEING * is_late(found, outcomes, self.control)
-        compared_h = np.full(designs.size, self.control.h)
-        given_up = np.zeros(designs.size, dtype=bool)
+        rows = RowStates(designs, self.control, *self._once(designs, self.control))
         for control in finer_controls(self.control):
-            # The last resort begins with longer steps than the usual ones end with.
-            is_finer = control.h <= FACTOR * compared_h
-            again = np.flatnonzero((is_open(found, control) & ~given_up) | ((wanting > 0) & is_finer))
-            if not len(again):
-                if not wanting.any():
-                    break
-                continue
-            some = designs.rows(again)
-            finer, solution = self._once(some, control)
-            given_up[again] = control.last_resort & (finer.verdict == ERROR)
-            confirmed = (wanting[again] > 0) & (finer.verdict == found.verdict[again])
-            confirmed &= agree(_rows_of(outcomes, again), solution, some.table.v_0)
-            wanting[again[confirmed]] -= 1
-            taken = (finer.verdict != ERROR) & ~confirmed
-            compared_h[again[taken | confirmed]] = control.h
-            places = again[taken]
-            wanting[places] = AGREEING * is_late(finer, solution, control)[taken]
-            found = with_rows(found, places, finer.rows(taken))
-            steps_s[places] = reported_step_s(control)
-            for values, new in zip(outcomes, solution, strict=True):
-                values[places] = new[taken]
-        if wanting.any():
-            found = self._doubted(found, np.flatnonzero(wanting), designs, outcomes, steps_s)
-        found = joined([found])
-        return self._margins_proved(found, designs) if self.least_margin > 0.0 else found
+            again = rows.wanted(control)
+            if len(again):
+                rows.update(again, control, *self._once(designs.rows(again), control))
+            elif not rows.unconfirmed.any():
+                break
+        judged = rows.judged
+        if rows.unconfirmed.any():
+            doubted = np.flatnonzero(rows.unconfirmed)
+            judged = self._doubted(judged, doubted, designs, rows.outcomes, rows.reported_s)
+        judged = joined([judged])
+        return self._margins_proved(judged, designs) if self.least_margin > 0.0 else judged
 
-    def _margins_proved(self, found: Judged, designs: Designs) -> Judged:
+    def _margins_proved(self, judged: Judged, designs: Designs) -> Judged:
         """Put margins that are not proved to last just below the one asked for; see `judged`."""
-        there = np.flatnonzero((found.verdict == PASS) & (found["margin"] >= self.least_margin))
+        there = np.flatnonzero((judged.verdict == PASS) & (judged["margin"] >= self.least_margin))
         if not len(there):
-            return found
+            return judged
         left = 1.0 - self.least_margin
         reduced = replace(
             self,
@@ -178,9 +160,9 @@ class Evaluation:
             only=("verdict", "reason"),
             least_margin=0.0,
         )
-        margin = found["margin"].copy()
+        margin = judged["margin"].copy()
         margin[there[reduced.judged(designs.rows(there)).verdict != PASS]] = np.nextafter(self.least_margin, 0.0)
-        return replace(found, columns=found.columns | {"margin": margin})
+        return replace(judged, columns=judged.columns | {"margin": margin})
 
     def _once(self, designs: Designs, control: Control) -> tuple[Judged, OutcomeTable]:
         """Simulate and judge designs once."""
@@ -188,12 +170,12 @@ class Evaluation:
         return judge(outcomes, designs, self.limits, reported_step_s(control), self.only), outcomes
 
     def _doubted(
-        self, found: Judged, places: np.ndarray, designs: Designs, outcomes: OutcomeTable, steps_s: np.ndarray
+        self, judged: Judged, places: np.ndarray, designs: Designs, outcomes: OutcomeTable, steps_s: np.ndarray
     ) -> Judged:
         """Judge late rows, on which no two solutions agree, as of unknown error."""
         unknown = np.full(len(places), np.inf)
-        doubted = _rows_of(outcomes, places)._replace(theta_error=unknown, x_error=unknown)
-        return with_rows(found, places, judge(doubted, designs.rows(places), self.limits, steps_s[places], self.only))
+        doubted = rows_of(outcomes, places)._replace(theta_error=unknown, x_error=unknown)
+        return with_rows(judged, places, judge(doubted, designs.rows(places), self.limits, steps_s[places], self.only))
 
     @property
     def columns(self) -> tuple[OutcomeColumn, ...]:
@@ -243,11 +225,6 @@ _warm_ups_s: list[float] = []
 def warm_up_s() -> float | None:
     """Return how long the last warm-up of this process took [s]; None where there was none."""
     return _warm_ups_s[-1] if _warm_ups_s else None
-
-
-def _rows_of(outcomes: OutcomeTable, places: np.ndarray) -> OutcomeTable:
-    """Return some rows of outcomes."""
-    return type(outcomes)(*(values[places] for values in outcomes))
 
 
 def evaluation_of(

@@ -19,7 +19,8 @@ import numpy as np
 from boulder_kernels import ELASTIC, Control, OutcomeTable, Status
 from boulder_sweep.columns import REASONS
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, finer_step_s
-from boulder_sweep.judge.judged import NUMERICAL_ERROR, OVERTURNS, PASS, Judged
+from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, OVERTURNS, PASS, Judged, with_rows
 from boulder_sweep.judge.verdict import STEP_REASONS
 
 FACTOR = 0.25
@@ -77,7 +78,7 @@ def is_open(judged: Judged, control: Control) -> np.ndarray:
 def is_late(judged: Judged, outcomes: OutcomeTable, control: Control) -> np.ndarray:
     """Return which rows need another solution to agree with them before they pass or overturn (bool, shape (n,)).
 
-    None where no error is estimated: such verdicts are unguarded. None either in soil that stays pressed, where every
+    None where no error is estimated: such verdicts are unguarded. None either in plastic soil, where every
     motion goes on until it rests, and loses its energy to the soil instead of rocking.
     """
     if not control.error_estimate or control.unloading != ELASTIC:
@@ -101,3 +102,64 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: np.ndarray) -> np.ndarr
     in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= np.maximum(coarse.x_error, SAME_WAY)
     in_angle = np.abs(coarse.theta_max - fine.theta_max) <= np.maximum(coarse.theta_error, SAME_ANGLE)
     return alike & np.isfinite(fine.x_error) & np.where(limit, in_time, in_angle)
+
+
+def rows_of(outcomes: OutcomeTable, rows: np.ndarray) -> OutcomeTable:
+    """Return some rows of outcomes."""
+    return type(outcomes)(*(values[rows] for values in outcomes))
+
+
+class RowStates:
+    """How far the rows of a block are decided, while some are simulated again by finer steps.
+
+    Attributes
+    ----------
+    judged : Judged
+        The rows as judged by the solution that counts so far.
+    outcomes : OutcomeTable
+        That solution, written in place.
+    reported_s : ndarray
+        Its step [s], shape (n,).
+    unconfirmed : ndarray
+        Number of further solutions that must agree with it before a late row counts, shape (n,).
+    """
+
+    def __init__(self, designs: Designs, control: Control, judged: Judged, outcomes: OutcomeTable) -> None:
+        n = designs.size
+        self._v_0 = designs.table.v_0
+        self.judged, self.outcomes = judged, outcomes
+        self.reported_s = np.full(n, reported_step_s(control))
+        self.unconfirmed = AGREEING * is_late(judged, outcomes, control)
+        # Step of the last solution compared or taken over [s], and rows that the last resort has refused.
+        self._compared_s, self._given_up = np.full(n, control.h), np.zeros(n, dtype=bool)
+
+    def wanted(self, control: Control) -> np.ndarray:
+        """Return the numbers of the rows that a solution by some control may decide or confirm."""
+        # The last resort begins with longer steps than the usual ones end with.
+        is_finer = control.h <= FACTOR * self._compared_s
+        may_decide = is_open(self.judged, control) & ~self._given_up
+        return np.flatnonzero(may_decide | ((self.unconfirmed > 0) & is_finer))
+
+    def update(self, rows: np.ndarray, control: Control, judged: Judged, outcomes: OutcomeTable) -> None:
+        """Compare a finer solution of some rows with what counts so far: it confirms it, or takes its place.
+
+        Parameters
+        ----------
+        rows
+            Numbers of the rows.
+        control, judged, outcomes
+            How they were simulated, and what came out, in the order of `rows`. What cannot be computed changes nothing.
+        """
+        failed = judged.verdict == ERROR
+        self._given_up[rows] = control.last_resort & failed
+        confirmed = (self.unconfirmed[rows] > 0) & (judged.verdict == self.judged.verdict[rows])
+        confirmed &= agree(rows_of(self.outcomes, rows), outcomes, self._v_0[rows])
+        self.unconfirmed[rows[confirmed]] -= 1
+        better = ~failed & ~confirmed
+        self._compared_s[rows[better | confirmed]] = control.h
+        replaced = rows[better]
+        self.unconfirmed[replaced] = AGREEING * is_late(judged, outcomes, control)[better]
+        self.judged = with_rows(self.judged, replaced, judged.rows(better))
+        self.reported_s[replaced] = reported_step_s(control)
+        for values, new in zip(self.outcomes, outcomes, strict=True):
+            values[replaced] = new[better]

@@ -31,7 +31,7 @@ from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, PARTS
 from boulder_sweep.report.rows import SIZES, Rows, Thinned, label_of
-from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.fields import BY_NAME, fields_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
 from boulder_sweep.settings.notes import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
@@ -257,9 +257,9 @@ def _yaml(settings: Mapping[str, Any]) -> list[str]:
         readings = "{" + ", ".join(f"{name}: {value}" for name, value in model["readings"].items()) + "}"
     asked = solver["accuracy"] or (f"{solver['accuracy_deg']} deg" if solver["accuracy_deg"] is not None else None)
     accuracy = f"step: {solver['step_s']} s" if asked is None else f"accuracy: {asked}"
+    limits = [f"{entry.key}: {criterion[entry.name]} {entry.unit}".rstrip() for entry in fields_of("criterion")]
     return [
-        f"criterion: {{max_rotation: {criterion['max_rotation_deg']} deg, rating: {criterion['rating']}, "
-        f"min_overlap: {criterion['min_overlap_m']} m}}",
+        f"criterion: {{{', '.join(limits)}}}",
         f"model: {{readings: {readings}, soil: {soil}, resistance: {model.get('resistance', RESISTANCES[0])}, "
         f"unloading: {model.get('unloading', UNLOADINGS[0])}}}",
         f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",

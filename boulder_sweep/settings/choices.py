@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.fields import BY_NAME, LAYER_TOP, MAX_ELEMENTS, Field
 from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
 from boulder_sweep.settings.model import (
@@ -13,9 +12,7 @@ from boulder_sweep.settings.model import (
     CLOSED_FORM,
     PRESETS,
     PRINTED,
-    RESISTANCES,
     SWITCHES,
-    UNLOADINGS,
     Layer,
     ReadingChoice,
 )
@@ -97,6 +94,8 @@ def read_setting(node: Node, field: Field) -> Any:
     LeafError
         With every mistake of this entry.
     """
+    if field.choices:
+        return _one_of(node, field.choices, field.kind)
     reader = _READERS.get(field.name)
     return read_single(node, field) if reader is None else reader(node)
 
@@ -116,10 +115,6 @@ def _one_of(node: Node, choices: tuple[str, ...], what: str) -> str:
         if word.lower() == choice.lower():
             return choice
     raise _wrong(node, f"{_shown(node)} is not {what}: {', '.join(choices)}{did_you_mean(word, choices)}")
-
-
-def _read_rating(node: Node) -> str:
-    return _one_of(node, RATINGS, "a penetration rating")
 
 
 def _read_readings(node: Node) -> ReadingChoice:
@@ -160,14 +155,6 @@ def _read_soil(node: Node) -> int:
     raise _wrong(node, f"{_shown(node)} is not a representation of the soil: closed_form, or {{elements: 5000}}")
 
 
-def _read_resistance(node: Node) -> str:
-    return _one_of(node, RESISTANCES, "a law of the soil's resistance")
-
-
-def _read_unloading(node: Node) -> str:
-    return _one_of(node, UNLOADINGS, "a way in which the soil unloads")
-
-
 def _read_accuracy(node: Node) -> str | float:
     """Read a name, or the error of the rotation that is admitted."""
     field = BY_NAME["accuracy"]
@@ -185,11 +172,8 @@ def _read_accuracy(node: Node) -> str | float:
 
 
 _READERS: dict[str, Callable[[Node], Any]] = {
-    "rating": _read_rating,
     "readings": _read_readings,
     "soil_elements": _read_soil,
-    "resistance": _read_resistance,
-    "unloading": _read_unloading,
     "layers": read_layers,
     "accuracy": _read_accuracy,
 }

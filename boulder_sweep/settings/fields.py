@@ -1,7 +1,8 @@
 """Every entry of a settings file in one register: key, unit, admitted and usual values, default.
 
-The reader, the checks, the tables of the documentation and the JSON Schema for editors follow from it. Name, unit
-and meaning of an input that is a column of the result come from the register of columns.
+Inputs are declared here, settings on the attributes of the dataclasses of `boulder_sweep.settings.model`. The reader,
+the checks, the tables of the documentation and the JSON Schema for editors follow from both. Name, unit and meaning of
+an input that is a column of the result come from the register of columns.
 
 The admitted range is wide: at least a million times either side of what is normal wherever a material or
 mechanical constant is concerned. A value beyond it is a typing mistake and refused. A value outside the usual range
@@ -10,71 +11,16 @@ is computed as given, with a note.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
-
 from boulder_sweep import columns
-
-
-class Bound(NamedTuple):
-    """Smallest and largest value admitted, ends included, and why there is an end."""
-
-    low: float
-    high: float
-    reason: str
-
-
-class Usual(NamedTuple):
-    """Range met in practice, and what to think of when a value lies outside."""
-
-    low: float
-    high: float
-    remark: str
-
-
-@dataclass(frozen=True, slots=True)
-class Field:
-    """One entry of the file.
-
-    Attributes
-    ----------
-    section, key : str
-        Where it stands in the file: ``section: {key: ...}``.
-    name : str
-        Its column in the table; for other inputs the name of the axis, for settings the attribute of `Criterion`,
-        `Model`, `SolverSettings` or `Sweep` that holds it.
-    unit : str
-        Unit of a bare number, and of the column; empty for words.
-    meaning : str
-        What it is, in one line.
-    admitted : Bound or None
-        Values that are accepted; None for words.
-    usual : Usual or None
-        Values met in practice.
-    default : float or None
-        Value of an input that the file does not give; None where there is none. (Settings have the defaults of their
-        dataclasses.)
-    also : tuple of str
-        Other words people try, for "did you mean".
-    optional : bool
-        Whether a file may be complete without it.
-    """
-
-    section: str
-    key: str
-    name: str
-    unit: str
-    meaning: str
-    admitted: Bound | None = None
-    usual: Usual | None = None
-    default: float | None = None
-    also: tuple[str, ...] = ()
-    optional: bool = False
-
-    @property
-    def path(self) -> str:
-        """Dotted key."""
-        return f"{self.section}.{self.key}"
+from boulder_sweep.settings.model import (
+    Bound,
+    Criterion,
+    Field,
+    Model,
+    SolverSettings,
+    Usual,
+    entries_of,
+)
 
 
 def _input(
@@ -240,7 +186,7 @@ INPUTS: tuple[Field, ...] = (
 )
 """What describes a design: each entry may be an axis of the grid."""
 
-SETTINGS: tuple[Field, ...] = (
+_OF_FILES = (
     Field(
         "soil",
         "correlation",
@@ -248,34 +194,6 @@ SETTINGS: tuple[Field, ...] = (
         "1",
         "correlation of friction angle and subgrade reaction, where both have a distribution",
         Bound(-0.99, 0.99, "the correlation of two different soil properties"),
-    ),
-    Field("soil", "layers", "layers", "", "layers below the uppermost, which the other entries describe"),
-    Field(
-        "soil",
-        "cohesion",
-        "cohesion_kPa",
-        "kPa",
-        "effective cohesion of the uppermost layer",
-        Bound(0.0, 1000.0, "more is rock"),
-        also=("c", "c'"),
-    ),
-    Field(
-        "soil",
-        "water_table",
-        "water_table_m",
-        "m",
-        "depth of the water table below the soil line; densities below it are those of the saturated soil",
-        Bound(0.0, 1000.0, "counted downwards from the soil line"),
-        also=("water", "ground_water", "groundwater", "water_level"),
-    ),
-    Field(
-        "soil",
-        "slope",
-        "slope_deg",
-        "deg",
-        "angle at which the ground falls away behind the boulder",
-        Bound(0.0, 60.0, "less than the friction angle, or the ground does not stand"),
-        also=("ground_slope", "inclination"),
     ),
     Field(
         "partial_factor",
@@ -285,73 +203,19 @@ SETTINGS: tuple[Field, ...] = (
         "divides the tangent of every friction angle",
         Bound(1.0, 5.0, "1.25 is usual"),
     ),
-    Field(
-        "criterion",
-        "max_rotation",
-        "max_rotation_deg",
-        "deg",
-        "rotation at which the boulder counts as overturned",
-        Bound(0.01, 90.0, "the model holds up to about 20 deg"),
-        Usual(1.0, 20.0, "beyond 20 deg the model no longer holds and a truck may ramp up"),
-    ),
-    Field("criterion", "rating", "rating", "", "penetration rating required"),
-    Field(
-        "criterion",
-        "min_overlap",
-        "min_overlap_m",
-        "m",
-        "least height of the boulder's top over the underside of the bumper; with less the truck may ride over",
-        Bound(0.0, 20.0, "counted upwards from the underside of the bumper"),
-        also=("overlap", "engagement"),
-    ),
-    Field(
-        "vehicle",
-        "calibrated_crush",
-        "calibrated_crush_m",
-        "m",
-        "crush up to which spring and damper describe the vehicle's front; a row is flagged where the vehicle drives "
-        "on by more, counted from the boulder",
-        Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
-        also=("crush", "max_crush"),
-    ),
-    Field("model", "readings", "readings", "", "how the misprinted equations of the paper are read"),
-    Field("model", "soil", "soil_elements", "", "closed form of the soil, or a number of soil elements"),
-    Field("model", "resistance", "resistance", "", "law of the ultimate resistance of the soil"),
-    Field("model", "unloading", "unloading", "", "whether the soil springs back, and whether a gap opens"),
-    Field(
-        "solver",
-        "accuracy",
-        "accuracy",
-        "deg",
-        "named accuracy, or the error of the rotation that is admitted",
-        Bound(1e-9, 10.0, "error of the rotation that is admitted"),
-    ),
-    Field(
-        "solver",
-        "step",
-        "step_s",
-        "s",
-        "time step in place of an accuracy; no error is estimated",
-        Bound(1e-7, 1.0, "a step of some milliseconds is usual"),
-    ),
-    Field(
-        "solver",
-        "horizon",
-        "horizon_s",
-        "s",
-        "how long an impact is simulated",
-        Bound(1e-4, 100.0, "an impact is over within a second or so"),
-    ),
+)
+"""Settings that change what the inputs say, and belong to no part of `boulder_sweep.settings.model`."""
+_IN_ORDER = ("soil", "partial_factor", "criterion", "vehicle", "model", "solver")
+SETTINGS: tuple[Field, ...] = tuple(
+    sorted(
+        (*_OF_FILES, *(entry for part in (Criterion, Model, SolverSettings) for entry in entries_of(part))),
+        key=lambda entry: _IN_ORDER.index(entry.section),
+    )
 )
 """What holds for all designs of a file: one value each."""
 
 LAYER_TOP = Field(
-    "soil.layers",
-    "from",
-    "from_m",
-    "m",
-    "depth of the layer's upper boundary",
-    Bound(1e-6, 20.0, "a depth"),
+    "soil.layers", "from", "from_m", "m", "depth of the layer's upper boundary", Bound(1e-6, 20.0, "a depth")
 )
 """The entry of a layer that no other has; the rest of it are entries of the soil."""
 

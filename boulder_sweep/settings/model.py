@@ -1,9 +1,14 @@
-"""The settings that are not columns: criterion, reading of the paper, soil representation, solver."""
+"""The settings that are not columns, each declared once: criterion, reading of the paper, soil, solver.
+
+What an attribute declares with `setting` is read, checked and documented by that; see `boulder_sweep.settings.fields`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
-from typing import Any
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
+from typing import Any, NamedTuple
+
+from boulder_sweep.columns import RATINGS
 
 PRESETS = ("as_printed", "corrected")
 
@@ -27,27 +32,124 @@ RESISTANCES = ("kp_squared", "broms", "width_capped")
 
 UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
 """How the soil unloads, in the order of the kernels; the first is the paper's."""
-REMEMBERING_ELEMENTS = 200
-"""Soil elements where the soil remembers and no number is given."""
+PLASTIC_ELEMENTS = 200
+"""Soil elements where the soil is plastic and no number is given."""
+
+
+class Bound(NamedTuple):
+    """Smallest and largest value admitted, ends included, and why there is an end."""
+
+    low: float
+    high: float
+    reason: str
+
+
+class Usual(NamedTuple):
+    """Range met in practice, and what to think of when a value lies outside."""
+
+    low: float
+    high: float
+    remark: str
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One entry of the file.
+
+    Attributes
+    ----------
+    section, key : str
+        Where it stands in the file: ``section: {key: ...}``.
+    name : str
+        Its column in the table; for other inputs the name of the axis, for settings the attribute of `Criterion`,
+        `Model`, `SolverSettings` or `Sweep` that holds it.
+    unit : str
+        Unit of a bare number, and of the column; empty for words.
+    meaning : str
+        What it is, in one line.
+    admitted : Bound or None
+        Values that are accepted; None for words.
+    usual : Usual or None
+        Values met in practice.
+    default : float or None
+        Value of an input that the file does not give; None where there is none. (Settings have the defaults of the
+        attributes that declare them.)
+    also : tuple of str
+        Other words people try, for "did you mean".
+    optional : bool
+        Whether a file may be complete without it.
+    choices : tuple of str
+        Words of which it is one; none where it is not such a word.
+    kind : str
+        What such a word is, as in "P9 is not a penetration rating".
+    """
+
+    section: str
+    key: str
+    name: str
+    unit: str
+    meaning: str
+    admitted: Bound | None = None
+    usual: Usual | None = None
+    default: float | None = None
+    also: tuple[str, ...] = ()
+    optional: bool = False
+    choices: tuple[str, ...] = ()
+    kind: str = ""
+
+    @property
+    def path(self) -> str:
+        """Dotted key."""
+        return f"{self.section}.{self.key}"
+
+
+def setting(path: str, unit: str, meaning: str, default: Any = MISSING, **more: Any) -> Any:
+    """Declare an attribute of a dataclass as an entry of the file.
+
+    Parameters
+    ----------
+    path : str
+        Dotted key.
+    unit, meaning
+        As of `Field`.
+    default
+        Value where the file does not give the entry; none where it must.
+    more
+        Further attributes of `Field`.
+    """
+    section, _, key = path.rpartition(".")
+    return field(default=default, metadata={"entry": Field(section, key, "", unit, meaning, **more)})
+
+
+def entries_of(part: type[Any]) -> list[Field]:
+    """Return the entries that the attributes of a dataclass declare, in their order."""
+    declared = ((attribute.name, attribute.metadata.get("entry")) for attribute in fields(part))
+    return [replace(entry, name=name) for name, entry in declared if entry is not None]
 
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """What a design must hold.
+    """What a design must hold."""
 
-    Attributes
-    ----------
-    max_rotation_deg : float
-        Rotation at which the boulder counts as overturned [deg].
-    rating : str
-        Penetration rating required: P1, P2 or P3.
-    min_overlap_m : float
-        Least height of the boulder's top over the underside of the bumper [m].
-    """
-
-    max_rotation_deg: float = 20.0
-    rating: str = "P1"
-    min_overlap_m: float = 0.25
+    max_rotation_deg: float = setting(
+        "criterion.max_rotation",
+        "deg",
+        "rotation at which the boulder counts as overturned",
+        20.0,
+        admitted=Bound(0.01, 90.0, "the model holds up to about 20 deg"),
+        usual=Usual(1.0, 20.0, "beyond 20 deg the model no longer holds and a truck may ramp up"),
+    )
+    rating: str = setting(
+        "criterion.rating", "", "penetration rating required", "P1", choices=RATINGS, kind="a penetration rating"
+    )
+    min_overlap_m: float = setting(
+        "criterion.min_overlap",
+        "m",
+        "least height of the boulder's top over the underside of the bumper; with less the truck may ride over",
+        0.25,
+        admitted=Bound(0.0, 20.0, "counted upwards from the underside of the bumper"),
+        also=("overlap", "engagement"),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +193,7 @@ class ReadingChoice:
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One layer of soil below the uppermost, down to the next.
-
-    Attributes
-    ----------
-    from_m : float
-        Depth of its upper boundary below the soil line [m].
-    density_kg_m3, friction_angle_deg, subgrade_reaction_MN_m3, cohesion_kPa : float
-        Its soil.
-    """
+    """One layer of soil below the uppermost, down to the next; `from_m` is the depth of its upper boundary."""
 
     from_m: float
     density_kg_m3: float
@@ -131,7 +225,7 @@ class Ground:
 
     @property
     def is_usual(self) -> bool:
-        """Whether there is nothing of it."""
+        """Whether the ground is dry, level, uniform and cohesionless."""
         return self == Ground()
 
     @property
@@ -157,7 +251,7 @@ class Ground:
 
     def fields(self) -> dict[str, Any]:
         """Return everything by name, the layers as they are."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {attribute.name: getattr(self, attribute.name) for attribute in fields(self)}
 
     @classmethod
     def of_dict(cls, given: dict[str, Any]) -> Ground:
@@ -169,37 +263,72 @@ class Ground:
 class Model:
     """Which reading of the paper and which representation of the soil.
 
-    Attributes
-    ----------
-    readings : ReadingChoice
-        The five readings.
-    soil_elements : int
-        Number of soil elements; 0 means the closed form, the limit of infinitely many.
-    calibrated_crush_m : float
-        Crush up to which spring and damper describe the vehicle's front [m].
-    resistance : str
-        Law of the ultimate resistance of the soil, one of `RESISTANCES`.
-    unloading : str
-        How the soil unloads, one of `UNLOADINGS`.
-    layers, cohesion_kPa, water_table_m, slope_deg
-        As of `Ground`.
+    The soil is what the inputs say; what it has beyond them is gathered in `Ground`.
     """
 
-    readings: ReadingChoice = ReadingChoice()
-    soil_elements: int = 0
-    calibrated_crush_m: float = 1.0
-    resistance: str = RESISTANCES[0]
-    unloading: str = UNLOADINGS[0]
-    layers: tuple[Layer, ...] = ()
-    cohesion_kPa: float = 0.0
-    water_table_m: float | None = None
-    slope_deg: float = 0.0
+    readings: ReadingChoice = setting(
+        "model.readings", "", "how the misprinted equations of the paper are read", ReadingChoice()
+    )
+    soil_elements: int = setting("model.soil", "", "closed form of the soil, or a number of soil elements", 0)
+    """0 means the closed form, the limit of infinitely many."""
+    calibrated_crush_m: float = setting(
+        "vehicle.calibrated_crush",
+        "m",
+        "crush up to which spring and damper describe the vehicle's front; a row is flagged where the vehicle drives "
+        "on by more, counted from the boulder",
+        1.0,
+        admitted=Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
+        also=("crush", "max_crush"),
+    )
+    resistance: str = setting(
+        "model.resistance",
+        "",
+        "law of the ultimate resistance of the soil",
+        RESISTANCES[0],
+        choices=RESISTANCES,
+        kind="a law of the soil's resistance",
+    )
+    unloading: str = setting(
+        "model.unloading",
+        "",
+        "whether the soil springs back, and whether a gap opens",
+        UNLOADINGS[0],
+        choices=UNLOADINGS,
+        kind="a way in which the soil unloads",
+    )
+    layers: tuple[Layer, ...] = setting(
+        "soil.layers", "", "layers below the uppermost, which the other entries describe", ()
+    )
+    cohesion_kPa: float = setting(
+        "soil.cohesion",
+        "kPa",
+        "effective cohesion of the uppermost layer",
+        0.0,
+        admitted=Bound(0.0, 1000.0, "more is rock"),
+        also=("c", "c'"),
+    )
+    water_table_m: float | None = setting(
+        "soil.water_table",
+        "m",
+        "depth of the water table below the soil line; densities below it are those of the saturated soil",
+        None,
+        admitted=Bound(0.0, 1000.0, "counted downwards from the soil line"),
+        also=("water", "ground_water", "groundwater", "water_level"),
+    )
+    slope_deg: float = setting(
+        "soil.slope",
+        "deg",
+        "angle at which the ground falls away behind the boulder",
+        0.0,
+        admitted=Bound(0.0, 60.0, "less than the friction angle, or the ground does not stand"),
+        also=("ground_slope", "inclination"),
+    )
 
     @property
     def elements(self) -> int:
-        """Number of soil elements that is computed with; 0 for the closed form, which soil that remembers has not."""
-        remembers = self.unloading != UNLOADINGS[0]
-        return REMEMBERING_ELEMENTS if remembers and self.soil_elements == 0 else self.soil_elements
+        """Number of soil elements that is computed with; 0 for the closed form, which plastic soil does not have."""
+        is_plastic = self.unloading != UNLOADINGS[0]
+        return PLASTIC_ELEMENTS if is_plastic and self.soil_elements == 0 else self.soil_elements
 
     @property
     def ground(self) -> Ground:
@@ -225,19 +354,26 @@ def completed(settings: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class SolverSettings:
-    """How finely and how long a design is simulated.
+    """How finely and how long a design is simulated: by an accuracy, or by a step where that is None."""
 
-    Attributes
-    ----------
-    accuracy : str, float or None
-        ``fast``, ``balanced``, ``fine``, or the admitted error of the rotation [deg];
-        None where a step is given.
-    step_s : float or None
-        Step [s]; None where an accuracy is given.
-    horizon_s : float
-        Longest time simulated [s].
-    """
-
-    accuracy: str | float | None = "balanced"
-    step_s: float | None = None
-    horizon_s: float = 1.0
+    accuracy: str | float | None = setting(
+        "solver.accuracy",
+        "deg",
+        "named accuracy, or the error of the rotation that is admitted",
+        "balanced",
+        admitted=Bound(1e-9, 10.0, "error of the rotation that is admitted"),
+    )
+    step_s: float | None = setting(
+        "solver.step",
+        "s",
+        "time step in place of an accuracy; no error is estimated",
+        None,
+        admitted=Bound(1e-7, 1.0, "a step of some milliseconds is usual"),
+    )
+    horizon_s: float = setting(
+        "solver.horizon",
+        "s",
+        "how long an impact is simulated",
+        1.0,
+        admitted=Bound(1e-4, 100.0, "an impact is over within a second or so"),
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -204,11 +204,7 @@ class Sweep:
             "order": "table" if self.table is not None else [axis.name for axis in self.axes],
             "inputs": inputs,
             **more,
-            "criterion": {
-                "max_rotation_deg": self.criterion.max_rotation_deg,
-                "rating": self.criterion.rating,
-                "min_overlap_m": self.criterion.min_overlap_m,
-            },
+            "criterion": asdict(self.criterion),
             "model": {
                 "preset": self.model.preset,
                 "readings": self.model.readings.as_dict(),

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
@@ -17,9 +16,7 @@ from boulder_sweep.settings.model import (
     CLOSED_FORM,
     PRESETS,
     PRINTED,
-    RESISTANCES,
     SWITCHES,
-    UNLOADINGS,
 )
 from boulder_sweep.settings.starter import default_of
 from boulder_sweep.settings.units import EXPECTED
@@ -92,6 +89,8 @@ def _described(field: Field) -> str:
 
 def _entry(field: Field) -> Schema:
     """Return what an entry may be."""
+    if field.choices:
+        return _words(*field.choices)
     if field.name in _FORMS:
         return _FORMS[field.name]
     value = _ref(field.path)
@@ -174,7 +173,6 @@ def _words(*words: str) -> Schema:
 
 _READINGS = {name: _words(PRINTED, corrected, "corrected") for name, corrected in SWITCHES.items()}
 _FORMS: dict[str, Schema] = {
-    "rating": _words(*RATINGS),
     "readings": {"anyOf": [_words(*PRESETS), _object({"preset": _words(*PRESETS), **_READINGS}, ())]},
     "soil_elements": {
         "anyOf": [
@@ -182,8 +180,6 @@ _FORMS: dict[str, Schema] = {
             _object({"elements": {"type": "integer", "minimum": 1, "maximum": MAX_ELEMENTS}}, ("elements",)),
         ]
     },
-    "resistance": _words(*RESISTANCES),
-    "unloading": _words(*UNLOADINGS),
     "layers": {
         "type": "array",
         "minItems": 1,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from boulder_sweep.columns import OUTCOMES, RATINGS
+from boulder_sweep.columns import OUTCOMES
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
-from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS
 from boulder_sweep.settings.starter import default_of, default_text
 from boulder_sweep.settings.units import EXPECTED
 
@@ -16,15 +15,14 @@ DEFAULTS = {
 }
 """In words, where it is no number."""
 FORMS = {
-    "rating": ", ".join(f"`{rating}`" for rating in RATINGS),
     "readings": "`corrected`, `as_printed`, or single switches ([readings](readings.md))",
     "soil_elements": "`closed_form`, or `{elements: 5000}` ([soil elements](convergence.md))",
-    "resistance": ", ".join(f"`{law}`" for law in RESISTANCES) + " ([soil](soil.md))",
-    "unloading": ", ".join(f"`{way}`" for way in UNLOADINGS) + " ([unloading](soil.md#unloading))",
     "layers": "a list of layers ([soils as they lie](soil.md#soils-as-they-lie))",
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }
-"""What a setting may be, where it is not a plain quantity."""
+"""What a setting may be, where it is neither a quantity nor one of some words."""
+PAGES = {"resistance": " ([soil](soil.md))", "unloading": " ([unloading](soil.md#unloading))"}
+"""Where the words are explained."""
 
 
 def entries_table() -> Table:
@@ -43,7 +41,10 @@ def choices_table() -> Table:
     """Return the entries that hold for all designs of a file."""
     table = Table(("entry", "may be", "where not given", "meaning"))
     for field in SETTINGS:
-        form = FORMS.get(field.name) or f"{EXPECTED[field.unit].words} ({EXPECTED[field.unit].examples})"
+        if field.choices:
+            form = ", ".join(f"`{word}`" for word in field.choices) + PAGES.get(field.name, "")
+        else:
+            form = FORMS.get(field.name) or f"{EXPECTED[field.unit].words} ({EXPECTED[field.unit].examples})"
         shown = f"`{default_text(field)}`" if isinstance(default_of(field), str) else default_text(field)
         table.add(f"`{field.path}`", form, shown, field.meaning)
     return table

@@ -13,7 +13,7 @@ from boulder_sweep.errors import NothingToMeasureError
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.judge.evaluation import control_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.settings.model import REMEMBERING_ELEMENTS
+from boulder_sweep.settings.model import PLASTIC_ELEMENTS
 from boulder_sweep.settings.problems import SettingsError
 from boulder_sweep.tradeoff.study import measure
 from boulder_sweep.views.wording import model_words
@@ -24,9 +24,9 @@ PLASTIC = ["model.unloading=plastic", "model.soil={elements: 40}", "solver.accur
 
 def test_by_elements_and_only_where_asked_for():
     elastic, plastic = (boulder_sweep.load("configs/rwg.yaml", given) for given in ([], PLASTIC[:1]))
-    assert (elastic.model.elements, plastic.model.elements) == (0, REMEMBERING_ELEMENTS)
+    assert (elastic.model.elements, plastic.model.elements) == (0, PLASTIC_ELEMENTS)
     assert [control_of(sweep, accuracy_of(sweep)).unloading for sweep in (elastic, plastic)] == [0, 1]
-    assert plastic.resolved()["model"]["soil"] == REMEMBERING_ELEMENTS
+    assert plastic.resolved()["model"]["soil"] == PLASTIC_ELEMENTS
     assert model_words(elastic.resolved()) == "readings corrected"
     assert model_words(plastic.resolved()) == "readings corrected, plastic unloading"
 
