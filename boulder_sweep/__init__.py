@@ -13,57 +13,40 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from boulder_sweep.answers.need import Need, need
-    from boulder_sweep.answers.uncertainty import Uncertainty, uncertainty
-    from boulder_sweep.impact.simulation import Trajectory, simulate
-    from boulder_sweep.report.comparison import compare
-    from boulder_sweep.report.export import export
-    from boulder_sweep.report.writing import write_explorer, write_report
-    from boulder_sweep.runner.sweeper import Summary, run
-    from boulder_sweep.settings import SettingsError, Sweep, load
-    from boulder_sweep.store import read
+    from boulder_sweep.answers.need import Need as Need
+    from boulder_sweep.answers.need import need as need
+    from boulder_sweep.answers.uncertainty import Uncertainty as Uncertainty
+    from boulder_sweep.answers.uncertainty import uncertainty as uncertainty
+    from boulder_sweep.impact.simulation import Trajectory as Trajectory
+    from boulder_sweep.impact.simulation import simulate as simulate
+    from boulder_sweep.report.comparison import compare as compare
+    from boulder_sweep.report.export import export as export
+    from boulder_sweep.report.writing import write_explorer as write_explorer
+    from boulder_sweep.report.writing import write_report as write_report
+    from boulder_sweep.runner.sweeper import Summary as Summary
+    from boulder_sweep.runner.sweeper import run as run
+    from boulder_sweep.settings import SettingsError as SettingsError
+    from boulder_sweep.settings import Sweep as Sweep
+    from boulder_sweep.settings import load as load
+    from boulder_sweep.store import read as read
 
     __version__: str
 
-__all__ = [
-    "Need",
-    "SettingsError",
-    "Summary",
-    "Sweep",
-    "Trajectory",
-    "Uncertainty",
-    "__version__",
-    "compare",
-    "export",
-    "load",
-    "need",
-    "read",
-    "run",
-    "simulate",
-    "uncertainty",
-    "write_explorer",
-    "write_report",
-]
-
 # Names are fetched at first use: the import of numba or pandas takes longer than checking a file.
-_HOME = {
-    "Need": "boulder_sweep.answers.need",
-    "need": "boulder_sweep.answers.need",
-    "Uncertainty": "boulder_sweep.answers.uncertainty",
-    "uncertainty": "boulder_sweep.answers.uncertainty",
-    "SettingsError": "boulder_sweep.settings",
-    "Sweep": "boulder_sweep.settings",
-    "load": "boulder_sweep.settings",
-    "Summary": "boulder_sweep.runner.sweeper",
-    "run": "boulder_sweep.runner.sweeper",
-    "Trajectory": "boulder_sweep.impact.simulation",
-    "simulate": "boulder_sweep.impact.simulation",
-    "read": "boulder_sweep.store",
-    "compare": "boulder_sweep.report.comparison",
-    "export": "boulder_sweep.report.export",
-    "write_explorer": "boulder_sweep.report.writing",
-    "write_report": "boulder_sweep.report.writing",
+_PUBLIC = {
+    "boulder_sweep.answers.need": ("Need", "need"),
+    "boulder_sweep.answers.uncertainty": ("Uncertainty", "uncertainty"),
+    "boulder_sweep.impact.simulation": ("Trajectory", "simulate"),
+    "boulder_sweep.report.comparison": ("compare",),
+    "boulder_sweep.report.export": ("export",),
+    "boulder_sweep.report.writing": ("write_explorer", "write_report"),
+    "boulder_sweep.runner.sweeper": ("Summary", "run"),
+    "boulder_sweep.settings": ("SettingsError", "Sweep", "load"),
+    "boulder_sweep.store": ("read",),
 }
+"""Public names by the module they live in; type checkers read them above."""
+_HOME = {name: module for module, names in _PUBLIC.items() for name in names}
+__all__ = sorted([*_HOME, "__version__"])
 
 
 def __getattr__(name: str) -> Any:

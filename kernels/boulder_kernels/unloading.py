@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from ._jit import kernel, unless_none
+from ._jit import inlined, kernel, unless_none
 from .after_step import RUNNING, Decided, Ending, rate_of
 from .dynamics import Acceleration, State
 from .modes import Switches
@@ -187,7 +187,7 @@ def rest_of(y: State, theta_limit: float, c: Any) -> Rest:
     return Rest(theta, max(theta - first, last - theta))
 
 
-@kernel
+@inlined
 def rate_with_memory(k_end: Acceleration, y: State, switches: Switches, c: Any, memory: Memory) -> Acceleration:
     """Acceleration at the start of a step in plastic soil, by what it remembers now."""
     return rate_of(y, switches, c)
