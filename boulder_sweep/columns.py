@@ -270,7 +270,7 @@ AT_REST: tuple[OutcomeColumn, ...] = (
         lambda facts: np.degrees(facts.outcomes.rest_error),
     ),
 )
-"""Outcomes that only soil that remembers has (`model.unloading` other than ``elastic``); behind the others in a table.
+"""Outcomes in plastic soil only (`model.unloading` other than ``elastic``); behind the others in a table.
 Null where the boulder overturns, where the vehicle still drives on at the end, or where the readings allow no proof."""
 
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.answers.keys import Key, sweep_ranges
-from boulder_sweep.answers.questions import Answers, replaced
+from boulder_sweep.answers.questions import Answers, Brackets, replaced
 from boulder_sweep.answers.search import ALWAYS, BEYOND, FAILS, FOUND, HOLDS, NEVER, Search, last_before, search
 from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
 from boulder_sweep.errors import QuestionError
@@ -120,30 +120,14 @@ class LightestQuestion:
         }
         block = replace(taken(rows, np.arange(n), **columns), labels=self.open.labels(start, stop))
         simulated = sum(trial.simulated for trial in trials) + n
-        return Answers(block, self.judges.final(block), kind, fails, passes, [None] * n, simulated)
+        return Answers(block, kind, fails, passes, self.judges.final(block), [None] * n, simulated)
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
-    """What a search found for n rows.
-
-    Attributes
-    ----------
-    sizes : dict of ndarray, shape (n,)
-        What is searched, of the boulders that pass or were tried last.
-    block : DesignBlock
-        Their designs.
-    kind : ndarray of int8, shape (n,)
-        Kind of answer, codes of `boulder_sweep.answers.search.WORDS`.
-    fails, passes : ndarray, shape (n,)
-        The bracket of the mass [kg]; NaN where there is none.
-    """
+class _SizedBrackets(Brackets):
+    """Brackets of the mass [kg], with what is searched of the boulders that pass or were tried last: `sizes`."""
 
     sizes: Sides
-    block: DesignBlock
-    kind: np.ndarray
-    fails: np.ndarray
-    passes: np.ndarray
 
 
 class _Boulders:
@@ -244,7 +228,7 @@ class _Boulders:
         sides = self.sides(places, others)
         return np.prod([sides[side] for side in SIDES], axis=0) * self.rows["boulder_density_kg_m3"][index]
 
-    def certified(self, others: Sides) -> _Found:
+    def certified(self, others: Sides) -> _SizedBrackets:
         """Return what the search finds for other sides and depths, one for each row, with the sweep's accuracy."""
         n = len(next(iter(self.rows.values())))
         index = np.arange(n)
@@ -258,7 +242,7 @@ class _Boulders:
             found = replaced(found, wrong, part)
         return self.found(others, found.shown, found.has_holds, found.fails, found.has_fails)
 
-    def bracketed(self, sizes: Sides) -> _Found:
+    def bracketed(self, sizes: Sides) -> _SizedBrackets:
         """Return boulders with the last lighter ones that fail, by the side that is searched for."""
         places = self.places(sizes)
         index = np.arange(len(places))
@@ -273,19 +257,19 @@ class _Boulders:
 
     def found(
         self, others: Sides, places: np.ndarray, passes: np.ndarray, fails: np.ndarray, has_fails: np.ndarray
-    ) -> _Found:
+    ) -> _SizedBrackets:
         """Return what was found for all rows, from places of the side and whether boulders of this side pass."""
         index = np.arange(len(places))
         sides = self.sides(places, others)
         at_least = places == self.first
         for side in self.asked.free:
             at_least &= sides[side] <= self.asked.bounds[side][0]
-        return _Found(
-            others | {self.side: places / MILLIMETRES},
+        return _SizedBrackets(
             self.block(index, places, others),
             np.where(passes, np.where(at_least, ALWAYS, FOUND), NEVER).astype(np.int8),
             np.where(has_fails, self.mass(index, fails, others), np.nan),
             np.where(passes, self.mass(index, places, others), np.nan),
+            others | {self.side: places / MILLIMETRES},
         )
 
     def lighter(self, sizes: Sides, passing: np.ndarray) -> Sides:
@@ -335,7 +319,7 @@ class _Boulders:
         return np.rint(sizes[self.side] * MILLIMETRES).astype(np.int64)
 
 
-def _lightest(found: Sequence[_Found]) -> np.ndarray:
+def _lightest(found: Sequence[_SizedBrackets]) -> np.ndarray:
     """Return the place of the lightest of several answers, one after the other, for each row; rather with a bracket."""
     n = len(found[0].passes)
     masses = [np.where(np.isnan(own.passes), np.inf, own.passes) + 1e-6 * np.isnan(own.fails) for own in found]

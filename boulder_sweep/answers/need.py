@@ -18,6 +18,7 @@ from boulder_sweep.answers.doubts import every_reading
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
 from boulder_sweep.answers.lightest import SIDES, LightestQuestion
 from boulder_sweep.answers.questions import ProbabilityQuestion, Question
+from boulder_sweep.answers.result import Result
 from boulder_sweep.answers.search import BLOCKED, WORDS
 from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
 from boulder_sweep.columns import OPTIONAL_COLUMNS
@@ -31,50 +32,33 @@ from boulder_sweep.settings.model import ReadingChoice
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
-    import pandas as pd
     import pyarrow as pa
 
     from boulder_sweep.settings import Sweep
 
-"""Called with the number of rows done and the total."""
-
 
 @dataclass(frozen=True, eq=False)
-class Need:
+class Need(Result):
     """Answers to a question, one row for every combination of the other inputs. Made by `need`.
 
     Attributes
     ----------
-    sweep : Sweep
-        The sweep asked about.
+    sweep, arrow
+        As of `Result`: inputs, answer, bracket, outcome at the answer.
     key : Key
         The input asked for.
     least_margin : float
         Margin asked for.
-    arrow : pyarrow.Table
-        Inputs, answer, bracket, outcome at the answer; units in the field metadata.
     simulated : int
         Designs simulated during the search.
     probability : float or None
         Probability of passing asked for; None where no input is uncertain.
     """
 
-    sweep: Sweep
     key: Key
     least_margin: float
-    arrow: pa.Table
     simulated: int
     probability: float | None = None
-
-    def __len__(self) -> int:
-        return len(self.arrow)
-
-    @property
-    def frame(self) -> pd.DataFrame:
-        """The answers as a data frame; units and meanings in ``.attrs``."""
-        from boulder_sweep.answers.tables import frame_of
-
-        return frame_of(self.arrow)
 
     @property
     def others(self) -> list[str]:
@@ -245,7 +229,7 @@ def need(
 
     table = joined_tables(tables, _metadata(asked[0], least_margin))
     chance = None if probability is None else share(probability, "--probability")
-    return Need(sweep, key, least_margin, table, simulated, chance)
+    return Need(sweep, table, key, least_margin, simulated, chance)
 
 
 """The same by its other name."""

@@ -32,19 +32,35 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Answers:
-    """Answers of n rows.
+class Brackets:
+    """Where n rows change from failing to passing.
 
     Attributes
     ----------
     block : DesignBlock
         The designs at the answer, or at the last value tried where there is none.
-    judged : Judged
-        Their outcomes and verdicts.
     kind : ndarray of int8, shape (n,)
         Kind of answer, codes of `boulder_sweep.answers.search.WORDS`.
     fails, passes : ndarray, shape (n,)
         The bracket in the unit of the table; NaN where there is no such value.
+    """
+
+    block: DesignBlock
+    kind: np.ndarray
+    fails: np.ndarray
+    passes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Answers(Brackets):
+    """Answers of n rows.
+
+    Attributes
+    ----------
+    block, kind, fails, passes
+        As of `Brackets`.
+    judged : Judged
+        Outcomes and verdicts of the designs.
     stretches : list of str or None, of length n
         All passing intervals, for rows that are not monotone.
     simulated : int
@@ -53,11 +69,7 @@ class Answers:
         Probabilities of passing at the answers, if one was asked for.
     """
 
-    block: DesignBlock
     judged: Judged
-    kind: np.ndarray
-    fails: np.ndarray
-    passes: np.ndarray
     stretches: list[str | None]
     simulated: int
     chances: Chance | None = None
@@ -116,10 +128,10 @@ class Question:
             block = trial.block(every, found.shown)
         return Answers(
             replace(block, labels=self.open.labels(start, stop)),
-            judged,
             self.kinds(rows, found),
             np.where(found.has_fails, self.key.values(found.fails), np.nan),
             np.where(found.has_holds, self.key.values(found.holds), np.nan),
+            judged,
             [_stretches(self.key, found.changes.get(row), first[row], last[row]) for row in range(stop - start)],
             trial.simulated,
             trial.chances(found.shown),

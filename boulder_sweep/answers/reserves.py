@@ -15,6 +15,7 @@ import numpy as np
 from boulder_sweep.answers.draws import threads
 from boulder_sweep.answers.keys import Key, key_of
 from boulder_sweep.answers.questions import Trial, replaced
+from boulder_sweep.answers.result import Result
 from boulder_sweep.answers.search import FAILS, HOLDS, Search, search
 from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
 from boulder_sweep.designs import block_of
@@ -22,7 +23,6 @@ from boulder_sweep.locations import Location
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
-    import pandas as pd
     import pyarrow as pa
 
     from boulder_sweep.settings import Sweep
@@ -38,8 +38,6 @@ ISO_SPEEDS = {"48 km/h": 48 * KM_H, "64 km/h": 64 * KM_H, "80 km/h": 80 * KM_H}
 ISO_MASS_KG = 7200.0
 CLASS_TOLERANCE = 0.02
 """A class applies to a truck of one mass; none is named if the mass differs by more than this share."""
-
-"""Called with the number of rows done and the total."""
 
 
 class Reserve(NamedTuple):
@@ -64,29 +62,8 @@ RESERVES = (
 
 
 @dataclass(frozen=True, eq=False)
-class Reserves:
-    """What the designs of a sweep withstand. Made by `reserves`.
-
-    Attributes
-    ----------
-    sweep : Sweep
-        The sweep.
-    arrow : pyarrow.Table
-        Inputs, outcome and withstood values of every design.
-    """
-
-    sweep: Sweep
-    arrow: pa.Table
-
-    def __len__(self) -> int:
-        return len(self.arrow)
-
-    @property
-    def frame(self) -> pd.DataFrame:
-        """The table as a data frame; units and meanings in ``.attrs``."""
-        from boulder_sweep.answers.tables import frame_of
-
-        return frame_of(self.arrow)
+class Reserves(Result):
+    """What the designs of a sweep withstand: inputs, outcome and withstood values of each. Made by `reserves`."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""

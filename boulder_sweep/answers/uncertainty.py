@@ -11,6 +11,7 @@ import numpy as np
 from boulder_sweep.answers.chance import FEWEST, FIRST, SCRAMBLINGS, Chance, Points, chance
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
+from boulder_sweep.answers.result import Result
 from boulder_sweep.answers.sensitivity import drivers, indices
 from boulder_sweep.answers.spread import Spread, uncertain_rows
 from boulder_sweep.answers.subset import FAILING, Failing, subset_simulation
@@ -24,7 +25,6 @@ from boulder_sweep.runner.pool import Pool, pool
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
-    import pandas as pd
     import pyarrow as pa
 
     from boulder_sweep.settings import Sweep
@@ -37,19 +37,15 @@ SAMPLES = 4096
 OUTPUTS = ("passes", "margin")
 """Outputs of the indices: whether a design passes, and its distance from failing."""
 
-"""Called with the number of rows done and the total."""
-
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class Uncertainty(Result):
     """Probabilities of the designs of a sweep. Made by `uncertainty`.
 
     Attributes
     ----------
-    sweep : Sweep
-        The sweep.
-    arrow : pyarrow.Table
-        One row a design: inputs with the means of the uncertain ones, the outcome at these means, the chance of passing
+    sweep, arrow
+        As of `Result`: inputs with the means of the uncertain ones, the outcome at these means, the chance of passing
         with its interval, and the most influential input.
     indices : pyarrow.Table
         Sobol indices, one row for each design, output and input; none where there are more than `MOST_INDEXED` designs.
@@ -59,21 +55,9 @@ class Uncertainty:
         Seed of all random numbers.
     """
 
-    sweep: Sweep
-    arrow: pa.Table
     indices: pa.Table
     samples: pa.Table
     seed: int
-
-    def __len__(self) -> int:
-        return len(self.arrow)
-
-    @property
-    def frame(self) -> pd.DataFrame:
-        """The probabilities as a data frame; units and meanings in ``.attrs``."""
-        from boulder_sweep.answers.tables import frame_of
-
-        return frame_of(self.arrow)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything except the samples as plain data."""

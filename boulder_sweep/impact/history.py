@@ -60,7 +60,7 @@ class EnergyLedger:
     soil_elastic_J, soil_drag_J : ndarray
         Stored in the springs of the soil, and dissipated by its drag.
     soil_plastic_J : ndarray
-        Taken by soil that is pressed for good; 0 where it springs back (Eq 123).
+        Plastic work of the soil; 0 in elastic soil (Eq 123).
     gravity_J : ndarray
         Done against the weight. Under the gravity reading a potential energy; as printed the work done against
         the restoring moment, which has no potential (and is negative where it drives the boulder on).
@@ -192,7 +192,7 @@ def _offsets(record: Record) -> np.ndarray:
 
 
 def _constants(record: Record, c: Constants, second: SecondSpring | None) -> list[Constants]:
-    """Return the constants of every sample: what soil remembers, and the second spring where it has taken over."""
+    """Return the constants of every sample: memory of plastic soil, and second spring where it has taken over."""
     own = [at_sample(c, row) for row in range(len(record.times))]
     if second is None:
         return own

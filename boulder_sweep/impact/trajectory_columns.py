@@ -39,7 +39,7 @@ ENERGY: tuple[ColumnSpec, ...] = (
     _number("energy_boulder_linear_J", "J", "kinetic energy of boulder and soil wedge in translation"),
     _number("energy_boulder_angular_J", "J", "kinetic energy of boulder and soil wedge in rotation"),
     _number("energy_soil_elastic_J", "J", "stored in the springs of the soil"),
-    _number("energy_soil_plastic_J", "J", "taken by soil that is pressed for good; 0 where it springs back"),
+    _number("energy_soil_plastic_J", "J", "plastic work of the soil; 0 in elastic soil"),
     _number("energy_soil_drag_J", "J", "dissipated by the drag of the soil"),
     _number(
         "energy_gravity_J",

@@ -210,8 +210,8 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
         notes.append("No numerical error was estimated: verdicts near a limit are unguarded.")
     if control.unloading:
         notes.append(
-            f"The table was computed with soil that stays pressed ({UNLOADING_WORDS[control.unloading]}); what is "
-            "simulated in this page uses elastic soil."
+            f"The table was computed with plastic soil ({UNLOADING_WORDS[control.unloading]}); what is simulated in "
+            "this page uses elastic soil."
         )
     if control.elements:
         notes.append(

@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 Report = Callable[[Progress], None]
-"""Called with the progress."""
 FINISHED = "finished"
 _LOOK_EVERY_S = 0.1
 _PATIENCE_S = 0.6

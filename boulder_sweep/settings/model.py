@@ -291,7 +291,7 @@ class Model:
     unloading: str = setting(
         "model.unloading",
         "",
-        "whether the soil springs back, and whether a gap opens",
+        "elastic or plastic soil, and whether a gap opens behind the boulder",
         UNLOADINGS[0],
         choices=UNLOADINGS,
         kind="a way in which the soil unloads",

@@ -280,14 +280,14 @@ def measure(
     Raises
     ------
     NothingToMeasureError
-        No design of the sample can be computed, or the soil does not spring back.
+        No design of the sample can be computed, or its soil is not elastic.
     """
     begun = time.monotonic()
     sweep.require_values()
     if sweep.model.unloading != UNLOADINGS[0]:
         raise NothingToMeasureError(
             f"{sweep.name}: model.unloading is {sweep.model.unloading}, and the methods that are compared here are "
-            f"ways to compute soil that springs back (model.unloading: {UNLOADINGS[0]})"
+            f"ways to compute elastic soil (model.unloading: {UNLOADINGS[0]})"
         )
     if backend != THREADING:
         with pool(1, backend, scheduler) as workers:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
 BEYOND_LIMIT, AFTER_PEAK = "#F3E7DF", "#F0F0F0"
-"""Behind the curves where the model no longer holds, and where its soil springs back without memory."""
+"""Behind the curves where the model no longer holds, and where its elastic soil gives back all that it took."""
 
 
 def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:

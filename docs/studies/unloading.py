@@ -1,4 +1,4 @@
-"""What soil does that stays pressed: to both crash tests, to a grid, and how many elements it takes."""
+"""What plastic soil does: to both crash tests, to a grid, and how many elements it takes."""
 
 from __future__ import annotations
 

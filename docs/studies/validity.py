@@ -61,7 +61,7 @@ def crush_words(grid: Path) -> str:
         f"have a vehicle that drives on by more than {limit:g} m further than the centre of the boulder moves. The "
         "boulder also turns, so that the point of contact recedes further than that centre: measured there "
         f"(`vehicle_crush_m`), the front is crushed by {low:.2f} to {high:.2f} m when the vehicle stops. After that "
-        f"the boulder swings back, in soil that springs back whole, and presses the front in by up to {later:.2f} m "
+        f"the boulder swings back, in elastic soil, and presses the front in by up to {later:.2f} m "
         f"within {control.horizon:g} s; this is not counted, nor is it final when the verdict is."
     )
 

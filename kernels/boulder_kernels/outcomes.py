@@ -82,7 +82,7 @@ class Maxima(NamedTuple):
     t_F_v: float
     crush: float
     """Largest crush of the truck's front while it drives forward, x_v less the displacement of the contact point [m]:
-    final once the truck has stopped. What the boulder may add as it swings back, in soil that springs back whole, is
+    final once the truck has stopped. What the boulder may add as it swings back, in elastic soil, is
     not counted."""
     t_crush: float
 

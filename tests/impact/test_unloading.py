@@ -1,4 +1,4 @@
-"""Soil that stays pressed, from the file to the table and the time history."""
+"""Plastic soil, from the file to the table and the time history."""
 
 import json
 

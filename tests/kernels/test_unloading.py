@@ -1,4 +1,4 @@
-"""Soil that remembers how far it was pushed: single elements by hand, sums and whole impacts against the oracle."""
+"""Plastic soil: single elements by hand, sums and whole impacts against the oracle."""
 
 import math
 import os
