@@ -1,6 +1,7 @@
 """From computed outcomes to pass, fail, undecided or error, with the reason.
 
-The rules, worst first; the first that applies decides the row:
+The rules, worst first; the first that applies decides the row. `boulder_kernels.verdict` applies them, for tables and
+for the page of a report:
 
 1. ``error``: the row could not be computed; the reason says why.
 2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
@@ -26,7 +27,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+import boulder_kernels.verdict as verdicts
 from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
+from boulder_kernels.verdict import RULINGS, VerdictLimits, write_rulings
 from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, Rows
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import (
@@ -67,6 +70,18 @@ STATUS_REASONS = {
 """Reason of a row that the kernels could not compute."""
 STEP_REASONS = frozenset(text for status, text in STATUS_REASONS.items() if status != Status.INVALID)
 """Those that a finer time step may resolve."""
+RULES = (
+    (ERROR, NO_REASON),  # which has a reason of its own
+    (FAIL, NO_CONTACT),
+    (FAIL, OVERTURNS),
+    (FAIL, PENETRATION),
+    (UNDECIDED, CRUSH),
+    (UNDECIDED, OVERRIDE),
+    (UNDECIDED, HORIZON),
+    (UNDECIDED, NUMERICAL_ERROR),
+    (PASS, NO_REASON),
+)
+"""Verdict and reason of every rule of `boulder_kernels.verdict`, in its order."""
 NOT_FINITE = "the computed result is not a finite number"
 
 
@@ -169,54 +184,21 @@ def judge(
 def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float | np.ndarray) -> Facts:
     """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
-    no_contact = status == Status.NO_CONTACT
-    simulated = _is_one_of(status, SIMULATED)
-    finite = np.ones(status.shape, dtype=bool)
-    for maximum in (
-        outcomes.theta_max,
-        outcomes.x_b_max,
-        outcomes.x_v_max,
-        outcomes.F_v_max,
-        outcomes.crush_max,
-        outcomes.t_end,
-    ):
-        finite &= np.isfinite(maximum)
-    computed = simulated & finite
-
-    overturned = computed & ((status == Status.LIMIT) | (outcomes.theta_max >= limits.rotation))
-    overturned &= ~np.isinf(outcomes.theta_error)
-    standing = computed & ~overturned
-    penetration = outcomes.x_v_max - designs.bed_offset - designs.table.L
-    too_deep = standing & (penetration > limits.penetration)
-    without_proof = (Status.HORIZON, Status.OUTWARD, *((Status.UNPROVABLE,) if limits.proved else ()))
-    unproved = standing & _is_one_of(status, without_proof)
-    crushed = standing & (outcomes.crush_max > designs.bed_offset)
-    overlap = designs.table.H - designs.table.d - designs.table.e_bumper
-    slight = standing & (overlap < limits.min_overlap)
-    unsure = (limits.rotation - outcomes.theta_max < outcomes.theta_error) | (
-        np.minimum(limits.penetration - penetration, designs.bed_offset - outcomes.crush_max) < outcomes.x_error
-    )
-
-    # Mildest rule first, so that the worst one stays.
-    rules = (
-        (standing & unsure, UNDECIDED, NUMERICAL_ERROR),
-        (unproved, UNDECIDED, HORIZON),
-        (slight, UNDECIDED, OVERRIDE),
-        (crushed, UNDECIDED, CRUSH),
-        (too_deep, FAIL, PENETRATION),
-        (overturned, FAIL, OVERTURNS),
-        (no_contact, FAIL, NO_CONTACT),
-    )
-    rule = np.zeros(status.shape, dtype=np.uint8)
-    for number, (rows, _, _) in enumerate(rules, start=1):
-        np.maximum(rule, rows * np.uint8(number), out=rule)
-    verdict = np.array([PASS, *(kind for _, kind, _ in rules)], dtype=np.int32).take(rule)
-    reason = np.array([NO_REASON, *(why for _, _, why in rules)], dtype=np.int32).take(rule)
-    failed = ~(computed | no_contact)
+    table = designs.table
+    sizes = np.stack([table.L, table.H, table.d, table.e_bumper, designs.bed_offset])
+    rulings = np.empty((len(RULINGS), len(status)))
+    known = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1 : len(OutcomeTable._fields)]))
+    held = VerdictLimits(limits.rotation, limits.penetration, limits.min_overlap, limits.proved)
+    write_rulings(known, sizes, held, rulings)
+    rule, overlap, penetration, margin = rulings[0].astype(np.intp), *rulings[1:]
+    verdict = np.array([kind for kind, _ in RULES], dtype=np.int32).take(rule)
+    reason = np.array([why for _, why in RULES], dtype=np.int32).take(rule)
+    failed = rule == verdicts.NOT_COMPUTED
     reasons: tuple[str, ...] = REASONS
     if failed.any():
-        verdict[failed] = ERROR
-        reason[failed], reasons = _error_reasons(status[failed], (simulated & ~finite)[failed])
+        reason[failed], reasons = _error_reasons(status[failed], _is_one_of(status[failed], SIMULATED))
+    standing, overturned = rule >= verdicts.PENETRATION, rule == verdicts.OVERTURNS
+    computed = standing | overturned
     rated = standing & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
     return Facts(
         outcomes=outcomes,
@@ -232,10 +214,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
         },
         overlap=overlap,
         penetration=penetration,
-        margin=np.minimum(
-            (limits.rotation - outcomes.theta_max) / limits.rotation,
-            (limits.penetration - penetration) / limits.penetration,
-        ),
+        margin=margin,
         verdict=verdict,
         reason=reason,
         rating=_ratings(penetration),

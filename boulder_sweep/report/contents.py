@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import SIMULATED, Control, Readings, SecondSpring, Status
+from boulder_kernels import Control, Readings, SecondSpring, Status
+from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE, SoilLayers
-from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES
+from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES, VERDICTS
+from boulder_sweep.columns import REASONS as VERDICT_REASONS
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
@@ -26,7 +28,7 @@ from boulder_sweep.judge.validity import (
     TESTED_WIDTH_OVER_DEPTH,
     usual_range,
 )
-from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M, STATUS_REASONS, STEP_REASONS
+from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, RULES, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, PARTS
@@ -159,6 +161,8 @@ def _layout() -> dict[str, Any]:
         "settings": entry_points.SETTINGS,
         "outcome": entry_points.OUTCOME,
         "history": entry_points.HISTORY,
+        "sizes": ["bed_offset_m" if name == "bed_offset" else SOURCES[name] for name in verdicts.SIZES],
+        "rulings": verdicts.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": len(SoilLayers._fields),
         "columns": {**SOURCES, **dict(zip(SecondSpring._fields, OPTIONAL_COLUMNS, strict=True))},
@@ -171,11 +175,11 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "rotation": rotation,
         "rating": rating,
-        "penetration": PENETRATION_LIMITS_M[rating],
-        "min_overlap": criterion["min_overlap_m"],
+        "limits": [rotation, PENETRATION_LIMITS_M[rating], criterion["min_overlap_m"], True],
+        "verdicts": [[VERDICTS[verdict], VERDICT_REASONS[reason]] for verdict, reason in RULES],
+        "not_finite": NOT_FINITE,
         "ratings": list(PENETRATION_LIMITS_M.items()),
         "status": {status.name: status.value for status in Status},
-        "simulated": [status.value for status in SIMULATED],
         "why": {str(status.value): words for status, words in STATUS_REASONS.items()},
         "open": sorted(STEP_REASONS),
         "tested": _tested(settings["model"]),

@@ -1,8 +1,8 @@
-"""What the page calls: the kernels behind two functions over pointers to doubles.
+"""What the page calls: the kernels behind three functions over pointers to doubles.
 
 WebAssembly has no named tuples, so designs and settings are passed as plain numbers in a fixed order, which only this
-module knows. `outcomes` does the work of ``sweep run``, one design after another instead of in lanes, and `history`
-that of ``sweep simulate``.
+module knows. `outcomes` does the work of ``sweep run``, one design after another instead of in lanes, `rulings`
+that of its verdicts, and `history` that of ``sweep simulate``.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from boulder_kernels.outcomes import write_outcome
 from boulder_kernels.second_spring import on_second_spring, spent_energy
 from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
+from boulder_kernels.verdict import VerdictLimits, write_rulings
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
@@ -45,6 +46,8 @@ SETTINGS = (*Readings._fields, *Control._fields)
 SETTINGS_COUNT = len(SETTINGS)
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
+LIMITS = VerdictLimits._fields
+"""Limits of the criterion, in this order; rad, m."""
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
@@ -57,6 +60,7 @@ ENERGY = HISTORY.index("vehicle_kinetic")
 _DOUBLES = types.CPointer(types.float64)
 EXPORTS = {
     "outcomes": (_DOUBLES, types.int32, _DOUBLES, types.int32, *(_DOUBLES,) * 4),
+    "rulings": (types.int32, *(_DOUBLES,) * 4),
     "history": (_DOUBLES, _DOUBLES, types.int32, _DOUBLES, _DOUBLES, types.int32, *(_DOUBLES,) * 7),
 }
 """The functions that the page calls, and the types of their arguments."""
@@ -143,6 +147,29 @@ def outcomes(
         # The status of a simulation that continues beyond the limit does not say that it reached it.
         if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
             fine.theta_error[row] = fine.x_error[row] = np.inf
+
+
+@array_kernel
+def rulings(n: int, outcomes_at: Any, sizes_at: Any, limits_at: Any, rulings_at: Any) -> None:
+    """Apply the rules of the verdict to n designs.
+
+    Parameters
+    ----------
+    n
+        Number of designs.
+    outcomes_at
+        Results of `outcomes`, shape (len(OUTCOME), n).
+    sizes_at
+        Inputs, shape (len(SIZES), n).
+    limits_at
+        Limits of the criterion, shape (len(LIMITS),).
+    rulings_at
+        Where the rulings go, shape (len(RULINGS), n).
+    """
+    s = carray(limits_at, (4,))
+    limits = VerdictLimits(s[0], s[1], s[2], s[3] > 0.0)
+    table = outcomes_from(carray(outcomes_at, (10, n)))
+    write_rulings(table, carray(sizes_at, (5, n)), limits, carray(rulings_at, (4, n)))
 
 
 @inlined

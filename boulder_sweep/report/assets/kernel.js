@@ -4,8 +4,8 @@
 /**
  * Names of the numbers that the kernel takes and gives, each in its order, how many numbers a layer of soil has, and how
  * many the kernel makes of it; written by Python.
- * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], layer: number,
- *   layer_room: number}} Layout
+ * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], sizes: string[],
+ *   rulings: string[], layer: number, layer_room: number}} Layout
  */
 
 /**
@@ -94,6 +94,24 @@ class Kernel {
     views[4].set(settings);
     this.call("outcomes", [at[1], n, at[2], m, ...at.slice(3)]);
     return Object.fromEntries(outcome.map((name, k) => [name, views[5].slice(k * n, (k + 1) * n)]));
+  }
+
+  /**
+   * Apply the rules of the verdict.
+   * @param {Record<string, Float64Array>} outcomes as of `outcomes`
+   * @param {Record<string, number>[]} designs by the columns of the table
+   * @param {number[]} limits of the criterion
+   * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.rulings`
+   */
+  rulings(outcomes, designs, limits) {
+    const { outcome, sizes, rulings } = this.layout;
+    const n = designs.length;
+    const { at, views } = this.room([2, outcome.length * n, sizes.length * n, limits.length, rulings.length * n]);
+    outcome.forEach((name, k) => views[1].set(outcomes[name], k * n));
+    sizes.forEach((name, k) => designs.forEach((one, row) => (views[2][k * n + row] = one[name])));
+    views[3].set(limits);
+    this.call("rulings", [n, ...at.slice(1)]);
+    return Object.fromEntries(rulings.map((name, k) => [name, views[4].slice(k * n, (k + 1) * n)]));
   }
 
   /**

@@ -91,7 +91,7 @@ class Page {
       blow: one.impact_height_m, friction: one.friction_angle_deg / DEGREES, mass: one.vehicle_mass_kg,
       speed: one.impact_speed_m_s, spring: one.vehicle_spring_N_m, damper: one.vehicle_damper_N_s_m,
       bumper: one.bumper_height_m, hood: one.hood_height_m, bed: one.bed_offset_m,
-      line: one.boulder_length_m + this.data.rules.penetration, rating: this.data.rules.rating,
+      line: one.boulder_length_m + this.data.rules.limits[1], rating: this.data.rules.rating,
     };
   }
 

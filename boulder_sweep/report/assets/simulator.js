@@ -198,8 +198,10 @@ class Simulator {
     const complete = designs.map((design) => this.completed(design));
     const given = complete.map((one) => this.kernelDesign(one.inputs));
     const outcomes = this.kernel.outcomes(given, given.map((one) => this.layers(one)), this.settings(changed));
+    const { rules } = this.data;
+    const rulings = this.kernel.rulings(outcomes, complete.map(({ inputs }) => inputs), rules.limits);
     return complete.map(({ inputs, refusal }, row) => {
-      const found = judge(outcomes, row, inputs, this.data.rules);
+      const found = judge(outcomes, rulings, row, inputs, rules);
       found.step_s = found.end_time_s === null ? null : this.step(changed);
       if (refusal === "") return found;
       const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));

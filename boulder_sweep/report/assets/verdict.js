@@ -5,9 +5,9 @@
  * What a design must keep to, and the words of every verdict; written by Python.
  * @typedef {object} Rules
  * @property {number} rotation largest rotation [rad]
- * @property {number} penetration largest penetration of the required rating [m]
- * @property {number} min_overlap least height of the boulder's top over the underside of the bumper [m]
- * @property {number[]} simulated ends of a simulation that has maxima to report
+ * @property {number[]} limits of the criterion, as the kernel takes them
+ * @property {[string, string][]} verdicts verdict and reason of every rule of the kernel
+ * @property {string} not_finite the reason where a result is not a finite number
  * @property {[string, number][]} ratings every rating and its largest penetration [m], the best first
  * @property {Record<string, number>} status how a simulation can end, by name
  * @property {Record<string, string>} why the reason of each status that leaves a design without a result
@@ -38,39 +38,24 @@
 const DEGREES = 180 / Math.PI;
 
 /**
- * Give the verdict on one design: the rules of `boulder_sweep.judge.verdict` for a row, held against them by a test.
+ * Give the verdict on one design, as the kernel has ruled.
  * @param {Record<string, Float64Array>} outcomes what the kernel computed
+ * @param {Record<string, Float64Array>} rulings what its rules made of that
  * @param {number} row which design
  * @param {Record<string, number>} inputs the design by the names of the table
  * @param {Rules} rules
  * @returns {Judged}
  */
-function judge(outcomes, row, inputs, rules) {
+function judge(outcomes, rulings, row, inputs, rules) {
   /** @param {string} name */
   const of = (name) => outcomes[name][row];
-  const { status } = rules;
+  const [penetration, overlap, margin] = ["penetration", "overlap", "margin"].map((name) => rulings[name][row]);
   const ended = of("status");
-  const [theta, x_b, x_v, F_v, crush, end] = ["theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max", "t_end"].map(of);
-  const valid = rules.simulated.includes(ended) && [theta, x_b, x_v, F_v, crush, end].every(Number.isFinite);
-  // Where only one of two solutions overturns the error is infinite, and nothing is decided.
-  const overturned = valid && (ended === status.LIMIT || theta >= rules.rotation) && of("theta_error") !== Infinity;
-  const standing = valid && !overturned;
-  const penetration = x_v - inputs.bed_offset_m - inputs.boulder_length_m;
-  const overlap = inputs.boulder_height_m - inputs.embedment_depth_m - inputs.bumper_height_m;
-  const room = Math.min(rules.penetration - penetration, inputs.bed_offset_m - crush);
-
-  let [verdict, reason] = ["pass", ""];
-  if (ended === status.NO_CONTACT) [verdict, reason] = ["fail", "no_contact"];
-  else if (!valid) [verdict, reason] = ["error", rules.why[ended] ?? "the computed result is not a finite number"];
-  else if (overturned) [verdict, reason] = ["fail", "overturns"];
-  else if (penetration > rules.penetration) [verdict, reason] = ["fail", "penetration"];
-  else if (crush > inputs.bed_offset_m) [verdict, reason] = ["undecided", "crush"];
-  else if (overlap < rules.min_overlap) [verdict, reason] = ["undecided", "override"];
-  else if ([status.OUTWARD, status.HORIZON, status.UNPROVABLE].includes(ended)) [verdict, reason] = ["undecided", "horizon"];
-  else if (rules.rotation - theta < of("theta_error") || room < of("x_error")) [verdict, reason] = ["undecided", "error"];
-  const rated = standing && (verdict !== "undecided" || reason === "error");
-
-  const margin = Math.min((rules.rotation - theta) / rules.rotation, (rules.penetration - penetration) / rules.penetration);
+  let [verdict, reason] = rules.verdicts[rulings.rule[row]];
+  if (verdict === "error") reason = rules.why[ended] ?? rules.not_finite;
+  const valid = verdict !== "error" && reason !== "no_contact";
+  const overturned = reason === "overturns";
+  const rated = valid && !overturned && (verdict !== "undecided" || reason === "error");
   const rating = rules.ratings.find(([, most]) => penetration <= most)?.[0] ?? null;
   /** @param {number} value @param {boolean} known */
   const kept = (value, known = valid) => (known && !Number.isNaN(value) ? value : null);
@@ -78,18 +63,18 @@ function judge(outcomes, row, inputs, rules) {
     verdict,
     reason,
     margin: kept(margin, rated),
-    max_rotation_deg: kept(theta * DEGREES),
-    max_displacement_m: kept(x_b),
-    max_vehicle_displacement_m: kept(x_v),
-    peak_force_kN: kept(F_v / 1000),
+    max_rotation_deg: kept(of("theta_max") * DEGREES),
+    max_displacement_m: kept(of("x_b_max")),
+    max_vehicle_displacement_m: kept(of("x_v_max")),
+    peak_force_kN: kept(of("F_v_max") / 1000),
     penetration_m: kept(penetration),
     rating: rated ? rating : null,
     time_to_limit_s: kept(of("t_limit"), overturned),
-    end_time_s: kept(end),
-    rotation_error_deg: kept(of("theta_error") * DEGREES, valid && !(overturned && ended === status.LIMIT)),
+    end_time_s: kept(of("t_end")),
+    rotation_error_deg: kept(of("theta_error") * DEGREES, valid && !(overturned && ended === rules.status.LIMIT)),
     displacement_error_m: kept(of("x_error")),
     time_to_limit_error_s: kept(of("x_error") / inputs.impact_speed_m_s, overturned),
-    vehicle_crush_m: kept(crush),
+    vehicle_crush_m: kept(of("crush_max")),
     overlap_m: verdict === "error" ? null : overlap,
     validity: verdict === "error" ? null : flagsOf(outcomes, row, inputs, overlap, rules).join(";"),
   };

@@ -1,0 +1,128 @@
+"""Which rule decides a row: the criterion on the maxima of a simulation, for tables and for the page of a report.
+
+The rules are in order, the worst first; the first that applies decides the row. `boulder_sweep.judge.verdict` says what
+each means.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._jit import exact_inlined, exact_kernel
+from .outcomes import OutcomeTable, Status
+
+NOT_COMPUTED, NO_CONTACT, OVERTURNS, PENETRATION, CRUSH, OVERRIDE, UNPROVED, NUMERICAL_ERROR, PASSES = range(9)
+"""The rules. A row is standing, computed and not overturned, from PENETRATION on."""
+
+
+class VerdictLimits(NamedTuple):
+    """Limits of the criterion."""
+
+    rotation: float
+    """Largest rotation [rad]."""
+    penetration: float
+    """Largest penetration [m]."""
+    min_overlap: float
+    """Least overlap of boulder and bumper [m]."""
+    proved: bool
+    """Whether a pass must be proved also where the readings allow no proof."""
+
+
+class Ruling(NamedTuple):
+    """What the rules make of one row; NaN where it was not computed."""
+
+    rule: int
+    """The rule that decides it."""
+    overlap: float
+    """Height of the top of the boulder over the underside of the bumper [m]."""
+    penetration: float
+    """How far the leading edge of the cargo bed came past the far face of the boulder [m]."""
+    margin: float
+    """Least (limit - value) / limit of rotation and penetration [-]."""
+
+
+RULINGS = Ruling._fields
+"""Rows of the array of `write_rulings`."""
+SIZES = ("L", "H", "d", "e_bumper", "bed_offset")
+"""Rows of the array of inputs that it takes."""
+
+
+@exact_inlined
+def is_simulated(status: int) -> bool:
+    """Whether a simulation ended with maxima to report, `boulder_kernels.outcomes.SIMULATED`."""
+    return (
+        status == Status.LIMIT.value
+        or status == Status.SETTLED.value
+        or status == Status.BELOW_LIMIT.value
+        or status == Status.UNPROVABLE.value
+        or status == Status.HORIZON.value
+        or status == Status.OUTWARD.value
+    )
+
+
+@exact_inlined
+def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimits) -> Ruling:
+    """Apply the rules to one row; arguments: see `write_rulings`."""
+    status, theta, x_v, crush = o.status[row], o.theta_max[row], o.x_v_max[row], o.crush_max[row]
+    bed_offset = sizes[4, row]
+    overlap = sizes[1, row] - sizes[2, row] - sizes[3, row]
+    penetration = x_v - bed_offset - sizes[0, row]
+    room = limits.penetration - penetration
+    margin = min((limits.rotation - theta) / limits.rotation, room / limits.penetration)
+    finite = (
+        np.isfinite(theta)
+        and np.isfinite(o.x_b_max[row])
+        and np.isfinite(x_v)
+        and np.isfinite(o.F_v_max[row])
+        and np.isfinite(crush)
+        and np.isfinite(o.t_end[row])
+    )
+    unproved = status == Status.HORIZON.value or status == Status.OUTWARD.value
+    unproved = unproved or (limits.proved and status == Status.UNPROVABLE.value)
+    # Where only one of two solutions overturns the error is infinite, and nothing is decided.
+    reached = (status == Status.LIMIT.value or theta >= limits.rotation) and not np.isinf(o.theta_error[row])
+    unsure = limits.rotation - theta < o.theta_error[row] or min(room, bed_offset - crush) < o.x_error[row]
+    if status == Status.NO_CONTACT.value:
+        rule = NO_CONTACT
+    elif not (is_simulated(status) and finite):
+        rule = NOT_COMPUTED
+    elif reached:
+        rule = OVERTURNS
+    elif penetration > limits.penetration:
+        rule = PENETRATION
+    elif crush > bed_offset:
+        rule = CRUSH
+    elif overlap < limits.min_overlap:
+        rule = OVERRIDE
+    elif unproved:
+        rule = UNPROVED
+    elif unsure:
+        rule = NUMERICAL_ERROR
+    else:
+        rule = PASSES
+    return Ruling(rule, overlap, penetration, margin)
+
+
+@exact_kernel
+def write_rulings(o: OutcomeTable, sizes: np.ndarray, limits: VerdictLimits, out: np.ndarray) -> None:
+    """Apply the rules to n rows.
+
+    Parameters
+    ----------
+    o
+        What the simulations gave, arrays of shape (n,).
+    sizes
+        Inputs of the same rows [m], shape (len(SIZES), n).
+    limits
+        Limits of the criterion.
+    out
+        Where the rulings go, shape (len(RULINGS), n).
+    """
+    for row in range(out.shape[1]):
+        ruling = ruling_of(o, sizes, row, limits)
+        out[0, row] = ruling.rule
+        out[1, row] = ruling.overlap
+        out[2, row] = ruling.penetration
+        out[3, row] = ruling.margin
