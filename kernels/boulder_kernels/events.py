@@ -1,4 +1,4 @@
-"""The instants at which a mode changes: where in a step they lie.
+"""The instants at which a mode changes: where in a step they lie, and which modes follow.
 
 A gap (`boulder_kernels.gaps`) that is negative at the end of a step puts its event inside it; there the step is cut.
 The gaps that end below zero, each scaled to end at -1, have a least one, which passes zero where the first event is. A

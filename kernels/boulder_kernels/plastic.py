@@ -51,7 +51,7 @@ class Memory(NamedTuple):
 
 
 WORK, PEAK, SWING, LAST = range(4)
-"""Places in `Memory.so_far`; from LAST on, the state."""
+"""Indices of `Memory.so_far`; from LAST on, the state."""
 
 _record: Any = namedtuple
 PlasticConstants = _record("PlasticConstants", (*Constants._fields, "soil", "memory"))

@@ -203,7 +203,7 @@ def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     sin_max, versin_max = sine_versine(theta_max)
     t = versin_max / sin_max if sin_max > 0.0 else 0.0
     lift = c.C_cos + c.C_sin * t
-    # Location the tangent where, along the line of the largest versine, the energy is least.
+    # The tangent is placed where, along the line of the largest versine, the energy is least.
     along = c.z_0 - c.l_n * t
     low, high = MOVED_FROM * sin_max, sin_max
     f_low, f_high = lift + slope_along(x_max, low, along, c), lift + slope_along(x_max, high, along, c)

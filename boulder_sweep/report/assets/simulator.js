@@ -23,7 +23,7 @@ function passiveCoefficient(phi) {
 }
 
 /**
- * The coefficient of a law of the soil's ultimate resistance over the paper's: `boulder_sweep.judge.resistance`.
+ * The coefficient of a law of the soil's ultimate resistance over the paper's: `boulder_sweep.soils`.
  * @param {string} law
  * @param {KernelDesign} design
  * @returns {number}
@@ -36,7 +36,7 @@ function resistanceFactor(law, { phi, W, d }) {
 }
 
 /**
- * What a slope leaves of the resistance: `boulder_sweep.judge.ground.slope_factor`.
+ * What a slope leaves of the resistance: `boulder_sweep.soils.slope_factor`.
  * @param {Ground} ground
  * @param {number} phi [rad]
  * @returns {number}
@@ -48,7 +48,7 @@ function slopeFactor({ slope_deg }, phi) {
 }
 
 /**
- * The layers of the soil of a design as the kernel takes them: `boulder_sweep.judge.ground.layers_of`.
+ * The layers of the soil of a design as the kernel takes them: `boulder_sweep.soils.layers_of`.
  * @param {string} law
  * @param {Ground} ground
  * @param {KernelDesign} design
