@@ -65,7 +65,7 @@ def simulate(
     stiff : bool
         Integrate by Radau's implicit method.
     unloading : {'elastic', 'plastic', 'plastic_with_gap'}
-        Whether the soil is elastic; if not, `elements` must be given. Its memory stands in the state.
+        Whether the soil springs back; if not, `elements` must be given. What it remembers stands in the state.
 
     Returns
     -------
