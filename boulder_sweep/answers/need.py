@@ -232,9 +232,6 @@ def need(
     return Need(sweep, table, key, least_margin, simulated, chance)
 
 
-"""The same by its other name."""
-
-
 def _question(
     sweep: Sweep,
     key: Key,

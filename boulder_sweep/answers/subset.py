@@ -61,7 +61,7 @@ class Failing:
     estimate, low, high : ndarray, shape (n,)
         The probability and its confidence interval; NaN where there is none.
     by : ndarray of int32, shape (n,)
-        Location in `FAILING`.
+        Index in `FAILING`.
     """
 
     estimate: np.ndarray

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import queue
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
@@ -29,6 +33,16 @@ _LOOK_EVERY_S = 10.0
 """Time without a result after which is looked whether there are workers [s]."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A call on a cluster."""
+
+    call: Call
+    future: Any
+    only: frozenset[str]
+    """The workers that it was given to; empty for any."""
+
+
 class Pool:
     """Yields the results of calls in their order, with a bounded number of calls in progress.
 
@@ -40,6 +54,8 @@ class Pool:
         Threads; all cores by default. With one job everything runs in the calling thread.
     cluster
         Where to work instead.
+    clock
+        Gives the time [s].
 
     Raises
     ------
@@ -47,8 +63,9 @@ class Pool:
         The number of threads is not a whole number, or out of range.
     """
 
-    def __init__(self, jobs: int | None, cluster: Cluster | None = None):
+    def __init__(self, jobs: int | None, cluster: Cluster | None = None, clock: Callable[[], float] = time.monotonic):
         check_jobs(jobs)
+        self._clock = clock
         self._jobs, self._cluster = jobs, cluster
         self._fetch_s = FETCH_S
 
@@ -82,22 +99,56 @@ class Pool:
         ClusterLostError
             The scheduler or the workers are gone.
         """
-        most = _CALLS_PER_THREAD * max(sum(cluster.threads().values()), 1)
-        waiting: deque[Any] = deque()
-        for function, arguments, options in calls:
-            waiting.append(cluster.client.submit(function, *arguments, **options, pure=False))
-            if len(waiting) >= most:
-                yield self._result(cluster, waiting.popleft())
-        while waiting:
-            yield self._result(cluster, waiting.popleft())
+        from boulder_sweep.runner.silence import Silence
 
-    def _result(self, cluster: Cluster, future: Any) -> Any:
-        """Wait for a result; a worker that dies is replaced by another as long as there is one."""
+        silence = Silence(cluster)
+        most = _CALLS_PER_THREAD * max(sum(cluster.threads().values()), 1)
+        waiting: deque[_Asked] = deque()
+
+        def submitted(call: Call) -> _Asked:
+            """Hand a call to the workers that are not silent."""
+            only = sorted(cluster.threads().keys() - silence.silent) if silence.silent else None
+            function, arguments, options = call
+            future = cluster.client.submit(function, *arguments, **options, workers=only, pure=False)
+            return _Asked(call, future, frozenset(only or ()))
+
+        def first_of() -> Any:
+            """Look for silent workers, give their calls to others, and return the future of the first call."""
+            in_flight = {asked.future: asked.only for asked in waiting}
+            for hung in silence.look(self._clock(), in_flight):
+                place = next(k for k, asked in enumerate(waiting) if asked.future is hung)
+                hung.release()
+                waiting[place] = submitted(waiting[place].call)
+            return waiting[0].future
+
+        for call in calls:
+            waiting.append(submitted(call))
+            if len(waiting) >= most:
+                yield self._result(cluster, waiting[0].future, first_of)
+                waiting.popleft()
+        while waiting:
+            yield self._result(cluster, waiting[0].future, first_of)
+            waiting.popleft()
+
+    def _result(self, cluster: Cluster, future: Any, renewed: Callable[[], Any] | None = None) -> Any:
+        """Wait for a result; a worker that dies or hangs is replaced by another as long as there is one.
+
+        Parameters
+        ----------
+        cluster, future
+            What is waited for.
+        renewed
+            Called while it does not come; returns the future that stands for the same call then.
+        """
         without_s = 0.0
         while True:
-            finished, patience_s = future.done(), self._fetch_s
+            finished = future.done()
+            # Only a result that is there is worth waiting for longer: its worker may be far away.
+            patience_s = self._fetch_s if finished else min(self._fetch_s, FETCH_S)
             try:
-                return future.result(timeout=patience_s)
+                if patience_s <= FETCH_S:
+                    return future.result(timeout=patience_s)
+                return _fetched(future, patience_s, renewed)
             except TimeoutError as late:
                 if future.status == "error":  # the call itself ran out of time
                     raise BackendError(f"the workers cannot answer this: {one_line(late)}") from late
@@ -108,12 +159,42 @@ class Pool:
                     without_s = 0.0
                     if not cluster.threads():
                         raise ClusterLostError(f"{cluster.lost_text()}: no worker is left") from None
+                future = future if renewed is None else renewed()
             except BoulderSweepError:
                 raise
             except Exception as problem:
                 if cluster.client.status != "running":
                     raise ClusterLostError(cluster.lost_text()) from problem
                 raise BackendError(f"the workers cannot answer this: {one_line(problem)}") from problem
+
+
+def _fetched(future: Any, limit_s: float, renewed: Callable[[], Any] | None) -> Any:
+    """Fetch a result that may take long, and look meanwhile whether another future stands for the call.
+
+    Raises
+    ------
+    TimeoutError
+        It did not come in time, or is no longer wanted.
+    """
+    came: queue.SimpleQueue[tuple[Any, Exception | None]] = queue.SimpleQueue()
+
+    def fetch() -> None:
+        try:
+            came.put((future.result(timeout=limit_s), None))
+        except Exception as problem:
+            came.put((None, problem))
+
+    threading.Thread(target=fetch, daemon=True).start()
+    while True:
+        try:
+            result, problem = came.get(timeout=FETCH_S)
+        except queue.Empty:
+            if renewed is not None and renewed() is not future:
+                raise TimeoutError from None
+            continue
+        if problem is not None:
+            raise problem
+        return result
 
 
 @contextmanager

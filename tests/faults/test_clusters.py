@@ -16,6 +16,7 @@ from urllib.request import urlopen
 import pytest
 from distributed import Future, LocalCluster
 
+import boulder_sweep
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner import remote
@@ -264,6 +265,27 @@ def test_a_worker_that_hangs_is_named_and_others_get_its_tasks(tmp_path):
         assert stopped.poll() is None
     run(grid_of(rows), tmp_path / "whole", **how)
     assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+
+
+@pytest.mark.nightly
+def test_answers_do_not_wait_for_a_worker_that_hangs(tmp_path, monkeypatch):
+    monkeypatch.setattr(backend, "CONNECT_S", 10.0)
+    angles = "soil.friction_angle={from: 34 deg, to: 44 deg, count: 400}"
+    sweep = boulder_sweep.load(ROOT / "configs" / "site.yaml", [angles])
+    with Cluster(2, tmp_path) as cluster:
+        stopped, calls = cluster.workers[0], []
+
+        def progress(done, total):
+            if not calls:
+                stopped.send_signal(signal.SIGSTOP)
+            calls.append((done, total))
+
+        answers = boulder_sweep.need(
+            sweep, "embedment_depth", backend="dask", scheduler=cluster.address, progress=progress
+        )
+        stopped.send_signal(signal.SIGCONT)
+    assert len(calls) > 2
+    assert answers.frame.equals(boulder_sweep.need(sweep, "embedment_depth").frame)
 
 
 @pytest.mark.nightly

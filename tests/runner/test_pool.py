@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import pickle
+import threading
 
 import pytest
 
@@ -11,6 +13,7 @@ from boulder_sweep.errors import BackendError, QuestionError
 from boulder_sweep.runner.pool import Pool, pool
 from boulder_sweep.runner.sweeper import estimate
 from tests.runner.grids import grid_of
+from tests.waiting import HANG_GUARD_S
 
 
 def times(number, *, by=2):
@@ -123,3 +126,80 @@ def test_a_result_that_comes_late_is_waited_for():
     assert late.asked == 3
     with pytest.raises(BackendError, match="TimeoutError: no answer from the store"):
         Pool(1)._result(Workers(), Failed())
+
+
+class Hanging:
+    """A cluster whose worker b hangs: it has calls, but no heartbeats and no results."""
+
+    status, silent, kind = "running", frozenset(), None
+
+    def __init__(self):
+        self.client, self.given, self.turn = self, [], itertools.cycle("ab")
+        self.beats = itertools.count()
+
+    def submit(self, function, *arguments, workers=None, pure=True):
+        worker = workers[0] if workers else next(self.turn)
+        self.given.append((worker, arguments[0]))
+        return self.kind(worker, function(*arguments))
+
+    def threads(self):
+        return {"a": 1, "b": 1}
+
+    def last_seen(self):
+        return {"a": float(next(self.beats)), "b": -1.0}
+
+    def tasks_of(self, workers):
+        return {f"{worker} {value}" for worker, value in self.given if worker in workers}
+
+    def lost_text(self):
+        return "the scheduler was lost"
+
+
+class HangingCall:
+    """A call on a worker, done at once but on the one that hangs."""
+
+    status = "pending"
+
+    def __init__(self, worker, value):
+        self.worker, self.value, self.key = worker, value, f"{worker} {value // 2}"
+        self.released = threading.Event()
+
+    def done(self):
+        return self.worker == "a"
+
+    def result(self, timeout):
+        assert not self.released.is_set()
+        if self.worker == "b":
+            raise TimeoutError
+        return self.value
+
+    def release(self):
+        self.released.set()
+
+
+class HeldResult(HangingCall):
+    """The same where the worker has hung when the call was done: its result is there, but is never sent."""
+
+    def done(self):
+        return True
+
+    def result(self, timeout):
+        if self.worker == "b" and timeout > 0.01:
+            self.released.wait(HANG_GUARD_S)
+        return super().result(timeout)
+
+
+@pytest.mark.parametrize("kind", [HangingCall, HeldResult])
+def test_calls_of_a_worker_that_hangs_are_made_by_others(kind, monkeypatch):
+    """Half a minute after its last heartbeat, all that it has, and nothing more is given to it."""
+    monkeypatch.setattr("boulder_sweep.runner.pool.FETCH_S", 0.01)
+    monkeypatch.setattr(Hanging, "kind", kind)
+    cluster, clock = Hanging(), itertools.count(step=5.0)
+    workers = Pool(1, cluster, lambda: next(clock))
+    workers._fetch_s = 0.01
+    assert list(workers((times, (value,), {}) for value in range(9))) == list(range(0, 18, 2))
+    by_b = [value for worker, value in cluster.given if worker == "b"]
+    assert by_b == [1, 3, 5]
+    assert [worker for worker, value in cluster.given[6:]] == ["a"] * (len(cluster.given) - 6)
+    assert sorted(value for worker, value in cluster.given if worker == "a") == list(range(9))
+    assert next(clock) <= 5.0 * 10, "found out by counting looks"
