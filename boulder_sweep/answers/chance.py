@@ -18,10 +18,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import joblib
 import numpy as np
 from scipy.special import betaincinv, ndtri, stdtrit
 from scipy.stats import qmc
+
+from boulder_sweep.runner.pool import Pool, call
 
 SCRAMBLINGS = 16
 """Independent estimates."""
@@ -58,8 +59,8 @@ class Points:
         """Return the first points of every scrambling, shape (SCRAMBLINGS, count, dimensions)."""
         more = count - self._points.shape[1]
         if more > 0:
-            parallel = joblib.Parallel(n_jobs=-1 if more >= MANY else 1, backend="threading")
-            new = parallel(joblib.delayed(_normal)(engine, more) for engine in self._engines)
+            parallel = Pool(None if more >= MANY else 1)
+            new = list(parallel(call(_normal, engine, more) for engine in self._engines))
             self._points = np.concatenate([self._points, np.stack(new)], axis=1)
         return self._points[:, :count]
 

@@ -8,7 +8,6 @@ strain rate factor does (Eq 27).
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -16,10 +15,10 @@ import numpy as np
 
 from boulder_sweep.answers.chance import SCRAMBLINGS, Points
 from boulder_sweep.answers.draws import Draws, threads
-from boulder_sweep.answers.spread import Spread, uncertain_rows
-from boulder_sweep.answers.trials import Judges, Rows, judges_of
+from boulder_sweep.answers.spread import Spread
+from boulder_sweep.answers.trials import Judges, Rows, every_reading, judges_of, uncertain_rows
 from boulder_sweep.designs import block_of
-from boulder_sweep.settings.model import PRINTED, SWITCHES, ReadingChoice
+from boulder_sweep.settings.model import SWITCHES
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -48,13 +47,6 @@ class Doubt:
     cause: str
     alone: float
     total: float
-
-
-def every_reading(sweep: Sweep) -> list[Sweep]:
-    """Return a sweep with every combination of the five readings."""
-    choices = itertools.product(*((PRINTED, corrected) for corrected in SWITCHES.values()))
-    readings = (ReadingChoice(**dict(zip(SWITCHES, own, strict=True))) for own in choices)
-    return [replace(sweep, model=replace(sweep.model, readings=own)) for own in readings]
 
 
 def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = None) -> list[Doubt]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import joblib
 import numpy as np
 from scipy.special import ndtr
 
 from boulder_sweep.answers.trials import Judges, Rows
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.judged import ERROR, NO_CONTACT, UNDECIDED
-from boulder_sweep.runner.pool import Pool
+from boulder_sweep.runner.pool import Pool, call
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.spread import Spread
@@ -98,7 +97,8 @@ class Draws:
     ) -> np.ndarray:
         ends = range(0, len(index), AT_ONCE)
         pieces = self.parallel(
-            joblib.delayed(self._piece)(
+            call(
+                self._piece,
                 index[at : at + AT_ONCE],
                 z[at : at + AT_ONCE],
                 {name: values[at : at + AT_ONCE] for name, values in inputs.items()},

@@ -8,27 +8,23 @@ run`` would judge them. If that disagrees, the row is searched again with the ac
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import joblib
-
-from boulder_sweep.answers.doubts import every_reading
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
 from boulder_sweep.answers.lightest import SIDES, LightestQuestion
-from boulder_sweep.answers.questions import ProbabilityQuestion, Question
+from boulder_sweep.answers.questions import Question
 from boulder_sweep.answers.result import Result
 from boulder_sweep.answers.search import BLOCKED, WORDS
-from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
+from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, other_readings, ranges
 from boulder_sweep.columns import OPTIONAL_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.backends import THREADING
-from boulder_sweep.runner.pool import pool
+from boulder_sweep.runner.pool import call, pool
 from boulder_sweep.settings.fields import EMBEDMENT
-from boulder_sweep.settings.model import ReadingChoice
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
@@ -219,7 +215,7 @@ def need(
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
     tables, simulated, done = [], 0, 0
     with pool(jobs, backend, scheduler) as workers:
-        for table, count in workers(joblib.delayed(_table_of)(asked, start, stop) for start, stop in pieces):
+        for table, count in workers(call(_table_of, asked, start, stop) for start, stop in pieces):
             tables.append(table)
             simulated += count
             done += len(table)
@@ -253,13 +249,9 @@ def _question(
     chance = share(probability, "--probability")
     if not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
+    from boulder_sweep.answers.probability import ProbabilityQuestion  # imports scipy.stats
+
     return ProbabilityQuestion(sweep, key, between, judges, chance, seed, variants)
-
-
-def other_readings(sweep: Sweep) -> Sweep:
-    """Return the sweep with the other preset of readings: as printed where it is corrected, else corrected."""
-    preset = "as_printed" if sweep.model.preset == "corrected" else "corrected"
-    return replace(sweep, model=replace(sweep.model, readings=ReadingChoice.of_preset(preset)))
 
 
 def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: int) -> tuple[pa.Table, int]:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import joblib
 import numpy as np
 
 from boulder_sweep.answers.draws import threads
@@ -20,6 +19,7 @@ from boulder_sweep.answers.search import FAILS, HOLDS, Search, search
 from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.locations import Location
+from boulder_sweep.runner.pool import call
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
         progress(0, sweep.n_designs)
     tables, done = [], 0
     pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
-    for table in threads(jobs)(joblib.delayed(_table)(sweep, judges, start, stop) for start, stop in pieces):
+    for table in threads(jobs)(call(_table, sweep, judges, start, stop) for start, stop in pieces):
         tables.append(table)
         done += len(table)
         if progress is not None:

@@ -85,18 +85,6 @@ class Spread:
         return found
 
 
-def uncertain_rows(sweep: Sweep, given: Rows, start: int, stop: int) -> Rows:
-    """Return the rows ``[start, stop)`` of a sweep with the places of their named soils and vehicles.
-
-    These are needed where named sets have distributions of their own; `boulder_sweep.designs.block_of` ignores them.
-    """
-    sets = {own.section for own in sweep.distributions.values() if isinstance(own, SetDistributions)}
-    if not sets:
-        return given
-    labels = sweep.block(start, stop).labels
-    return given | {section: np.asarray(labels[section].codes, dtype=float) for section in sets}
-
-
 def _drawn(
     spread: Distribution | SetDistributions, given: Rows, mean: np.ndarray, z: np.ndarray, moving: Moving | None
 ) -> np.ndarray:

@@ -16,14 +16,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from boulder_sweep.answers.search import WORDS
-from boulder_sweep.answers.sensitivity import Indices
-from boulder_sweep.answers.subset import FAILING
 from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.provenance import identity_in, judged_by, sha256_of
-from boulder_sweep.store.schema import part_table
+from boulder_sweep.store.schema import number_array, part_table, word_array
 from boulder_sweep.store.targets import check_target
 from boulder_sweep.text import one_line, why
 
@@ -33,6 +31,7 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.chance import Chance
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.questions import Answers
+    from boulder_sweep.answers.sensitivity import Indices
     from boulder_sweep.answers.subset import Failing
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
@@ -62,7 +61,6 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
     sense = "largest" if key.most else "smallest"
     unit = key.field.unit
     what = f"{sense} value of {key.field.path} that passes"
-    stretches = pa.array(own.stretches, pa.string()).dictionary_encode()
     columns: list[tuple[str, str, str, pa.Array]] = [
         (key.answer, unit, f"{what}; null where none does", _numbers(own.passes)),
         (
@@ -72,14 +70,9 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
             _numbers(own.fails),
         ),
         ("passes_at", unit, "the same as the answer: judged as a run judges it", _numbers(own.passes)),
-        ("found", "", "found, always, never, not_monotone or blocked_by_overlap", _words(own.kind)),
-        (
-            "passes_within",
-            unit,
-            "where it fails again further on: all stretches that pass",
-            stretches,
-        ),
-        (*MASS, pa.array(boulder_mass(table))),
+        ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(own.kind, WORDS)),
+        ("passes_within", unit, "where it fails again further on: all stretches that pass", _words(own.stretches)),
+        (*MASS, number_array(boulder_mass(block))),
     ]
     for other, name in zip(answers[1:], readings[1:], strict=True):
         columns += [
@@ -89,7 +82,7 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
                 f"{what} by the readings {name}",
                 _numbers(other.passes),
             ),
-            (f"found_{name}", "", f"as found, by the readings {name}", _words(other.kind)),
+            (f"found_{name}", "", f"as found, by the readings {name}", word_array(other.kind, WORDS)),
         ]
     if own.chances is not None:
         columns += [
@@ -97,10 +90,10 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
                 "p_pass",
                 "1",
                 "chance of passing at the answer, or at the value tried last",
-                pa.array(own.chances.estimate),
+                number_array(own.chances.estimate),
             ),
-            ("p_pass_low", "1", "lower end of the interval of p_pass", pa.array(own.chances.low)),
-            ("p_pass_high", "1", "upper end of the interval of p_pass", pa.array(own.chances.high)),
+            ("p_pass_low", "1", "lower end of the interval of p_pass", number_array(own.chances.low)),
+            ("p_pass_high", "1", "upper end of the interval of p_pass", number_array(own.chances.high)),
         ]
     for place, (name, own_unit, meaning, array) in enumerate(columns):
         field = pa.field(name, array.type, metadata={"unit": own_unit, "meaning": meaning})
@@ -135,20 +128,21 @@ def chance_table(
         Probabilities of failing, small ones by subset simulation.
     """
     table = part_table(replace(block, start=start, stop=start + len(block)), judged, {})
-    places = pa.array(driver.astype(np.int32), mask=driver < 0)
     columns: list[tuple[str, str, str, pa.Array]] = [
-        ("p_pass", "1", "chance that the design passes", pa.array(found.estimate)),
-        ("p_pass_low", "1", "lower end of the interval of p_pass", pa.array(found.low)),
-        ("p_pass_high", "1", "upper end of the interval of p_pass", pa.array(found.high)),
+        ("p_pass", "1", "chance that the design passes", number_array(found.estimate)),
+        ("p_pass_low", "1", "lower end of the interval of p_pass", number_array(found.low)),
+        ("p_pass_high", "1", "upper end of the interval of p_pass", number_array(found.high)),
         (
             "p_pass_driver",
             "",
             "most influential of the uncertain inputs; null where they change nothing",
-            pa.DictionaryArray.from_arrays(places, pa.array(list(words))),
+            word_array(driver, tuple(words)),
         ),
-        ("p_pass_designs", "1", "designs drawn for p_pass", pa.array(found.points)),
+        ("p_pass_designs", "1", "designs drawn for p_pass", number_array(found.points)),
     ]
     if failing is not None:
+        from boulder_sweep.answers.subset import FAILING
+
         columns += [
             (
                 "p_fail",
@@ -164,7 +158,7 @@ def chance_table(
                 "subset: by subset simulation; drawn: by the designs drawn for p_pass; no_progress: no step of the "
                 "simulation came nearer to the rare designs; contradicts: its interval and that of p_pass "
                 "exclude each other",
-                pa.DictionaryArray.from_arrays(pa.array(failing.by), pa.array(FAILING)),
+                word_array(failing.by, FAILING),
             ),
         ]
     for name, unit, meaning, array in columns:
@@ -174,6 +168,8 @@ def chance_table(
 
 def index_table(names: Sequence[str], found: Sequence[Indices], outputs: Sequence[str]) -> pa.Table:
     """Return Sobol indices as a table, one row for each design, output and input."""
+    from boulder_sweep.answers.sensitivity import Indices
+
     values: dict[str, list[Any]] = {"design_id": [], "output": [], "input": []}
     numbers: dict[str, list[np.ndarray]] = {field.name: [] for field in fields(Indices)}
     for design, own in enumerate(found):
@@ -223,17 +219,15 @@ def with_columns(table: pa.Table, columns: Sequence[tuple[str, str, str, Any]]) 
         Name, unit, meaning, and n values: numbers, NaN for none, or words, None for none.
     """
     for name, unit, meaning, values in columns:
-        array = (
-            _numbers(values) if isinstance(values, np.ndarray) else pa.array(values, pa.string()).dictionary_encode()
-        )
+        array = _numbers(values) if isinstance(values, np.ndarray) else _words(values)
         table = table.append_column(pa.field(name, array.type, metadata={"unit": unit, "meaning": meaning}), array)
     return table
 
 
-def boulder_mass(table: pa.Table) -> np.ndarray:
-    """Mass of the boulders of a table [kg]."""
+def boulder_mass(block: DesignBlock) -> np.ndarray:
+    """Mass of the boulders of a block [kg], shape (n,)."""
     sides = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
-    return np.prod([table[side].to_numpy() for side in sides], axis=0)
+    return np.prod([block.columns[side].to_numpy() for side in sides], axis=0)
 
 
 def joined_tables(tables: Sequence[pa.Table], metadata: Mapping[bytes, bytes]) -> pa.Table:
@@ -351,8 +345,12 @@ def checked_parquet(path: str | Location) -> Location:
 
 
 def _numbers(values: np.ndarray) -> pa.Array:
-    return pa.array(values, mask=np.isnan(values))
+    """Return numbers as an array, null for NaN."""
+    return number_array(values, np.isnan(values))
 
 
-def _words(codes: np.ndarray) -> pa.Array:
-    return pa.DictionaryArray.from_arrays(pa.array(codes.astype(np.int32)), pa.array(WORDS))
+def _words(texts: Sequence[str | None]) -> pa.Array:
+    """Return words as an array, null for None."""
+    known = tuple(dict.fromkeys(text for text in texts if text is not None))
+    codes = {None: -1} | {text: code for code, text in enumerate(known)}
+    return word_array(np.array([codes[text] for text in texts], dtype=np.int32), known)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -15,6 +16,8 @@ from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import fields
+from boulder_sweep.settings.distributions import SetDistributions
+from boulder_sweep.settings.model import PRINTED, SWITCHES, ReadingChoice
 from boulder_sweep.settings.sweep import DesignList
 
 if TYPE_CHECKING:
@@ -116,6 +119,31 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
         coarse = final
     return Judges(coarse, final, accuracy, least_margin)
+
+
+def every_reading(sweep: Sweep) -> list[Sweep]:
+    """Return a sweep with every combination of the five readings."""
+    choices = itertools.product(*((PRINTED, corrected) for corrected in SWITCHES.values()))
+    readings = (ReadingChoice(**dict(zip(SWITCHES, own, strict=True))) for own in choices)
+    return [dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=own)) for own in readings]
+
+
+def other_readings(sweep: Sweep) -> Sweep:
+    """Return the sweep with the other preset of readings: as printed where it is corrected, else corrected."""
+    preset = "as_printed" if sweep.model.preset == "corrected" else "corrected"
+    return dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=ReadingChoice.of_preset(preset)))
+
+
+def uncertain_rows(sweep: Sweep, given: Rows, start: int, stop: int) -> Rows:
+    """Return the rows ``[start, stop)`` of a sweep with the places of their named soils and vehicles.
+
+    These are needed where named sets have distributions of their own; `boulder_sweep.designs.block_of` ignores them.
+    """
+    sets = {own.section for own in sweep.distributions.values() if isinstance(own, SetDistributions)}
+    if not sets:
+        return given
+    labels = sweep.block(start, stop).labels
+    return given | {section: np.asarray(labels[section].codes, dtype=float) for section in sets}
 
 
 def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:

@@ -13,9 +13,9 @@ from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
 from boulder_sweep.answers.result import Result
 from boulder_sweep.answers.sensitivity import drivers, indices
-from boulder_sweep.answers.spread import Spread, uncertain_rows
+from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.subset import FAILING, Failing, subset_simulation
-from boulder_sweep.answers.trials import Judges, judges_of, ranges
+from boulder_sweep.answers.trials import Judges, judges_of, ranges, uncertain_rows
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError

@@ -73,13 +73,13 @@ def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, byte
     pyarrow.Table
         Columns in the order of the register, then those that not every table has; null where a value is NaN.
     """
-    arrays = [_array(block.design_id())]
+    arrays = [number_array(block.design_id())]
     arrays += [_input_array(block.columns[spec.name]) for spec in INPUTS]
     resting = [spec for spec in AT_REST if spec.name in judged.columns]
     arrays += [_outcome_array(spec, judged) for spec in (*OUTCOMES, *resting)]
     optional = [name for name in OPTIONAL_COLUMNS if name in block.columns]
     arrays += [_input_array(block.columns[name]) for name in optional]
-    arrays += [_word_array(label.codes, label.words) for label in block.labels.values()]
+    arrays += [word_array(label.codes, label.words) for label in block.labels.values()]
     specs = [*COLUMNS, *resting, *(column_spec(name) for name in (*optional, *block.labels))]
     fields = [_field(spec, array.type) for spec, array in zip(specs, arrays, strict=True)]
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata, specs)))
@@ -146,26 +146,26 @@ def _input_array(column: Column) -> pa.Array:
     """One input column; its codes become the indices of a dictionary array without a lookup."""
     missing = np.isnan(column.values)
     if column.codes is None:
-        return _array(column.values, missing)
+        return number_array(column.values, missing)
     mask = missing[column.codes] if missing.any() else None
-    return pa.DictionaryArray.from_arrays(_array(column.codes, mask), _array(column.values), safe=False)
+    return pa.DictionaryArray.from_arrays(number_array(column.codes, mask), number_array(column.values), safe=False)
 
 
 def _outcome_array(spec: OutcomeColumn, judged: Judged) -> pa.Array:
     """One outcome column."""
     values = judged[spec.name]
     if spec.type == "dictionary":
-        return _word_array(values, judged.words[spec.name])
-    return _array(values, np.isnan(values))
+        return word_array(values, judged.words[spec.name])
+    return number_array(values, np.isnan(values))
 
 
-def _word_array(codes: np.ndarray, words: tuple[str, ...]) -> pa.DictionaryArray:
+def word_array(codes: np.ndarray, words: tuple[str, ...]) -> pa.DictionaryArray:
     """Array of words from codes; code -1 is null."""
-    indices = _array(codes.astype(np.int32, copy=False), codes < 0)
+    indices = number_array(codes.astype(np.int32, copy=False), codes < 0)
     return pa.DictionaryArray.from_arrays(indices, _texts(words), safe=False)
 
 
-def _array(values: np.ndarray, missing: np.ndarray | None = None) -> pa.Array:
+def number_array(values: np.ndarray, missing: np.ndarray | None = None) -> pa.Array:
     """Array of numbers, null where they are missing; it shares their memory.
 
     Avoids `pyarrow.array`, which imports pandas to check for its types: a good part of the time of a run of a hundred
@@ -179,7 +179,7 @@ def _array(values: np.ndarray, missing: np.ndarray | None = None) -> pa.Array:
 
 
 def _texts(words: tuple[str, ...]) -> pa.Array:
-    """Array of words, made as `_array` and for the same reason."""
+    """Array of words, made as `number_array` and for the same reason."""
     encoded = [word.encode() for word in words]
     ends = np.cumsum([0, *map(len, encoded)], dtype=np.int32)
     return pa.StringArray.from_buffers(len(words), pa.py_buffer(ends), pa.py_buffer(b"".join(encoded)))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boulder_sweep.answers.doubts import INPUTS, LAW, NUMERICAL, READINGS, doubts, every_reading, parted
+from boulder_sweep.answers.doubts import INPUTS, LAW, NUMERICAL, READINGS, doubts, parted
 from boulder_sweep.answers.need import need
+from boulder_sweep.answers.trials import every_reading
 from boulder_sweep.errors import QuestionError
 from tests.answers.designs import site
 

@@ -72,6 +72,7 @@ def test_version(sweep):
         (["check", str(ROOT / "configs" / "m30_sizing.yaml")], HEAVY),
         (["check", str(ROOT / "configs" / "crash_tests.yaml")], HEAVY),
         (["simulate", str(ROOT / "configs" / "rwg.yaml")], BESIDE_THE_KERNELS),
+        (["need", str(ROOT / "configs" / "site.yaml")], ("scipy", "pandas", "matplotlib", "joblib", "rich", "dask")),
     ],
 )
 def test_nothing_heavy_is_loaded(words, unused):
