@@ -6,12 +6,9 @@ away from the truck; alpha is the depth below the soil line, 0 ... d.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import lower_builtin, type_callable
 
 from ._jit import exact_inlined
 from .numerics import direction, half_tangent
@@ -109,29 +106,6 @@ def design_at(table: DesignTable, row: int) -> Design:
 def design_in(designs: np.ndarray, row: int) -> Design:
     """Return one design of an array whose rows are the columns of a `DesignTable`."""
     return Design(*designs[:, row])
-
-
-# Inside kernels it is one load for every field: an index that need not be checked lets a loop over rows be vectorised.
-
-
-@type_callable(design_in)
-def _type_design_in(context: Any) -> Callable[..., Any]:
-    def result(designs: Any, row: Any) -> Any:
-        """Return the type of the result, or None where a column is not one piece of memory."""
-        return types.NamedUniTuple(designs.dtype, len(Design._fields), Design) if designs.layout == "C" else None
-
-    return result
-
-
-@lower_builtin(design_in, types.Array, types.Any)
-def _lower_design_in(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    designs = context.make_array(sig.args[0])(context, builder, args[0])
-    columns = builder.extract_value(designs.shape, 1)
-    place, numbers = context.cast(builder, args[1], sig.args[1], types.intp), []
-    for _ in Design._fields:
-        numbers.append(builder.load(builder.gep(designs.data, [place], inbounds=True)))
-        place = builder.add(place, columns)
-    return context.make_tuple(builder, sig.return_type, numbers)
 
 
 class Constants(NamedTuple):

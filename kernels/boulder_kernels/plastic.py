@@ -22,9 +22,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from ._jit import kernel, summing_kernel
+from ._jit import kernel, overload, summing_kernel
 from .design import Constants
 from .layered import SoilElements
 from .layered_soil import power_of_elements
@@ -63,7 +62,7 @@ def memory_of(c: Any) -> Memory | None:
     return c.memory if isinstance(c, PlasticConstants) else None
 
 
-@overload(memory_of, inline="always", strict=False)
+@overload(memory_of)
 def _memory_of(c: Any) -> Callable[..., Any]:
     return (lambda c: c.memory) if c.instance_class is PlasticConstants else (lambda c: None)
 

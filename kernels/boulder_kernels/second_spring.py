@@ -21,9 +21,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from ._jit import exact_kernel, function_of, kernel
+from ._jit import exact_kernel, function_of, kernel, overload
 from .after_step import Kept
 from .dense_output import DenseOutput, state_at
 from .design import Constants, Design
@@ -67,7 +66,7 @@ def on_second_spring(c: Constants, k_2: float, u_0: float) -> Constants:
     return c._replace(k_v=k_2, k_m=c.k_m * (k_2 / c.k_v), u_0=u_0)
 
 
-@overload(on_second_spring, inline="always", strict=False)
+@overload(on_second_spring)
 def _on_second_spring(c: Any, k_2: Any, u_0: Any) -> Callable[..., Any]:
     """Write out every field, of `Constants` or of a record that has more."""
     changed = {"k_v": "k_2", "k_m": "c.k_m * (k_2 / c.k_v)", "u_0": "u_0"}

@@ -13,9 +13,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from ._jit import exact_inlined, function_of, kernel, unless_none
+from ._jit import exact_inlined, function_of, kernel, overload, unless_none
 from .design import Constants, Design, Readings, SoilMass, constants_of, constants_with
 from .layered import (
     Bounds,
@@ -116,7 +115,7 @@ def by_law(field: str, *names: str) -> Callable[..., Any]:
         return function_of(source, of_law=getattr(law_of(arguments[-1]), field))
 
     uniform = getattr(UNIFORM, field)
-    overload(call, inline="always", strict=False)(write_call)
+    overload(call)(write_call)
     return call
 
 
@@ -155,7 +154,7 @@ def with_records(c: Constants, soil: Any, memory: Memory | None) -> Any:
     return LayeredConstants(*c, soil) if memory is None else PlasticConstants(*c, soil, memory)
 
 
-@overload(with_records, inline="always", strict=False)
+@overload(with_records)
 def _with_records(c: Any, soil: Any, memory: Any) -> Callable[..., Any]:
     values = ", ".join(f"c.{name}" for name in Constants._fields)
     if hasattr(memory, "instance_class"):

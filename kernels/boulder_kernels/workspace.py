@@ -11,13 +11,11 @@ constants, and no index need be checked for being negative, as one that counts f
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
-from numba import types
-from numba.extending import lower_builtin, type_callable
 
+from ._jit import when_compiling
 from .dense_output import Track
 from .design import Constants, Design
 from .dynamics import Acceleration, State
@@ -150,7 +148,7 @@ MOMENT = _place("moment")
 """Net moment where the step is cut [N m]."""
 STATUS_OF_LANE = _place("status")
 DESIGN = _place("design")
-_RECORDS = {_place(name): record for name, record in _ALL.items()}
+RECORDS = {_place(name): record for name, record in _ALL.items()}
 
 
 def field(ws: np.ndarray, place: int, lane: int) -> float:
@@ -163,7 +161,7 @@ def put(ws: np.ndarray, place: int, lane: int, value: float) -> None:
     ws[place + lane] = value
 
 
-def _offsets(record: Any) -> dict[str, int]:
+def offsets_of(record: Any) -> dict[str, int]:
     """Where the fields that are kept of a record lie, from its place on."""
     kept = (name for name in record._fields if name not in KNOWN)
     return {name: i * LANES for i, name in enumerate(kept)}
@@ -171,8 +169,8 @@ def _offsets(record: Any) -> dict[str, int]:
 
 def load(ws: np.ndarray, place: int, lane: int) -> Any:
     """Return the record at a place, one of the constants above, for one lane."""
-    record = _RECORDS[place]
-    offsets = _offsets(record)
+    record = RECORDS[place]
+    offsets = offsets_of(record)
     numbers = [
         kind(ws[place + offsets[name] + lane]) if name in offsets else KNOWN[name]
         for name, kind in get_type_hints(record).items()
@@ -182,7 +180,7 @@ def load(ws: np.ndarray, place: int, lane: int) -> Any:
 
 def store(ws: np.ndarray, place: int, lane: int, record: Any) -> None:
     """Write a record at a place, one of the constants above, for one lane."""
-    for name, offset in _offsets(type(record)).items():
+    for name, offset in offsets_of(type(record)).items():
         ws[place + offset + lane] = getattr(record, name)
 
 
@@ -199,117 +197,7 @@ def copy_lane(ws: np.ndarray, lane: int, other: int, end: int) -> None:
     ws[other : other + end : LANES] = ws[lane : lane + end : LANES]
 
 
-# Inside kernels the five are instructions of the compiler, one load or store for every number: as code to be compiled
-# and inlined wherever they are called they would take a third of the time of all kernels to compile. A copy by a loop
-# would be compiled to vectors gathered and scattered, which take three times as long.
-
-
-def _pointer(context: Any, builder: Any, kinds: Any, values: Any, offset: int = 0) -> Any:
-    """Where a number lies: from the workspace on, the sum of some whole numbers and an offset."""
-    first = context.get_constant(types.intp, offset)
-    for kind, value in zip(kinds[1:], values[1:], strict=True):
-        first = builder.add(first, context.cast(builder, value, kind, types.intp))
-    return builder.gep(context.make_array(kinds[0])(context, builder, values[0]).data, [first], inbounds=True)
-
-
-LINE = 64
-"""Bytes of a line of the fast memory."""
-
-
-@type_callable(align_stack)
-def _type_align_stack(context: Any) -> Callable[..., Any]:
-    return lambda: types.void
-
-
-@lower_builtin(align_stack)
-def _lower_align_stack(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    builder.function.attributes.add("nounwind")  # as it is anyway: llvmlite writes no alignment of the stack alone
-    builder.function.attributes.alignstack = LINE
-    return context.get_dummy_value()
-
-
-_NOT_REAL = {int: types.int64, bool: types.boolean}
-
-
-@type_callable(field)
-def _type_field(context: Any) -> Callable[..., Any]:
-    return lambda ws, place, lane: ws.dtype
-
-
-@lower_builtin(field, types.Array, types.Any, types.Any)
-def _lower_field(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.load(_pointer(context, builder, sig.args[:3], args[:3]))
-
-
-@type_callable(put)
-def _type_put(context: Any) -> Callable[..., Any]:
-    return lambda ws, place, lane, value: types.void
-
-
-@lower_builtin(put, types.Array, types.Any, types.Any, types.Any)
-def _lower_put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    value = context.cast(builder, args[3], sig.args[3], sig.args[0].dtype)
-    builder.store(value, _pointer(context, builder, sig.args[:3], args[:3]))
-    return context.get_dummy_value()
-
-
-@type_callable(load)
-def _type_load(context: Any) -> Callable[..., Any]:
-    def result(ws: Any, place: Any, lane: Any) -> Any:
-        """Return the type of the record, or None where the place is not yet known as a constant."""
-        if not isinstance(place, types.IntegerLiteral):
-            return None
-        record = _RECORDS[place.literal_value]
-        kinds = [_NOT_REAL.get(kind, ws.dtype) for kind in get_type_hints(record).values()]
-        return types.BaseTuple.from_types(kinds, record)
-
-    return result
-
-
-@lower_builtin(load, types.Array, types.IntegerLiteral, types.Any)
-def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    record = sig.return_type.instance_class
-    offsets = _offsets(record)
-    values = []
-    for name, kind in zip(record._fields, sig.return_type.types, strict=True):
-        if name in offsets:
-            number = builder.load(_pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
-            values.append(context.cast(builder, number, sig.args[0].dtype, kind))
-        else:
-            values.append(context.get_constant(kind, KNOWN[name]))
-    return context.make_tuple(builder, sig.return_type, values)
-
-
-@type_callable(store)
-def _type_store(context: Any) -> Callable[..., Any]:
-    return lambda ws, place, lane, record: types.void
-
-
-@lower_builtin(store, types.Array, types.Any, types.Any, types.BaseNamedTuple)
-def _lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    record = sig.args[3]
-    offsets = _offsets(record.instance_class)
-    for i, (name, kind) in enumerate(zip(record.fields, record.types, strict=True)):
-        if name in offsets:
-            value = context.cast(builder, builder.extract_value(args[3], i), kind, sig.args[0].dtype)
-            builder.store(value, _pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
-    return context.get_dummy_value()
-
-
-@type_callable(copy_lane)
-def _type_copy_lane(context: Any) -> Callable[..., Any]:
-    def result(ws: Any, lane: Any, other: Any, end: Any) -> Any:
-        """Return the type of the result, or None where the end is not yet known as a constant."""
-        return types.void if isinstance(end, types.IntegerLiteral) else None
-
-    return result
-
-
-@lower_builtin(copy_lane, types.Array, types.Any, types.Any, types.IntegerLiteral)
-def _lower_copy_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    for place in range(0, sig.args[3].literal_value, LANES):
-        source, target = (
-            _pointer(context, builder, (sig.args[0], sig.args[i]), (args[0], args[i]), place) for i in (1, 2)
-        )
-        builder.store(builder.load(source), target)
-    return context.get_dummy_value()
+@when_compiling
+def _lower() -> None:
+    """Register them as instructions of the compiler."""
+    from . import _lowering  # noqa: F401  registers them

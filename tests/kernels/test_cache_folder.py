@@ -16,7 +16,7 @@ from typing import IO
 
 import pytest
 
-from boulder_kernels import _jit
+from boulder_kernels import _jit, _numba
 
 ROOT = Path(__file__).parents[2]
 OTHER_USER = 65534
@@ -92,7 +92,7 @@ def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 TINY = """
-from boulder_kernels import _jit
+from boulder_kernels import _jit, _numba
 
 @_jit.kernel
 def tiny(x):
@@ -163,8 +163,8 @@ def test_a_process_forked_meanwhile_does_not_keep_others_waiting(
         kept.append(os.dup(file.fileno()))
         return file
 
-    monkeypatch.setattr(_jit.Path, "open", forked)
-    with _jit._alone(tmp_path / "lock"), opened(tmp_path / "lock") as other, pytest.raises(BlockingIOError):
+    monkeypatch.setattr(_numba.Path, "open", forked)
+    with _numba._alone(tmp_path / "lock"), opened(tmp_path / "lock") as other, pytest.raises(BlockingIOError):
         fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
     with opened(tmp_path / "lock") as other:
         fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -46,11 +46,11 @@ def test_imports_are_few(source: Path) -> None:
 
 
 def test_nothing_else_is_loaded() -> None:
-    """Nor by way of others: importing the kernels loads no package of a table, a plot or a settings file."""
+    """Nor by way of others: importing the kernels loads no package of a table, a plot or a settings file, nor Numba."""
     script = "import sys, boulder_kernels; print(*{name.partition('.')[0] for name in sys.modules})"
     loaded = run(script, {}).split()
     foreign = {"pandas", "pyarrow", "matplotlib", "joblib", "pint", "pydantic", "click", "boulder_sweep"}
-    assert not foreign & set(loaded)  # SciPy, where there is one, is loaded by Numba itself
+    assert not (foreign | {"numba", "llvmlite", "scipy"}) & set(loaded)
 
 
 def run(script: str, environment: dict[str, str]) -> str:
@@ -235,7 +235,7 @@ SAVED = """
 import fcntl, sys, time
 from pathlib import Path
 from numba.core.caching import IndexDataCacheFile
-from boulder_kernels import _jit
+from boulder_kernels import _jit, _numba
 
 def meet(*, word, other_words):
     Path(sys.argv[1] + word).touch()
@@ -268,7 +268,7 @@ def twice(x):
     return x + x
 
 if sys.argv[2:]:
-    _jit._Files.save_overload = at_once(_jit._Files.save_overload)
+    _numba.Files.save_overload = at_once(_numba.Files.save_overload)
     IndexDataCacheFile._save_index = late(IndexDataCacheFile._save_index)
     fcntl.flock = asking(fcntl.flock)
     print(twice(1 if sys.argv[1] < sys.argv[2] else 0.5))

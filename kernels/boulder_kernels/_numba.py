@@ -1,0 +1,202 @@
+"""How kernels are compiled: Numba's compiler without what they do not need, and its files on disk.
+
+Imported when the first kernel is compiled, see `boulder_kernels._jit`, which has the decorators and their flags.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import functools
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numba
+from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.runtime._nrt_python import c_helpers
+
+from . import _jit
+
+NEEDLESS = {
+    "WithLifting",
+    "InlineClosureLikes",
+    "RewriteDynamicRaises",
+    "MakeFunctionToJitFunction",
+    "InlineInlinables",
+    "FindLiterallyCalls",
+    "LiteralUnroll",
+    "LiteralPropagationSubPipelinePass",
+    "NopythonRewrites",
+    "NoPythonSupportedFeatureValidation",
+    "AnnotateTypes",
+    "DumpParforDiagnostics",
+}
+"""Steps of Numba's compiler that kernels do without, by name."""
+REPEATED = "DeadBranchPrune"
+"""A step that Numba takes three times; the last one finds everything that the others do."""
+ENVIRONMENT = "_ZN08NumbaEnv"
+"""What the names begin with of the variables by which compiled functions find Python's objects."""
+
+
+class KernelCompiler(Compiler):
+    """Numba's compiler without the steps that kernels do not need."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the steps, as Numba asks for them."""
+        (steps,) = super().define_pipelines()
+        kept = [(step, reason) for step, reason in steps.passes if step.__name__ not in NEEDLESS]
+        repeated = [place for place, (step, _) in enumerate(kept) if step.__name__ == REPEATED]
+        steps.passes = [entry for place, entry in enumerate(kept) if place not in repeated[:-1]]
+        steps.finalize()
+        return [steps]
+
+
+class InsideCompiler(KernelCompiler):
+    """The same for kernels that other kernels call."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the steps, and let the result be kept without machine code."""
+        state = self.state
+        state.library = _Taken(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().define_pipelines()
+
+
+class _Taken(JITCodeLibrary):
+    """Optimised code that is taken into that of others.
+
+    In place of its machine code there are only the variables that Numba sets wherever it has compiled a function or
+    loaded it from the disk.
+    """
+
+    def _finalize_final_module(self) -> None:
+        code = self._final_module
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        variables = [str(known) for known in code.global_variables if known.name.startswith(ENVIRONMENT)]
+        head = str(self._codegen._create_empty_module(self.name))
+        self._final_module = llvmlite.binding.parse_assembly("\n".join([head, *variables]))
+        self._final_module.name = code.name
+        super()._finalize_final_module()
+        self._final_module = code
+
+
+SETTINGS: Any = numba.config
+"""Numba's settings, which it fills in at run time."""
+_LOOKING = threading.Lock()
+
+
+def _ask_for_wide_vectors() -> None:
+    """Let the compiler use 512-bit registers where the processor has them.
+
+    For many of these processors LLVM prefers half the width, because ordinary code lowers their clock for little
+    gain. The loops over lanes are dense in multiply-adds and gain a third. The choice is Numba's, for the whole
+    process, made at its first compilation; one that the user has made (NUMBA_CPU_FEATURES) stands.
+    """
+    if SETTINGS.CPU_FEATURES is None and SETTINGS.CPU_NAME is None and SETTINGS.ENABLE_AVX:
+        features = llvmlite.binding.get_host_cpu_features()
+        if features.get("avx512f", False):
+            SETTINGS.CPU_FEATURES = f"{features.flatten()},-prefer-256-bit"
+
+
+_ask_for_wide_vectors()
+
+
+class Files:
+    """The compiled code of one function on disk, in place of Numba's cache, of which it makes one when it is asked.
+
+    Numba looks for the folder of every function that is decorated, and makes its compiler ready before it loads
+    anything. Of a start that compiles nothing that is a third.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: str):
+        self._function, self._folder = function, folder
+
+    @functools.cached_property
+    def _cache(self) -> Any:
+        with _LOOKING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
+            before = SETTINGS.CACHE_DIR
+            SETTINGS.CACHE_DIR = self._folder
+            try:
+                return FunctionCache(self._function)
+            finally:
+                SETTINGS.CACHE_DIR = before
+
+    @property
+    def cache_path(self) -> str:
+        """Folder of the files, for Numba's statistics."""
+        return self._cache.cache_path
+
+    def load_overload(self, types: Any, context: Any) -> Any:
+        """Return the code for arguments of some types; None where there is none: the compiler makes itself ready."""
+        for name, address in c_helpers.items():  # what makes arrays
+            llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+        return self._cache._load_overload(types, context)
+
+    def save_overload(self, types: Any, compiled: Any) -> None:
+        """Keep the code for arguments of some types.
+
+        One process at a time: Numba looks for a free number, and of two that do so at once, each for other types, both
+        would take the same. One of the two would then find the other's code under its own types at every later start.
+        """
+        with _alone(Path(_jit.CACHE_FOLDER or "") / "lock"):
+            self._cache.save_overload(types, compiled)
+
+
+@contextlib.contextmanager
+def _alone(file: Path) -> Iterator[None]:
+    """Keep other processes waiting that ask for the same file, where the file system has locks."""
+    with contextlib.ExitStack() as kept:
+        with contextlib.suppress(OSError):
+            lock = kept.enter_context(file.open("a"))
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            # A process forked meanwhile has the file open, too, and would keep the lock beyond its closing here.
+            kept.callback(fcntl.flock, lock, fcntl.LOCK_UN)
+        yield
+
+
+def _decorated(function: Callable[..., Any], options: dict[str, Any], folder: str, compiler: type[Any]) -> Any:
+    """Decorate a function, its compiled code in a folder."""
+    decorated: Any = numba.njit(pipeline_class=compiler, **options)(function)
+    if _jit.CACHE_FOLDER is not None:
+        decorated._cache = Files(function, folder)
+        decorated._compilation_chain_init_hook = lambda: None  # looks for extensions, as the compiler does itself
+    return decorated
+
+
+def dispatcher_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return a dispatcher that compiles a wrapper only for calls from Python, not for those of other kernels.
+
+    A wrapper takes the tuples among the arguments apart, number by number. Most kernels are called by kernels only, and
+    their wrappers would be a third of the work. What Python calls is left to a second dispatcher of the same function.
+    """
+    folder = Path(_jit.CACHE_FOLDER or "")
+    inside = _decorated(function, options | {"no_cpython_wrapper": True}, str(folder / _jit.INSIDE), InsideCompiler)
+    inside.targetoptions = options
+    called = functools.cache(lambda: _decorated(function, options, str(folder), KernelCompiler))
+    take_over = inside.add_overload
+
+    def keep(compiled: Any) -> None:
+        """Let kernels alone find it: a call from Python would find nothing that it could run."""
+        inside.overloads[tuple(compiled.signature.args)] = compiled
+
+    def compile_for_python(*args: Any, **named: Any) -> Any:
+        """Compile for the first call from Python with arguments of these types."""
+        entry = called()._compile_for_args(*args, **named)
+        for types, compiled in called().overloads.items():
+            if inside.overloads.get(types) is not compiled:
+                take_over(compiled)
+        inside._cache_hits, inside._cache_misses = called()._cache_hits, called()._cache_misses
+        return entry
+
+    inside.add_overload, inside._compile_for_args = keep, compile_for_python
+    return inside
+
+
+for _register in _jit._REGISTRATIONS:
+    _register()
