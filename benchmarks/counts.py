@@ -29,7 +29,7 @@ from .timing import versions
 RECORD = FOLDER / "counts.toml"
 TARGET = {"NUMBA_CPU_NAME": "x86-64-v4", "NUMBA_CPU_FEATURES": "-prefer-256-bit"}
 """The processor that the counted code is compiled for: one with 512-bit vectors, whatever this one is."""
-KERNELS = ("attempt_steps", "simulate_lanes", "simulate_rows", "element_sums")
+KERNELS = ("attempt_steps", "run_lanes", "run_rows", "element_sums")
 """Kernels whose machine code is counted, with all that they call; a step in lanes is the first."""
 DESIGNS = 64
 """Designs that are simulated with the compiler off."""

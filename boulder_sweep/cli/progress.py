@@ -21,18 +21,19 @@ if TYPE_CHECKING:
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
 COMPILED = {
-    "table": ("lanes.simulate_lanes", None, 15.0),
-    "design": ("impact.simulate", None, 20.0),
-    "elements-table": ("table.simulate_rows", None, 20.0),
-    "springs-table": ("table.simulate_rows", "second_spring.reached", 20.0),
-    "springs-design": ("impact.simulate", "second_spring.reached", 20.0),
-    "layers-table": ("table.simulate_rows", "layered.in_layer", 30.0),
-    "layers-design": ("impact.simulate", "layered.in_layer", 30.0),
-    "plastic-table": ("impact.simulate_motion", "plastic.push", 30.0),
-    "plastic-design": ("impact.simulate_motion", "plastic.push", 30.0),
+    "table": ("lanes.run_lanes", "", 15.0),
+    "design": ("impact.simulate", "", 20.0),
+    "elements-table": ("table.run_rows", "f82,n,n,n", 20.0),
+    "springs-table": ("table.run_rows", "f82,n,n,f82", 20.0),
+    "springs-design": ("impact.simulate", "SecondSpring", 20.0),
+    "layers-table": ("table.run_rows", "f82,f83", 30.0),
+    "layers-design": ("impact.simulate", "SoilProfile", 30.0),
+    "plastic-table": ("impact.simulate_motion", "Memory", 30.0),
+    "plastic-design": ("impact.simulate_motion", "Memory", 30.0),
 }
-"""Kernels for tables, and for one design over time: the function that is compiled last, one that is compiled for this
-kind of problem only, and seconds where unknown."""
+"""Kernels for tables, and for one design over time: the one that takes longest to compile, what tells this kind of
+problem from others among the types that it is compiled for (`boulder_kernels._ahead.flatten`), and seconds where
+unknown."""
 
 
 def kernels_for(sweep: Sweep, of: Literal["table", "design"] = "table") -> str:
@@ -58,14 +59,13 @@ def cold_start(kernels: str | None) -> str | None:
     """
     if kernels is None:
         return None
-    from boulder_kernels._jit import CACHE_FOLDER, INSIDE
+    from boulder_kernels._ahead import is_compiled
+    from boulder_kernels._jit import CACHE_FOLDER
 
-    function, special, seconds = COMPILED[kernels]
+    kernel, types, seconds = COMPILED[kernels]
+    if is_compiled(kernel, types):
+        return None
     if CACHE_FOLDER is not None:
-        entries = (path.relative_to(CACHE_FOLDER) for path in Path(CACHE_FOLDER).rglob(f"{function}-*.nbc"))
-        compiled = any(INSIDE not in path.parts for path in entries)
-        if compiled and (special is None or any(Path(CACHE_FOLDER).rglob(f"{special}-*.nbc"))):
-            return None
         with suppress(OSError, ValueError):  # no earlier compilation on this machine
             seconds = float(_remembered(kernels).read_text())
     return f"compiling kernels, once on this machine, about {max(seconds, 1.0):.0f} s"

@@ -134,11 +134,15 @@ class Kernel:
     ----------
     py_func : callable
         The function itself.
+    natives : dict
+        What it was compiled to ahead, by the types of its arguments, see `boulder_kernels._ahead`.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self.py_func, self._options = function, options
         self._dispatcher: Any = None
+        self._is_of_the_package = function.__module__.startswith(f"{__package__}.")
+        self.natives: dict[str, Any] = {}
         functools.update_wrapper(self, function)
 
     @property
@@ -152,7 +156,12 @@ class Kernel:
         return self._dispatcher
 
     def __call__(self, *args: Any, **named: Any) -> Any:
-        """Call the compiled function."""
+        """Call the compiled function: its library, or by Numba where it has none."""
+        if self._is_of_the_package and not named:
+            try:
+                return _ahead.call(self, args)
+            except _ahead.UnsuitableError:
+                pass
         return (self._dispatcher or self.dispatcher)(*args, **named)
 
     def __getattr__(self, name: str) -> Any:
@@ -290,12 +299,13 @@ def unless_none(names: str, function: Callable[..., Any], otherwise: str, **know
         What else it refers to, by name.
     """
     arguments = ", ".join(names.split())
+    plain = getattr(function, "py_func", function)  # what it calls is compiled
     when_none = function_of(f"def when_none({arguments}):\n return {otherwise}", **known)
     unless = function_of(f"def unless({arguments}):\n return function({arguments})", function=function)
 
     def call(*given: Any) -> Any:
         """Call the one for these arguments."""
-        return (when_none if given[-1] is None else function)(*given)
+        return (when_none if given[-1] is None else plain)(*given)
 
     def choose(*given: Any) -> Callable[..., Any]:
         """Return the one for arguments of these Numba types."""
@@ -305,3 +315,6 @@ def unless_none(names: str, function: Callable[..., Any], otherwise: str, **know
 
     overload(call)(choose)
     return call
+
+
+from . import _ahead  # noqa: E402  it needs the folder above

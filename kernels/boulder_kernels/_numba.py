@@ -8,6 +8,11 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import functools
+import json
+import os
+import shutil
+import subprocess
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,12 +20,13 @@ from typing import Any
 
 import llvmlite.binding
 import numba
+import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.runtime._nrt_python import c_helpers
 
-from . import _jit
+from . import _ahead, _jit, _llvm
 
 NEEDLESS = {
     "WithLifting",
@@ -196,6 +202,162 @@ def dispatcher_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
 
     inside.add_overload, inside._compile_for_args = keep, compile_for_python
     return inside
+
+
+def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file: Path | None) -> _ahead.Native:
+    """Compile a kernel to a library, keep it, and load it.
+
+    Parameters
+    ----------
+    kernel
+        The `boulder_kernels._jit.Kernel`.
+    arguments
+        What it is called with; only their types matter.
+    described
+        These types as text.
+    file
+        Where to keep it, without an ending; None for nowhere.
+
+    Raises
+    ------
+    boulder_kernels._ahead.UnsuitableError
+        It returns something other than numbers and records of them, or makes arrays.
+    """
+    types = tuple(numba_type(value) for value in arguments)
+    kernel.dispatcher.compile(types)
+    returns = kernel.dispatcher.overloads[types].signature.return_type
+    lines: list[str] = []
+    kept = {"returns": written_out(returns, "found", lines), "numbers": len(lines), "types": described}
+    reals, wholes, arrays = _Counter(), _Counter(), _Counter()
+    records: list[type] = []
+    given = [argument_text(value, reals, wholes, arrays, records) for value in arguments]
+    kept |= {"arrays": arrays.count}
+    pointers = [f"p{number}" for number in range(arrays.count)]
+    source = f"def {_ahead.ENTRY}(reals_at, wholes_at, {''.join(f'{name}, ' for name in pointers)}out_at):\n"
+    source += f" reals = carray(reals_at, ({reals.count},))\n wholes = carray(wholes_at, ({wholes.count},))\n"
+    source += f" out = carray(out_at, ({len(lines)},))\n found = function({', '.join(given)})\n"
+    source += "".join(f" out[{place}] = {line}\n" for place, line in enumerate(lines))
+    named = {f"R{number}": record for number, record in enumerate(records)}
+    wrapper = _jit.function_of(source, carray=numba.carray, function=kernel.dispatcher, **named)
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    entry: Any = numba.njit(pipeline_class=InsideCompiler, **options)(wrapper)
+    entry.add_overload = lambda compiled: entry.overloads.__setitem__(tuple(compiled.signature.args), compiled)
+    real, whole = numba.types.CPointer(numba.types.float64), numba.types.CPointer(numba.types.int64)
+    signature = (real, whole, *arrays.kinds, real)
+    entry.compile(signature)
+    compiled = entry.overloads[signature]
+    codegen = compiled.library.codegen
+    module = _llvm.module_of(compiled.library.get_llvm_str(), compiled.fndesc.llvm_func_name, _ahead.ENTRY)
+    machine = llvmlite.binding.Target.from_default_triple().create_target_machine(
+        cpu=codegen._get_host_cpu_name(), features=codegen._get_host_cpu_features(), opt=3, reloc="pic"
+    )
+    if strange := _llvm.keep_only(module, [_ahead.ENTRY], machine) - MATHEMATICS:
+        raise _ahead.UnsuitableError(str(strange))
+    code = machine.emit_object(module)
+    library = linked(code)
+    if file is None:
+        return _ahead.native_of(_llvm.loaded(code), kept)
+    file.parent.mkdir(mode=0o700, exist_ok=True)
+    put(file.with_suffix(_ahead.OBJECT if library is None else _ahead.LIBRARY), code if library is None else library)
+    put(file.with_suffix(_ahead.RETURNS), json.dumps(kept).encode())
+    return _ahead.loaded(file)
+
+
+MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "exp", "log", "sin", "cos", "fmod"}
+"""Functions of the C library that kernels may call."""
+
+
+class _Counter:
+    """Counts the numbers or arrays of a call."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.kinds: list[Any] = []
+
+    def next(self) -> int:
+        """Return the number of the next one."""
+        self.count += 1
+        return self.count - 1
+
+
+def numba_type(value: Any) -> Any:
+    """Return Numba's type of an argument."""
+    types = numba.types
+    if isinstance(value, np.ndarray):
+        return types.Array(numba.from_dtype(value.dtype), value.ndim, "C")
+    if isinstance(value, tuple):
+        kinds = [numba_type(one) for one in value]
+        return types.BaseTuple.from_types(kinds, type(value) if hasattr(value, "_fields") else None)
+    if value is None:
+        return types.none
+    if isinstance(value, bool | np.bool_):
+        return types.boolean
+    return types.float64 if isinstance(value, float) else types.int64
+
+
+def argument_text(value: Any, reals: _Counter, wholes: _Counter, arrays: _Counter, records: list[type]) -> str:
+    """Return the expression of an argument from the numbers of a call, in the order of `_ahead.flatten`."""
+    if isinstance(value, np.ndarray):
+        shape = "".join(f"wholes[{wholes.next()}], " for _ in value.shape)
+        arrays.kinds.append(numba.types.CPointer(numba.from_dtype(value.dtype)))
+        return f"carray(p{arrays.next()}, ({shape}))"
+    if isinstance(value, tuple):
+        name = ""
+        if hasattr(value, "_fields"):
+            name = f"R{len(records)}"
+            records.append(type(value))
+        fields = "".join(f"{argument_text(one, reals, wholes, arrays, records)}, " for one in value)
+        return f"{name}({fields})"
+    if value is None:
+        return "None"
+    if isinstance(value, bool | np.bool_):
+        return f"(wholes[{wholes.next()}] != 0)"
+    return f"reals[{reals.next()}]" if isinstance(value, float) else f"wholes[{wholes.next()}]"
+
+
+def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
+    """Append the expressions of all numbers of what a kernel returns, and return how they are put together again.
+
+    Raises
+    ------
+    boulder_kernels._ahead.UnsuitableError
+        It holds something other than numbers.
+    """
+    types: Any = numba.types
+    if isinstance(kind, types.NoneType):
+        return _ahead.NOTHING
+    for number, letter in ((types.Boolean, _ahead.TRUTH), (types.Integer, _ahead.WHOLE), (types.Float, _ahead.REAL)):
+        if isinstance(kind, number):
+            lines.append(expression)
+            return letter
+    if not isinstance(kind, types.BaseTuple):
+        raise _ahead.UnsuitableError(str(kind))
+    name = _ahead.name_of(kind.instance_class) if isinstance(kind, types.BaseNamedTuple) else ""
+    parts = (
+        [f"{expression}.{field}" for field in kind.fields] if name else [f"{expression}[{i}]" for i in range(len(kind))]
+    )
+    return [name, [written_out(one, part, lines) for one, part in zip(kind.types, parts, strict=True)]]
+
+
+def linked(code: bytes) -> bytes | None:
+    """Return object code as a shared library, linked by the C compiler of this machine; None where there is none."""
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    if compiler is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        source, target = Path(folder) / "kernel.o", Path(folder) / "kernel.so"
+        source.write_bytes(code)
+        command = [compiler, "-shared", "-s", "-o", str(target), str(source), "-lm"]
+        done = subprocess.run(command, capture_output=True, check=False)
+        return target.read_bytes() if done.returncode == 0 else None
+
+
+def put(file: Path, content: bytes) -> None:
+    """Write a file whole, or not at all."""
+    with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as part:
+        part.write(content)
+    Path(part.name).replace(file)
 
 
 for _register in _jit._REGISTRATIONS:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, inlined, kernel
+from ._jit import inlined, kernel
 from .after_step import (
     RUNNING,
     Decided,
@@ -109,7 +109,6 @@ class Record(NamedTuple):
     """Offset u_0 of the vehicle's spring at each [m], shape (n,), see `boulder_kernels.second_spring`; may be empty."""
 
 
-@array_kernel
 def no_record() -> Record:
     """Return a record that keeps nothing."""
     return Record(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, inlined, kernel
+from ._jit import inlined, kernel
 from .after_step import RUNNING
 from .design import Readings
 from .impact import Control, ending_of
@@ -258,7 +258,6 @@ def sweep(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, con
     return q.counts[BUSY] > 0 or q.counts[PENDING] > 0
 
 
-@array_kernel
 def empty_workspace() -> np.ndarray:
     """Return the workspace before the first design has been started, its vectors on whole lines of the fast memory."""
     ws = np.zeros(WHOLE + LANES)
@@ -266,7 +265,6 @@ def empty_workspace() -> np.ndarray:
     return ws[LANES - behind :]
 
 
-@array_kernel
 def empty_queue() -> Queue:
     """Return the queue before the first design has been started."""
     return Queue(
@@ -279,20 +277,22 @@ def empty_queue() -> Queue:
     )
 
 
-@array_kernel
 def filled_up(designs: np.ndarray) -> np.ndarray:
     """Return designs that are at least as many as lanes, the last one repeated where they are fewer."""
-    count, last = designs.shape
-    if last >= LANES:
-        return designs
-    more = np.empty((count, LANES))
-    for i in range(count):
-        for lane in range(LANES):
-            more[i, lane] = designs[i, min(lane, last - 1)]
-    return more
+    missing = LANES - designs.shape[1]
+    return designs if missing <= 0 else np.pad(designs, ((0, 0), (0, missing)), "edge")
 
 
-@array_kernel
+@kernel
+def run_lanes(
+    designs: np.ndarray, readings: Readings, control: Control, ws: np.ndarray, q: Queue, out: np.ndarray
+) -> None:
+    """Simulate every design of a table; arguments: see `simulate_lanes` and `start_more`."""
+    begin(ws, q, designs, readings, control, out)
+    while sweep(ws, q, designs, readings, control, out):
+        pass
+
+
 def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
     """Simulate every design of a table in lanes, by the closed form of the soil and stopping at the limit.
 
@@ -313,9 +313,5 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
     out = empty_outcomes(designs.shape[1])
     if designs.shape[1] == 0:
         return out
-    designs = filled_up(designs)
-    ws, q = empty_workspace(), empty_queue()
-    begin(ws, q, designs, readings, control, out)
-    while sweep(ws, q, designs, readings, control, out):
-        pass
+    run_lanes(filled_up(designs), readings, control, empty_workspace(), empty_queue(), out)
     return out

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, exact_kernel
+from ._jit import exact_kernel
 from .design import (
     Constants,
     Design,
@@ -207,7 +207,6 @@ def bounds_of_layers(soil: SoilLayers) -> Bounds:
     return Bounds(0, K_soil, R_soil, x_yield)
 
 
-@array_kernel
 def uniform_layers(design: Design) -> np.ndarray:
     """Return the soil of a design as the only one of its layers, shape (1, 6)."""
     slope = ultimate_pressure(1.0, design.phi, design.rho_s, 1.0)

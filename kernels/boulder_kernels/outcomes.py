@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, inlined, kernel
+from ._jit import inlined, kernel
 from .dense_output import DenseOutput, displacement_at, state_at, turning_point
 from .design import Constants
 from .dynamics import State, contact_displacement, contact_lever, spring_compression
@@ -137,7 +137,6 @@ STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END = (
 )
 
 
-@array_kernel
 def empty_outcomes(n: int) -> np.ndarray:
     """Return an array for n outcomes, the columns of an `OutcomeTable` as its rows: INVALID and NaN until written."""
     out = np.full((len(OUTCOME_FIELDS), n), np.nan)

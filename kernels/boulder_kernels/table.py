@@ -57,6 +57,37 @@ second_spring_in = unless_none("row springs", take_second_spring, "None")
 
 
 @array_kernel
+def run_rows(
+    designs: np.ndarray,
+    layers: np.ndarray | None,
+    soil: Any,
+    springs: np.ndarray | None,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    out: np.ndarray,
+) -> None:
+    """Simulate designs one by one; arguments: see `simulate_rows`, a record that keeps nothing, and its result."""
+    for row in range(designs.shape[1]):
+        profile, second = profile_in(row, soil, layers), second_spring_in(row, springs)
+        write_outcome(out, row, simulate(Problem(design_in(designs, row), profile, second), readings, control, record))
+
+
+@kernel
+def run_last_resort(
+    designs: np.ndarray,
+    springs: np.ndarray | None,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    out: np.ndarray,
+) -> None:
+    """The same for designs that need more steps than are allowed, see `boulder_kernels.last_resort`."""
+    for row in range(designs.shape[1]):
+        problem = Problem(design_in(designs, row), None, second_spring_in(row, springs))
+        write_outcome(out, row, simulate_last_resort(problem, readings, control, record))
+
+
 def simulate_rows(
     designs: np.ndarray,
     layers: np.ndarray | None,
@@ -81,22 +112,7 @@ def simulate_rows(
         As of `simulate_table`.
     """
     out = empty_outcomes(designs.shape[1])
-    for row in range(designs.shape[1]):
-        profile, second = profile_in(row, soil, layers), second_spring_in(row, springs)
-        outcome = simulate(Problem(design_in(designs, row), profile, second), readings, control, no_record())
-        write_outcome(out, row, outcome)
-    return out
-
-
-@array_kernel
-def simulate_rows_last_resort(
-    designs: np.ndarray, springs: np.ndarray | None, readings: Readings, control: Control
-) -> np.ndarray:
-    """The same for designs that need more steps than are allowed, see `boulder_kernels.last_resort`."""
-    out = empty_outcomes(designs.shape[1])
-    for row in range(designs.shape[1]):
-        problem = Problem(design_in(designs, row), None, second_spring_in(row, springs))
-        write_outcome(out, row, simulate_last_resort(problem, readings, control, no_record()))
+    run_rows(designs, layers, soil, springs, readings, control, no_record(), out)
     return out
 
 
@@ -174,7 +190,8 @@ def simulate_once(
         soil = empty_soil(table.layers.shape[1], control.elements)
         out = simulate_rows(designs, table.layers, soil, stacked, readings, control)
     elif control.last_resort:
-        out = simulate_rows_last_resort(designs, stacked, readings, control)
+        out = empty_outcomes(designs.shape[1])
+        run_last_resort(designs, stacked, readings, control, no_record(), out)
     elif springs is None and control.elements == 0 and control.stop_at_limit:
         out = simulate_lanes(designs, readings, control)
     else:
