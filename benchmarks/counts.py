@@ -132,21 +132,23 @@ def _of_code(names: Sequence[str]) -> Counts:
     import numpy as np
 
     import boulder_kernels as bk
-    from boulder_kernels import lanes, soil, table
+    from boulder_kernels import lanes, soil
+    from boulder_kernels import table as rows
 
     from .designs import HORIZON, ROTATION_LIMIT
 
     number = numba.float64
     control = numba.typeof(bk.Control(STEP_S, HORIZON, ROTATION_LIMIT, 0, False))
-    simulated = numba.typeof(np.zeros((2, 2))), numba.typeof(bk.corrected()), control
+    table, how = numba.typeof(np.zeros((2, 2))), (numba.typeof(bk.corrected()), control)
+    lane_arrays = numba.typeof(lanes.empty_workspace()), numba.typeof(lanes.empty_queue())
     nothing = numba.types.none
     lines = numba.types.NamedTuple([number] * len(soil.Kinematics._fields), soil.Kinematics)
     of_design = [numba.int64 if name == "elements" else number for name in bk.Constants._fields]
     constants = numba.types.NamedTuple(of_design, bk.Constants)
     found: dict[str, tuple[Any, tuple[Any, ...]]] = {
         "attempt_steps": (lanes.attempt_steps, (number[::1],)),
-        "simulate_lanes": (lanes.simulate_lanes, simulated),
-        "simulate_rows": (table.simulate_rows, (simulated[0], nothing, nothing, nothing, *simulated[1:])),
+        "run_lanes": (lanes.run_lanes, (table, *how, *lane_arrays, table)),
+        "run_rows": (rows.run_rows, (table, nothing, nothing, nothing, *how, numba.typeof(bk.no_record()), table)),
         "element_sums": (soil.element_sums, (lines, constants)),
     }
     counts: Counts = {}

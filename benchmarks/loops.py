@@ -7,14 +7,13 @@ import numpy as np
 
 from boulder_kernels import Constants, Control, Readings
 from boulder_kernels.lane_steps import attempt_steps, take_over_steps
-from boulder_kernels.lanes import BUSY, HANDLED, STEPPED, begin, empty_queue, empty_workspace, sweep
+from boulder_kernels.lanes import BUSY, HANDLED, STEPPED, Queue, begin, empty_queue, empty_workspace, sweep
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.soil import Kinematics, closed_form, element_sums
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 
 
-@_compiled
 def simulate_and_count(
     designs: np.ndarray, readings: Readings, control: Control, sweeps: int
 ) -> tuple[np.ndarray, tuple[int, int, int]]:
@@ -27,8 +26,14 @@ def simulate_and_count(
     counts
         Steps attempted by all lanes; those by lanes that held a design; those that needed more than to be accepted.
     """
-    out = empty_outcomes(designs.shape[1])
-    ws, q = empty_workspace(), empty_queue()
+    ws = empty_workspace()
+    return ws, _count(designs, readings, control, sweeps, ws, empty_queue(), empty_outcomes(designs.shape[1]))
+
+
+@_compiled
+def _count(
+    designs: np.ndarray, readings: Readings, control: Control, sweeps: int, ws: np.ndarray, q: Queue, out: np.ndarray
+) -> tuple[int, int, int]:
     attempts, in_use = 0, 0
     begin(ws, q, designs, readings, control, out)
     going = q.counts[BUSY] > 0
@@ -36,7 +41,7 @@ def simulate_and_count(
         attempts += STEPPED
         in_use += q.counts[BUSY]
         going = sweep(ws, q, designs, readings, control, out)
-    return ws, (attempts, in_use, q.counts[HANDLED])
+    return attempts, in_use, q.counts[HANDLED]
 
 
 @_compiled

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Constants, Design, Readings, Record, SecondSpring
-from boulder_kernels.dynamics import Acceleration, State, acceleration
-from boulder_kernels.energy import stored_energies
+from boulder_kernels.dynamics import Acceleration
+from boulder_kernels.energy import Stored
 from boulder_kernels.layered import SoilLayers
 from boulder_kernels.modes import (
     FREE,
@@ -19,14 +19,10 @@ from boulder_kernels.modes import (
     SEATED,
     TURNING_BACK,
     TURNING_FORWARD,
-    Modes,
-    Switches,
-    switches_of,
 )
 from boulder_kernels.plastic import PlasticConstants, at_sample
-from boulder_kernels.second_spring import on_second_spring, spent_energy
+from boulder_kernels.samples import evaluate_samples
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
-from boulder_kernels.unloading import plastic_work
 
 MODE_NAMES = {
     SEATED: "seated",
@@ -117,8 +113,7 @@ def forces_along(
     dict of str to ndarray
         Arrays of shape (n,) by the names of the trajectory's columns.
     """
-    rates = [acceleration(*y, switches, own) for y, switches, own in _samples(record, readings, c, second)]
-    a_b, alpha_b, a_v, M = np.array(rates).reshape(-1, len(Acceleration._fields)).T
+    (a_b, alpha_b, a_v, M), _, _ = _evaluated(record, design, readings, c, second)
     theta = record.states[:, 2]
     # As printed the truck is pulled back by a force that the boulder does not feel: only contact counts here.
     F_v = np.where(record.touching, -design.m_v * a_v, 0.0)
@@ -152,27 +147,14 @@ def ledger_of(
     EnergyLedger
         Arrays of shape (n,).
     """
-    stored = [
-        # Printed separation: the spring goes on pulling the truck after release, so it holds energy all along.
-        stored_energies(
-            State(*y),
-            design.m_v,
-            bool(touching) or not readings.separation_released,
-            readings.restoring_gravity,
-            own,
-        )
-        for y, touching, own in zip(record.states, record.touching, _constants(record, c, second), strict=True)
-    ]
-    spent = [0.0 if second is None else spent_energy(float(u_0), c.k_v, second.k_2) for u_0 in _offsets(record)]
-    works = [plastic_work(State(*y), at_sample(c, row)) for row, y in enumerate(record.states)]
-    before, since = np.array(works).reshape(-1, 2).T
-    truck, linear, angular, elastic, spring, potential = np.array(stored).reshape(-1, 6).T
+    _, stored, (spent, before, since) = _evaluated(record, design, readings, c, second)
+    truck, linear, angular, elastic, spring, potential = stored
     drag, damper, restoring, pull = record.exchanged.T
     parts = {
         "vehicle_kinetic_J": truck,
         "crush_spring_J": spring,
         "crush_damper_J": damper.copy(),
-        "crush_spent_J": np.array(spent),
+        "crush_spent_J": spent,
         "boulder_linear_J": linear,
         "boulder_angular_J": angular,
         "soil_elastic_J": elastic - since,
@@ -186,39 +168,17 @@ def ledger_of(
     return EnergyLedger(time_s=record.times, **parts, residual_J=residual)
 
 
-def _offsets(record: Record) -> np.ndarray:
-    """Offset of the vehicle's spring at every sample [m]; 0 on its first spring."""
-    return record.offset if len(record.offset) else np.zeros(len(record.times))
-
-
-def _constants(record: Record, c: Constants, second: SecondSpring | None) -> list[Constants]:
-    """Return the constants of every sample: memory of plastic soil, and second spring where it has taken over."""
-    own = [at_sample(c, row) for row in range(len(record.times))]
-    if second is None:
-        return own
-    offsets = zip(own, _offsets(record), strict=True)
-    return [now if u_0 == 0.0 else on_second_spring(now, second.k_2, float(u_0)) for now, u_0 in offsets]
-
-
-def _samples(
-    record: Record, readings: Readings, c: Constants, second: SecondSpring | None
-) -> list[tuple[np.ndarray, Switches, Constants]]:
-    """State, factors of the modes and constants of every sample; the signs of Eq 37 follow from the rotation itself."""
-    theta = record.states[:, 2]
-    corner = np.copysign(1.0, c.theta_corner - theta)
-    arm = np.copysign(1.0, c.C_cos * np.cos(theta) + c.C_sin * np.sin(theta))
-    samples = []
-    for row, own in enumerate(_constants(record, c, second)):
-        modes = Modes(
-            turning=int(record.turning[row]),
-            touching=bool(record.touching[row]),
-            corner=float(corner[row]),
-            arm=float(arm[row]),
-            yielded_top=0,
-            yielded_base=0,
-        )
-        samples.append((record.states[row], switches_of(modes, readings, own), own))
-    return samples
+def _evaluated(
+    record: Record, design: Design, readings: Readings, c: Constants, second: SecondSpring | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rates, stored and spent energies at the samples of a record, see `evaluate_samples`."""
+    n = len(record.times)
+    rates, stored, spent = (np.empty((count, n)) for count in (len(Acceleration._fields), len(Stored._fields), 3))
+    if not len(record.offset):
+        record = record._replace(offset=np.zeros(n))
+    if n:
+        evaluate_samples(record, at_sample(c, 0), second, design.m_v, readings, rates, stored, spent)
+    return rates, stored, spent
 
 
 @dataclass(frozen=True, eq=False)

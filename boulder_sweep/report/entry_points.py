@@ -7,7 +7,6 @@ that of its verdicts, and `history` that of ``sweep simulate``.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from numba import carray, types
 
 from boulder_kernels import (
     ELASTIC,
-    Constants,
     Control,
     Design,
     DesignTable,
@@ -28,12 +26,9 @@ from boulder_kernels import (
 )
 from boulder_kernels._jit import array_kernel, inlined
 from boulder_kernels.design import design_in
-from boulder_kernels.dynamics import State, acceleration
-from boulder_kernels.energy import stored_energies
 from boulder_kernels.layered import SoilLayers
-from boulder_kernels.modes import Modes, switches_of
 from boulder_kernels.outcomes import write_outcome
-from boulder_kernels.second_spring import on_second_spring, spent_energy
+from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
 from boulder_kernels.verdict import VerdictLimits, write_rulings
@@ -173,14 +168,6 @@ def rulings(n: int, outcomes_at: Any, sizes_at: Any, limits_at: Any, rulings_at:
 
 
 @inlined
-def modes_of(y: State, turning: float, touching: float, c: Constants) -> Modes:
-    """Return the modes of a sample; the signs of Eq 37 follow from the rotation itself."""
-    corner = math.copysign(1.0, c.theta_corner - y.theta_b)
-    arm = math.copysign(1.0, c.C_cos * math.cos(y.theta_b) + c.C_sin * math.sin(y.theta_b))
-    return Modes(int(turning), touching > 0.0, corner, arm, 0, 0)
-
-
-@inlined
 def write_history(
     first: Any,
     design: Design,
@@ -193,22 +180,11 @@ def write_history(
     """Evaluate motion, force and energies of a record whose constants are `first` until a second spring takes over."""
     centre[0], centre[1] = first.c_x, first.c_y
     for i in range(record.times.size):
-        y = State(
-            record.states[i, 0],
-            record.states[i, 1],
-            record.states[i, 2],
-            record.states[i, 3],
-            record.states[i, 4],
-            record.states[i, 5],
-        )
+        y = state_of(record, i)
         if np.isnan(y.x_b):
             break
-        c = first if record.offset[i] == 0.0 else on_second_spring(first, second.k_2, record.offset[i])
-        mode = modes_of(y, record.turning[i], record.touching[i], c)
-        rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(mode, readings, c), c)
-        # Printed separation: the spring keeps pulling the truck after release, so it always holds energy.
-        pulls = mode.touching or not readings.separation_released
-        stored = stored_energies(y, design.m_v, pulls, readings.restoring_gravity, c)
+        sample = sample_of(record, i, first, second, design.m_v, readings)
+        stored, touching = sample.stored, record.touching[i] > 0.0
         drag, damper, restoring, pull = (
             record.exchanged[i, 0],
             record.exchanged[i, 1],
@@ -217,7 +193,7 @@ def write_history(
         )
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = y
         out[6, i] = record.touching[i]
-        out[7, i] = -design.m_v * rate.a_v if mode.touching else 0.0
+        out[7, i] = -design.m_v * sample.rate.a_v if touching else 0.0
         out[8, i], out[9, i], out[10, i], out[11, i] = (
             stored.truck_kinetic,
             stored.boulder_kinetic,
@@ -227,8 +203,7 @@ def write_history(
         out[12, i] = stored.crush_elastic
         out[13, i] = stored.gravity if readings.restoring_gravity else restoring
         # What is spent where the second spring takes over is lasting crush, as what the damper takes up.
-        lasting = damper + spent_energy(record.offset[i], design.k_v, second.k_2)
-        out[14, i], out[15, i], out[16, i] = drag, lasting, -pull
+        out[14, i], out[15, i], out[16, i] = drag, damper + sample.spent, -pull
 
 
 @array_kernel

@@ -166,7 +166,7 @@ def take_sample(
         tried += seconds
         # If single rows take long, few are enough; otherwise the largest piece is the best guess, as blocks cost time.
         per_row[size] = max(seconds / size, per_row.get(size, 0.0))
-        if tried > _SAMPLE_S:
+        if tried > _SAMPLE_S or size == rows:
             break
     fewest, most = _PIECES
     pieces = min(max(int(_SHARE * rows) // _SHORT_PIECE, fewest), most)

@@ -63,7 +63,7 @@ def run(
     out
         Folder of the table; it is made. A path, or a URL such as ``s3://bucket/m30.sweep``.
     jobs
-        Workers; as many as this process may use cores by default.
+        Workers; as many as this process may use cores by default, and one for a single design.
     backend
         ``threading`` or ``dask``.
     scheduler
@@ -118,7 +118,7 @@ def run(
     sweep.require_values()
     check_backend(backend, scheduler)
     again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
-    jobs = jobs or available_cores()
+    jobs = jobs or (1 if sweep.n_designs == 1 else available_cores())
     with noted_signals() as signals, signals.deferred():
         # A store may be silent, and a signal must end the run all the same: only threads of their own wait for it.
         remote = isinstance(out, RemotePath)

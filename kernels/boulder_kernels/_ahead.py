@@ -203,7 +203,6 @@ def native_of(library: Any, kept: dict[str, Any]) -> Native:
     return Native(function, kept["returns"], kept["numbers"], library)
 
 
-@functools.cache
 def folder() -> Path | None:
     """Return the folder for this processor and compiler; None where compiled code is not kept."""
     if _jit.CACHE_FOLDER is None:
@@ -211,6 +210,7 @@ def folder() -> Path | None:
     return Path(_jit.CACHE_FOLDER) / f"native-{machine_hash()[:16]}"
 
 
+@functools.cache
 def machine_hash() -> str:
     """Hash of what code depends on beside the sources: processor, compiler and its settings."""
     parts = [platform.machine(), platform.system()]

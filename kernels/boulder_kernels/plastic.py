@@ -91,7 +91,7 @@ def at_sample(c: Any, sample: int) -> Any:
     row = memory.samples[sample]
     so_far = memory.so_far.copy()
     so_far[WORK] = row[-1]
-    return c._replace(memory=memory._replace(front=row[:n], back=row[n:-1], so_far=so_far))
+    return c._replace(memory=memory._replace(front=row[:n].copy(), back=row[n:-1].copy(), so_far=so_far))
 
 
 @kernel

@@ -25,7 +25,7 @@ from .dynamics import Acceleration, State
 from .modes import Switches
 from .numerics import sine_versine
 from .outcomes import Status, highest
-from .plastic import LAST, PEAK, SWING, WORK, Memory, memory_of, push, slider_energy
+from .plastic import LAST, PEAK, SWING, WORK, Memory, push, slider_energy
 from .settling import boulder_energy, least_plastic_energy
 from .soil import soil_kinematics
 
@@ -92,13 +92,16 @@ def write_memory(y: State, y_end: State, h: float, c: Any, memory: Memory) -> No
         so_far[LAST + i] = y_end[i]
 
 
-def plastic_work(y: State, c: Any) -> tuple[float, float]:
+@kernel
+def work_of_sliders(y: State, c: Any, memory: Memory) -> tuple[float, float]:
     """Plastic work of the soil [J] (Eq 123): up to the start of the step that a state is in, and since then."""
-    if memory_of(c) is None:
-        return 0.0, 0.0
     sin, versin = sine_versine(y.theta_b)
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
-    return float(c.memory.so_far[WORK]), float(slider_energy(k, c.soil, c.memory))
+    return memory.so_far[WORK], slider_energy(k, c.soil, memory)
+
+
+plastic_work = unless_none("y c memory", work_of_sliders, "(0.0, 0.0)")
+"""Plastic work of the soil [J] (Eq 123): up to the start of the step that a state is in, and since then."""
 
 
 @kernel
@@ -128,6 +131,20 @@ def keep_sample(sample: int, memory: Memory) -> None:
     for i in range(n):
         row[i], row[n + i] = memory.front[i], memory.back[i]
     row[2 * n] = memory.so_far[WORK]
+
+
+@kernel
+def recall_sample(sample: int, memory: Memory) -> None:
+    """Let the soil remember what it did at a sample of the record."""
+    n = memory.front.size
+    row = memory.samples[sample]
+    for i in range(n):
+        memory.front[i], memory.back[i] = row[i], row[n + i]
+    memory.so_far[WORK] = row[2 * n]
+
+
+recall = unless_none("sample memory", recall_sample, "None")
+"""The same of any soil; elastic soil remembers nothing."""
 
 
 @kernel

@@ -83,14 +83,11 @@ def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatc
     progress._remember("table", 12.3)
     assert progress.cold_start("table") == f"{COMPILING}12 s"
     assert progress.cold_start("design") == f"{COMPILING}20 s"
-    _ahead.folder.cache_clear()
     compiled = _ahead.folder()
     compiled.mkdir()
     (compiled / "lanes-run_lanes-0.json").write_text('{"types": "f82"}')
     assert progress.cold_start("table") is None
     assert progress.cold_start("design") is not None
-    monkeypatch.undo()
-    _ahead.folder.cache_clear()
 
 
 def test_compiled_kernels_are_those_that_are_looked_for(compiled):

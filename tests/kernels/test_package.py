@@ -23,7 +23,7 @@ import boulder_kernels as bk
 boulder, soil, truck = (1.65, 1.68, 3.44, 2596.0), (1859.9, 0.754, 95.0, 1.0), (6722.0, 14.5, 3103.3e3, 138.91e3)
 table = bk.DesignTable(*(np.array([x]) for x in (*boulder, 2.03, 0.938, *soil, *truck, 0.5)))
 found = bk.simulate_table(table, bk.corrected(), bk.Control(8e-3, 0.5, 0.35, 0, False))
-print(found.theta_max[0].hex(), "numba" in sys.modules, "pickle" in sys.modules)
+print(found.theta_max[0].hex(), "numba" in sys.modules)
 """
 
 
@@ -71,21 +71,21 @@ def run(script: str, environment: dict[str, str]) -> str:
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     """It finds all machine code on the disk: no new file, none written again, no Numba; and the same bits come out."""
     environment = {_jit.CACHE_VARIABLE: str(tmp_path)}
-    theta, has_numba, _ = run(RUN, environment).split()
+    theta, has_numba = run(RUN, environment).split()
     assert has_numba == "True"
     files = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
     assert sum(file.suffix in (_ahead.LIBRARY, _ahead.OBJECT) for file in files) == 1
     folder = f"kernels-{_jit.source_hash()[:16]}"
     assert {file.relative_to(tmp_path).parts[0] for file in files} == {folder}
-    assert run(RUN, environment).split() == [theta, "False", "False"]
+    assert run(RUN, environment).split() == [theta, "False"]
     assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == files
 
 
 @pytest.mark.compiled
 def test_a_warm_start_is_without_numba() -> None:
-    """The same of the folder that these tests run with, which they have warmed; and nothing is read from pickles."""
+    """The same of the folder that these tests run with, which they have warmed."""
     run(RUN, {})
-    assert run(RUN, {}).split()[1:] == ["False", "False"]
+    assert run(RUN, {}).split()[1:] == ["False"]
 
 
 def test_the_hash_tells_sources_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,129 @@
+"""Kernels compiled ahead: the bits of Numba's own calls, and a library for each kind of arguments."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import boulder_kernels as bk
+from boulder_kernels import _ahead, _jit
+from boulder_kernels.design import constants_of, is_computable
+from boulder_kernels.impact import simulate
+from boulder_kernels.layered import uniform_layers
+from boulder_kernels.numerics import sine_versine
+from boulder_kernels.soil_laws import profile_of
+from boulder_kernels.table import estimate_errors, problem_at, run_rows
+
+from .samples import control, random_designs, table_of
+
+pytestmark = pytest.mark.compiled
+READINGS = bk.corrected()
+HOW = control(4e-3, 0.5, np.radians(20.0), stop_at_limit=True)
+DESIGNS = random_designs(5, seed=230)
+DESIGN = DESIGNS[0]
+
+
+def problems() -> dict[str, bk.Problem]:
+    """One impact in each kind of soil, and with a second spring."""
+    twice = np.repeat(uniform_layers(DESIGN), 2, axis=0)
+    twice[0, 0] = 0.5 * DESIGN.d
+    plastic = HOW._replace(unloading=bk.PLASTIC_WITH_GAP, elements=20)
+    return {
+        "uniform": bk.Problem(DESIGN, None, None),
+        "second spring": bk.Problem(DESIGN, None, bk.SecondSpring(3.0 * DESIGN.k_v, 0.2)),
+        "layers": bk.Problem(DESIGN, profile_of(DESIGN, twice, 0), None),
+        "elements": bk.Problem(DESIGN, profile_of(DESIGN, twice, 20), None),
+        "plastic": problem_at(table_of([DESIGN]), 0, plastic),
+    }
+
+
+@pytest.mark.parametrize("kind", problems())
+def test_the_bits_are_those_of_numba(kind: str) -> None:
+    """Of one impact, whatever its soil and vehicle, maxima, times and status."""
+    ahead = _ahead.call(simulate, (problems()[kind], READINGS, HOW, bk.no_record()))
+    numba = simulate.dispatcher(problems()[kind], READINGS, HOW, bk.no_record())
+    assert isinstance(ahead, bk.Outcome)
+    assert np.array_equal(np.hstack([*ahead.maxima, ahead.t_end]), np.hstack([*numba.maxima, numba.t_end]))
+    assert (ahead.status, ahead.attempts) == (numba.status, numba.attempts)
+
+
+def test_arrays_are_read_and_written_in_place() -> None:
+    """Inputs of any number of dimensions, and results."""
+    found = []
+    for call in (run_rows, run_rows.dispatcher):
+        out = np.full((10, len(DESIGNS)), np.nan)
+        call(np.stack(table_of(DESIGNS)), None, None, None, READINGS, HOW, bk.no_record(), out)
+        found.append(out)
+    assert np.isfinite(found[0][1]).all()
+    assert np.array_equal(*found, equal_nan=True)
+
+
+def test_what_comes_back_has_its_types() -> None:
+    """Records by their class, whole numbers and truth values as such, nothing as None."""
+    c = constants_of(DESIGN, READINGS, 7)
+    assert type(c) is bk.Constants
+    assert type(c.elements) is int
+    assert c.elements == 7
+    assert is_computable(c) is True
+    assert is_computable(c._replace(d=-1.0)) is False
+    table = bk.simulate_table(table_of(DESIGNS), READINGS, HOW)
+    assert estimate_errors(table, table, table_of(DESIGNS), 1.5) is None
+
+
+def test_no_call_is_refused_that_numba_takes() -> None:
+    """An array in another order, or of other numbers: left to Numba, with the same result."""
+    designs = np.stack(table_of(DESIGNS))
+    layers = np.asfortranarray(np.stack([uniform_layers(one) for one in DESIGNS]))
+    with pytest.raises(_ahead.UnsuitableError):
+        _ahead.call(run_rows, (designs, layers, None, None, READINGS, HOW, bk.no_record(), designs))
+    assert sine_versine(np.float32(0.3))[0] == pytest.approx(np.sin(0.3), rel=1e-6)
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A kernel of the package that was not called before, and an empty folder for what it is compiled to."""
+    monkeypatch.setattr(_jit, "CACHE_FOLDER", str(tmp_path))
+    monkeypatch.setattr(sine_versine, "natives", {})
+    return tmp_path
+
+
+def test_a_machine_without_a_linker(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The code itself is kept, and loaded by LLVM: the same bits."""
+    expected = sine_versine.dispatcher(0.3)
+    monkeypatch.setenv("CC", "there-is-no-such-compiler")
+    for _ in range(2):
+        assert sine_versine(0.3) == expected
+        monkeypatch.setattr(sine_versine, "natives", {})
+    assert sorted(file.suffix for file in fresh.glob("native-*/*")) == [_ahead.RETURNS, _ahead.OBJECT]
+
+
+def test_half_of_a_library_is_compiled_again(fresh: Path) -> None:
+    """A process that was killed, or a full disk, leaves no kernel that cannot be called."""
+    expected = sine_versine(0.3)
+    (library,) = fresh.glob(f"native-*/*{_ahead.LIBRARY}")
+    library.unlink()
+    sine_versine.natives.clear()
+    assert sine_versine(0.3) == expected
+    assert library.exists()
+    assert not [file for file in library.parent.iterdir() if file.suffix not in (_ahead.LIBRARY, _ahead.RETURNS)]
+
+
+def test_nothing_is_kept_without_a_folder(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where no folder is safe: compiled for this process alone."""
+    monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
+    assert sine_versine(0.3) == sine_versine.dispatcher(0.3)
+    assert not list(fresh.iterdir())
+
+
+def test_code_is_kept_by_processor_and_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A home folder that machines share holds code for each of them."""
+    before = _ahead.machine_hash.__wrapped__()
+    assert _ahead.machine_hash.__wrapped__() == before
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    named = _ahead.machine_hash.__wrapped__()
+    monkeypatch.setattr(os, "uname", lambda: os.uname_result(("Linux", "here", "6", "1", "another")))
+    assert len({before, named, _ahead.machine_hash.__wrapped__()}) >= 2
+    assert before != named
