@@ -169,7 +169,7 @@ def _assembly(kernel: Any, signature: tuple[Any, ...]) -> str:
     """Compile a kernel anew, because code from the cache cannot be inspected, and return its machine code."""
     import numba
 
-    options = {name: value for name, value in kernel.targetoptions.items() if name not in ("cache", "nopython")}
+    options = {name: value for name, value in kernel.options.items() if name not in ("cache", "nopython")}
     again = numba.njit(**options)(kernel.py_func)
     again.compile(signature)
     return str(again.inspect_asm(again.signatures[0]))

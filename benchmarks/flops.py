@@ -188,7 +188,7 @@ def assembly_of(kernel: Any, *arguments: Any) -> str:
     """Return the machine code of a kernel; compiled anew, because code loaded from the cache cannot be inspected."""
     import numba
 
-    options = {name: value for name, value in kernel.targetoptions.items() if name not in ("cache", "nopython")}
+    options = {name: value for name, value in kernel.options.items() if name not in ("cache", "nopython")}
     again = numba.njit(**options)(kernel.py_func)
     again(*arguments)
     return str(again.inspect_asm(again.signatures[0]))

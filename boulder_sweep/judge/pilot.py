@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +19,6 @@ if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.settings import Sweep
 
-
-from itertools import product
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from boulder_sweep.settings import Sweep
 
 MOST_CORNERS = 64
 

@@ -125,6 +125,7 @@ def parts_of(start: int, stop: int, size: int) -> list[tuple[int, int]]:
 def other_versions_text(who: str) -> str:
     """Say that versions differ."""
     return (
-        f"{who} and this machine have different versions of boulder-sweep, Python or NumPy; install the same "
-        f"versions everywhere"
+        f"{who} and this machine have different versions of boulder-sweep, Python or NumPy, or processors that differ "
+        f"in the last bits (with and without fused multiply-add); install the same versions everywhere, on processors "
+        f"of one kind"
     )

@@ -172,8 +172,10 @@ def now() -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that compute and write rows."""
-    found = {"python": platform.python_version()}
+    """Versions of Python, of the packages that compute and write rows, and of the instructions that compute them."""
+    from boulder_kernels._ahead import target  # imports NumPy, which those who only read a manifest need not
+
+    found = {"python": platform.python_version(), "target": target()}
     for package in _PACKAGES:
         try:
             found[package] = version(package)
@@ -184,7 +186,7 @@ def versions() -> dict[str, str]:
 
 @cache
 def kernels_sha256() -> str:
-    """Hash of the sources of the compiled kernels, as `boulder_kernels.source_hash`, without the import of Numba."""
+    """Hash of the sources of the compiled kernels, as `boulder_kernels.source_hash`, without the import of NumPy."""
     found = find_spec("boulder_kernels")
     if found is None or found.origin is None:
         raise FileNotFoundError("the sources of boulder_kernels are missing")

@@ -210,16 +210,32 @@ def folder() -> Path | None:
     return Path(_jit.CACHE_FOLDER) / f"native-{machine_hash()[:16]}"
 
 
+def target() -> str:
+    """Return what the bits of results depend on beside the sources.
+
+    Processors of one architecture give the same bits if both have fused multiply-add, or neither: wider registers only
+    take more designs at once.
+    """
+    fused = any(line.startswith("flags") and "fma" in line.split() for line in processor())
+    named = [os.environ[name] for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES") if os.environ.get(name)]
+    return " ".join([f"{platform.machine()}{'+fma' if fused else ''}", *named])
+
+
+@functools.cache
+def processor() -> tuple[str, ...]:
+    """Return what tells the kind of processor and its features, line by line."""
+    try:
+        with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as described:
+            first = described.read(16_384).partition("\n\n")[0]
+    except OSError:
+        return (platform.processor(),)
+    return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
+
+
 @functools.cache
 def machine_hash() -> str:
     """Hash of what code depends on beside the sources: processor, compiler and its settings."""
-    parts = [platform.machine(), platform.system()]
-    try:
-        with Path("/proc/cpuinfo").open() as described:
-            first = described.read(16_384).partition("\n\n")[0]
-        parts += [line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU "))]
-    except OSError:
-        parts.append(platform.processor())
+    parts = [platform.machine(), platform.system(), *processor()]
     parts += [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith("NUMBA_")]
     for package in ("numba", "llvmlite"):
         found = importlib.util.find_spec(package)

@@ -16,10 +16,11 @@ that is called has been compiled ahead, a process does without it.
     Off but for what makes arrays: kernels borrow those that they are given, and do not count references to them.
     The counters are atomic, and cost a fifth of the time of short simulations.
 ``no_cfunc_wrapper``, ``no_cpython_wrapper``
-    Nothing calls a kernel from C, and few are called from Python: wrappers would have to be compiled, too.
-``cache``
-    Compiled code is kept in a folder named by a hash of all kernel sources, because a cached function does
-    not notice that a function it calls has changed in another file. Only a folder that nobody else can write is used.
+    Nothing calls a kernel by Numba's wrappers, which would have to be compiled, too: from Python, kernels are called by
+    libraries (`boulder_kernels._ahead`).
+
+Compiled code is kept in a folder named by a hash of all kernel sources, because what is kept of one function does not
+notice that a function it calls has changed in another file. Only a folder that nobody else can write is used.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def source_hash() -> str:
 def _cache_folder() -> str | None:
     """Return a folder for this version of the kernels that only this user can write, or None with a warning.
 
-    Compiled kernels are loaded from pickles, which run as the user who loads them.
+    Libraries, and the pickles in which Numba keeps what one kernel takes from another, run as the user who loads them.
     """
     named = os.environ.get(CACHE_VARIABLE)
     user_caches = os.environ.get("XDG_CACHE_HOME")
@@ -121,8 +122,6 @@ def _own_folder(folder: Path) -> Path:
 
 
 CACHE_FOLDER = _cache_folder()
-INSIDE = "inside"
-"""Folder within it for kernels as other kernels call them, without what a call from Python needs."""
 
 
 class Kernel:
@@ -134,35 +133,46 @@ class Kernel:
     ----------
     py_func : callable
         The function itself.
+    options : dict
+        What Numba is asked for.
     natives : dict
         What it was compiled to ahead, by the types of its arguments, see `boulder_kernels._ahead`.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        self.py_func, self._options = function, options
+        self.py_func, self.options = function, options
         self._dispatcher: Any = None
+        self._for_python: Any = None
         self._is_of_the_package = function.__module__.startswith(f"{__package__}.")
         self.natives: dict[str, Any] = {}
         functools.update_wrapper(self, function)
 
     @property
     def dispatcher(self) -> Any:
-        """What Numba compiles the function with."""
+        """What compiles the function for other kernels."""
         with _MAKING:
             if self._dispatcher is None:
                 from . import _numba
 
-                self._dispatcher = _numba.dispatcher_of(self.py_func, self._options)
+                self._dispatcher = _numba.dispatcher_of(self.py_func, self.options)
         return self._dispatcher
+
+    @property
+    def for_python(self) -> Any:
+        """Numba's dispatcher of the function for calls from Python, for which it is compiled in every process."""
+        with _MAKING:
+            if self._for_python is None:
+                from . import _numba
+
+                self._for_python = _numba.dispatcher_for_python(self.py_func, self.options)
+        return self._for_python
 
     def __call__(self, *args: Any, **named: Any) -> Any:
         """Call the compiled function: its library, or by Numba where it has none."""
         if self._is_of_the_package and not named:
-            try:
+            with contextlib.suppress(_ahead.UnsuitableError):
                 return _ahead.call(self, args)
-            except _ahead.UnsuitableError:
-                pass
-        return (self._dispatcher or self.dispatcher)(*args, **named)
+        return self.for_python(*args, **named)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import functools
 import json
 import os
 import shutil
@@ -24,7 +23,6 @@ import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
-from numba.core.runtime._nrt_python import c_helpers
 
 from . import _ahead, _jit, _llvm
 
@@ -113,45 +111,17 @@ def _ask_for_wide_vectors() -> None:
 _ask_for_wide_vectors()
 
 
-class Files:
-    """The compiled code of one function on disk, in place of Numba's cache, of which it makes one when it is asked.
+class Kept(FunctionCache):
+    """What a kernel is compiled to for other kernels, on disk."""
 
-    Numba looks for the folder of every function that is decorated, and makes its compiler ready before it loads
-    anything. Of a start that compiles nothing that is a third.
-    """
-
-    def __init__(self, function: Callable[..., Any], folder: str):
-        self._function, self._folder = function, folder
-
-    @functools.cached_property
-    def _cache(self) -> Any:
-        with _LOOKING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
-            before = SETTINGS.CACHE_DIR
-            SETTINGS.CACHE_DIR = self._folder
-            try:
-                return FunctionCache(self._function)
-            finally:
-                SETTINGS.CACHE_DIR = before
-
-    @property
-    def cache_path(self) -> str:
-        """Folder of the files, for Numba's statistics."""
-        return self._cache.cache_path
-
-    def load_overload(self, types: Any, context: Any) -> Any:
-        """Return the code for arguments of some types; None where there is none: the compiler makes itself ready."""
-        for name, address in c_helpers.items():  # what makes arrays
-            llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
-        return self._cache._load_overload(types, context)
-
-    def save_overload(self, types: Any, compiled: Any) -> None:
+    def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code for arguments of some types.
 
         One process at a time: Numba looks for a free number, and of two that do so at once, each for other types, both
         would take the same. One of the two would then find the other's code under its own types at every later start.
         """
         with _alone(Path(_jit.CACHE_FOLDER or "") / "lock"):
-            self._cache.save_overload(types, compiled)
+            super().save_overload(sig, data)
 
 
 @contextlib.contextmanager
@@ -166,42 +136,27 @@ def _alone(file: Path) -> Iterator[None]:
         yield
 
 
-def _decorated(function: Callable[..., Any], options: dict[str, Any], folder: str, compiler: type[Any]) -> Any:
-    """Decorate a function, its compiled code in a folder."""
-    decorated: Any = numba.njit(pipeline_class=compiler, **options)(function)
-    if _jit.CACHE_FOLDER is not None:
-        decorated._cache = Files(function, folder)
-        decorated._compilation_chain_init_hook = lambda: None  # looks for extensions, as the compiler does itself
-    return decorated
-
-
 def dispatcher_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """Return a dispatcher that compiles a wrapper only for calls from Python, not for those of other kernels.
+    """Return what compiles a function for other kernels, without a wrapper for calls from Python.
 
     A wrapper takes the tuples among the arguments apart, number by number. Most kernels are called by kernels only, and
-    their wrappers would be a third of the work. What Python calls is left to a second dispatcher of the same function.
+    their wrappers would be a third of the work.
     """
-    folder = Path(_jit.CACHE_FOLDER or "")
-    inside = _decorated(function, options | {"no_cpython_wrapper": True}, str(folder / _jit.INSIDE), InsideCompiler)
-    inside.targetoptions = options
-    called = functools.cache(lambda: _decorated(function, options, str(folder), KernelCompiler))
-    take_over = inside.add_overload
-
-    def keep(compiled: Any) -> None:
-        """Let kernels alone find it: a call from Python would find nothing that it could run."""
-        inside.overloads[tuple(compiled.signature.args)] = compiled
-
-    def compile_for_python(*args: Any, **named: Any) -> Any:
-        """Compile for the first call from Python with arguments of these types."""
-        entry = called()._compile_for_args(*args, **named)
-        for types, compiled in called().overloads.items():
-            if inside.overloads.get(types) is not compiled:
-                take_over(compiled)
-        inside._cache_hits, inside._cache_misses = called()._cache_hits, called()._cache_misses
-        return entry
-
-    inside.add_overload, inside._compile_for_args = keep, compile_for_python
+    inside: Any = numba.njit(pipeline_class=InsideCompiler, **{**options, "no_cpython_wrapper": True})(function)
+    inside.add_overload = lambda compiled: inside.overloads.__setitem__(tuple(compiled.signature.args), compiled)
+    if _jit.CACHE_FOLDER is not None:
+        with _LOOKING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
+            before, SETTINGS.CACHE_DIR = SETTINGS.CACHE_DIR, _jit.CACHE_FOLDER
+            try:
+                inside._cache = Kept(function)
+            finally:
+                SETTINGS.CACHE_DIR = before
     return inside
+
+
+def dispatcher_for_python(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return what compiles a function for calls from Python that cannot be compiled ahead; nothing is kept of it."""
+    return numba.njit(pipeline_class=KernelCompiler, **options)(function)
 
 
 def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file: Path | None) -> _ahead.Native:
@@ -239,8 +194,8 @@ def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file
     source += "".join(f" out[{place}] = {line}\n" for place, line in enumerate(lines))
     named = {f"R{number}": record for number, record in enumerate(records)}
     wrapper = _jit.function_of(source, carray=numba.carray, function=kernel.dispatcher, **named)
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    options["no_cpython_wrapper"] = True
     entry: Any = numba.njit(pipeline_class=InsideCompiler, **options)(wrapper)
     entry.add_overload = lambda compiled: entry.overloads.__setitem__(tuple(compiled.signature.args), compiled)
     real, whole = numba.types.CPointer(numba.types.float64), numba.types.CPointer(numba.types.int64)

@@ -44,7 +44,7 @@ def problems() -> dict[str, bk.Problem]:
 def test_the_bits_are_those_of_numba(kind: str) -> None:
     """Of one impact, whatever its soil and vehicle, maxima, times and status."""
     ahead = _ahead.call(simulate, (problems()[kind], READINGS, HOW, bk.no_record()))
-    numba = simulate.dispatcher(problems()[kind], READINGS, HOW, bk.no_record())
+    numba = simulate.for_python(problems()[kind], READINGS, HOW, bk.no_record())
     assert isinstance(ahead, bk.Outcome)
     assert np.array_equal(np.hstack([*ahead.maxima, ahead.t_end]), np.hstack([*numba.maxima, numba.t_end]))
     assert (ahead.status, ahead.attempts) == (numba.status, numba.attempts)
@@ -53,7 +53,7 @@ def test_the_bits_are_those_of_numba(kind: str) -> None:
 def test_arrays_are_read_and_written_in_place() -> None:
     """Inputs of any number of dimensions, and results."""
     found = []
-    for call in (run_rows, run_rows.dispatcher):
+    for call in (run_rows, run_rows.for_python):
         out = np.full((10, len(DESIGNS)), np.nan)
         call(np.stack(table_of(DESIGNS)), None, None, None, READINGS, HOW, bk.no_record(), out)
         found.append(out)
@@ -92,7 +92,7 @@ def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_machine_without_a_linker(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The code itself is kept, and loaded by LLVM: the same bits."""
-    expected = sine_versine.dispatcher(0.3)
+    expected = sine_versine.for_python(0.3)
     monkeypatch.setenv("CC", "there-is-no-such-compiler")
     for _ in range(2):
         assert sine_versine(0.3) == expected
@@ -114,7 +114,7 @@ def test_half_of_a_library_is_compiled_again(fresh: Path) -> None:
 def test_nothing_is_kept_without_a_folder(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As where no folder is safe: compiled for this process alone."""
     monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
-    assert sine_versine(0.3) == sine_versine.dispatcher(0.3)
+    assert sine_versine(0.3) == sine_versine.for_python(0.3)
     assert not list(fresh.iterdir())
 
 

@@ -92,13 +92,17 @@ def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 TINY = """
-from boulder_kernels import _jit, _numba
+from boulder_kernels import _jit
 
 @_jit.kernel
 def tiny(x):
     return x + 1.0
 
-print(tiny(1.0), _jit.CACHE_FOLDER)
+@_jit.kernel
+def call(x):
+    return tiny(x)
+
+print(call(1.0), _jit.CACHE_FOLDER)
 """
 
 

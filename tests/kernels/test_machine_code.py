@@ -53,7 +53,7 @@ def assembly(kernel, *arguments: object) -> str:
 
     Code that comes out of the cache has no listing, so it is compiled afresh.
     """
-    options = {name: value for name, value in kernel.targetoptions.items() if name not in ("nopython", "cache")}
+    options = {name: value for name, value in kernel.options.items() if name not in ("nopython", "cache")}
     fresh = numba.njit(**options)(kernel.py_func)
     fresh(*arguments)
     return "\n".join(fresh.inspect_asm().values())
@@ -139,7 +139,7 @@ def test_wide_vectors_are_asked_for() -> None:
 def test_kernels_leave_the_interpreter_lock_free() -> None:
     """All kernels are compiled without the interpreter: they run side by side in threads."""
     for kernel in (run_lanes, bk.simulate_design, attempt_steps, take_over_steps):
-        assert kernel.targetoptions["nogil"]
+        assert kernel.options["nogil"]
 
 
 def test_a_column_that_is_not_one_piece_of_memory_is_refused() -> None:

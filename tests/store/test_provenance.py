@@ -27,7 +27,7 @@ def test_an_identity_is_plain_data_and_equal_after_json():
     assert json.loads(json.dumps(found)) == found
     assert found["settings_sha256"] == sha256_of({"x": [1, 2.5]})
     assert re.fullmatch("[0-9a-f]{64}", found["kernels_sha256"])
-    assert set(found["versions"]) >= {"python", "numpy", "numba", "llvmlite", "pyarrow", "boulder-sweep"}
+    assert set(found["versions"]) >= {"python", "target", "numpy", "numba", "llvmlite", "pyarrow", "boulder-sweep"}
     assert differences(found, json.loads(json.dumps(found))) == []
 
 
