@@ -1,7 +1,7 @@
 """CPU time and memory in proportion to another checkout, such as an earlier version of the project.
 
 Run as ``python -m benchmarks.ratio FOLDER``: kernels by four settings on random designs and on those of
-``configs/m30_sizing.yaml``, and whole runs of 10^6 designs from process start to table. Each checkout has a process
+``configs/m30_sizing.yaml``, whole runs of 10^6 designs from process start to table, and short commands. Each checkout has a process
 and a folder of compiled kernels of its own. Both are timed in turn in every round, so that the load of the machine hits
 both alike.
 """
@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
@@ -22,8 +23,17 @@ from typing import NamedTuple
 import numpy as np
 
 FOLDER = Path(__file__).resolve().parent.parent
-ROUNDS, RUN_ROUNDS = 9, 3
+ROUNDS, RUN_ROUNDS, COMMAND_ROUNDS = 9, 3, 7
 RUN_ROWS = 1_000_000
+
+
+COMMANDS = {
+    "simulate": ("simulate", "configs/rwg.yaml"),
+    "run": ("run", "configs/rwg.yaml", "-o", "{table}", "--overwrite"),
+    "need": ("need", "configs/site.yaml"),
+    "check": ("check", "configs/rwg.yaml"),
+}
+"""Short commands, in the folder of a checkout."""
 
 
 class Setting(NamedTuple):
@@ -105,12 +115,26 @@ def whole_run(checkout: Path, cache: Path, accuracy: str, folder: Path) -> tuple
     grid.write_text(settings_of(RUN_ROWS))
     with tempfile.TemporaryDirectory(dir=folder) as name:
         words = ("run", str(grid), "-o", f"{name}/table", "--jobs", "2", "--accuracy", accuracy, "--quiet")
-        command = [sys.executable, "-m", "boulder_sweep", *words]
-        process = subprocess.Popen(command, cwd=checkout, env=_environment(checkout, cache), stdout=subprocess.DEVNULL)
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
+        return command_of(checkout, cache, words)
+
+
+def command_of(checkout: Path, cache: Path, words: Sequence[str]) -> tuple[float, float]:
+    """CPU time [s] and largest memory [MB] of a command of a checkout.
+
+    Raises
+    ------
+    RuntimeError
+        It failed.
+    """
+    command = [sys.executable, "-m", "boulder_sweep", *words]
+    environment = _environment(checkout, cache)
+    process = subprocess.Popen(
+        command, cwd=checkout, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
-        raise RuntimeError(f"the run of {checkout} ended with exit code {process.returncode}")
+        raise RuntimeError(f"{' '.join(words)} in {checkout} ended with exit code {process.returncode}")
     return used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
 
 
@@ -144,34 +168,53 @@ def compare_kernels(checkouts: tuple[Path, Path], caches: tuple[Path, Path], fol
 def compare_runs(checkouts: tuple[Path, Path], caches: tuple[Path, Path], folder: Path, rounds: int) -> None:
     """Print the ratios of the CPU times of whole runs, and the memory."""
     print("run of 10^6  now [s]  other [s]  ratio of least, median of ratios   memory [MB]")
+    both = tuple(zip(checkouts, caches, strict=True))
     for accuracy in ("fast", "balanced"):
-        for checkout, cache in zip(checkouts, caches, strict=True):
-            whole_run(checkout, cache, accuracy, folder)
-        found = [
-            [whole_run(checkout, cache, accuracy, folder) for checkout, cache in zip(checkouts, caches, strict=True)]
-            for _ in range(rounds)
-        ]
-        now, other = (min(run[0] for run in column) for column in zip(*found, strict=True))
-        ratio = median(a[0] / b[0] for a, b in found)
-        memory = [max(run[1] for run in column) for column in zip(*found, strict=True)]
-        used = f"{memory[0]:.0f} and {memory[1]:.0f}"
-        print(f"{accuracy:<12} {now:7.2f} {other:10.2f}  {now / other:.3f}, {ratio:.3f}   {used}", flush=True)
+        for one in both:
+            whole_run(*one, accuracy, folder)
+        print_ratio(accuracy, [[whole_run(*one, accuracy, folder) for one in both] for _ in range(rounds)])
+
+
+def compare_commands(checkouts: tuple[Path, Path], caches: tuple[Path, Path], folder: Path, rounds: int) -> None:
+    """Print the same of short commands: the first one where nothing has been compiled, then the others, warm."""
+    print("command      now [s]  other [s]  ratio of least, median of ratios   memory [MB]")
+    both = tuple(zip(checkouts, caches, strict=True))
+
+    def timed(name: str, fresh: str = "") -> list[tuple[float, float]]:
+        words = [word.format(table=folder / "one.sweep") for word in COMMANDS[name]]
+        return [command_of(checkout, Path(f"{cache}{fresh}"), words) for checkout, cache in both]
+
+    print_ratio("run, first", [timed("run", "-fresh")])
+    for name in COMMANDS:
+        timed(name)
+        print_ratio(name, [timed(name) for _ in range(rounds)])
+
+
+def print_ratio(name: str, found: Sequence[Sequence[tuple[float, float]]]) -> None:
+    """Print one line: CPU times of this and the other checkout by turns, their ratio, and the memory."""
+    now, other = (min(run[0] for run in column) for column in zip(*found, strict=True))
+    ratio = median(a[0] / b[0] for a, b in found)
+    memory = [max(run[1] for run in column) for column in zip(*found, strict=True)]
+    used = f"{memory[0]:.0f} and {memory[1]:.0f}"
+    print(f"{name:<12} {now:7.2f} {other:10.2f}  {now / other:.3f}, {ratio:.3f}   {used}", flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.ratio", description=__doc__)
     parser.add_argument("checkout", type=Path, help="folder of another checkout")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="how often the kernels are timed")
-    parser.add_argument("--only", choices=("kernels", "runs"), help="only one part")
+    parser.add_argument("--only", choices=("kernels", "runs", "commands"), help="only one part")
     arguments = parser.parse_args()
     checkouts = (FOLDER, arguments.checkout.resolve())
     with tempfile.TemporaryDirectory(prefix="sweep-ratio-") as name:
         folder = Path(name)
         caches = (folder / "cache-0", folder / "cache-1")
-        if arguments.only != "runs":
+        if arguments.only in (None, "kernels"):
             compare_kernels(checkouts, caches, folder, arguments.rounds)
-        if arguments.only != "kernels":
+        if arguments.only in (None, "runs"):
             compare_runs(checkouts, caches, folder, RUN_ROUNDS)
+        if arguments.only in (None, "commands"):
+            compare_commands(checkouts, caches, folder, COMMAND_ROUNDS)
 
 
 if __name__ == "__main__":

@@ -63,10 +63,12 @@ class KernelCompiler(Compiler):
 class InsideCompiler(KernelCompiler):
     """The same for kernels that other kernels call."""
 
+    library: type[JITCodeLibrary]
+
     def define_pipelines(self) -> list[Any]:
         """Return the steps, and let the result be kept without machine code."""
         state = self.state
-        state.library = _Taken(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return super().define_pipelines()
 
@@ -88,6 +90,22 @@ class _Taken(JITCodeLibrary):
         self._final_module.name = code.name
         super()._finalize_final_module()
         self._final_module = code
+
+
+InsideCompiler.library = _Taken
+
+
+class _Raw(_Taken):
+    """Code that is optimised together with the only function that calls it."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+
+class OutermostCompiler(InsideCompiler):
+    """The same for a kernel that is called by its entry point alone."""
+
+    library = _Raw
 
 
 SETTINGS: Any = numba.config
@@ -142,8 +160,7 @@ def dispatcher_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     A wrapper takes the tuples among the arguments apart, number by number. Most kernels are called by kernels only, and
     their wrappers would be a third of the work.
     """
-    inside: Any = numba.njit(pipeline_class=InsideCompiler, **{**options, "no_cpython_wrapper": True})(function)
-    inside.add_overload = lambda compiled: inside.overloads.__setitem__(tuple(compiled.signature.args), compiled)
+    inside = _for_kernels(function, options, InsideCompiler)
     if _jit.CACHE_FOLDER is not None:
         with _LOOKING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
             before, SETTINGS.CACHE_DIR = SETTINGS.CACHE_DIR, _jit.CACHE_FOLDER
@@ -152,6 +169,13 @@ def dispatcher_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
             finally:
                 SETTINGS.CACHE_DIR = before
     return inside
+
+
+def _for_kernels(function: Callable[..., Any], options: dict[str, Any], compiler: type[InsideCompiler]) -> Any:
+    """Return what compiles a function without any wrapper."""
+    found: Any = numba.njit(pipeline_class=compiler, **{**options, "no_cpython_wrapper": True})(function)
+    found.add_overload = lambda compiled: found.overloads.__setitem__(tuple(compiled.signature.args), compiled)
+    return found
 
 
 def dispatcher_for_python(function: Callable[..., Any], options: dict[str, Any]) -> Any:
@@ -179,8 +203,9 @@ def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file
         It returns something other than numbers and records of them, or makes arrays.
     """
     types = tuple(numba_type(value) for value in arguments)
-    kernel.dispatcher.compile(types)
-    returns = kernel.dispatcher.overloads[types].signature.return_type
+    outermost = _for_kernels(kernel.py_func, kernel.options, OutermostCompiler)
+    outermost.compile(types)
+    returns = outermost.overloads[types].signature.return_type
     lines: list[str] = []
     kept = {"returns": written_out(returns, "found", lines), "numbers": len(lines), "types": described}
     reals, wholes, arrays = _Counter(), _Counter(), _Counter()
@@ -193,11 +218,9 @@ def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file
     source += f" out = carray(out_at, ({len(lines)},))\n found = function({', '.join(given)})\n"
     source += "".join(f" out[{place}] = {line}\n" for place, line in enumerate(lines))
     named = {f"R{number}": record for number, record in enumerate(records)}
-    wrapper = _jit.function_of(source, carray=numba.carray, function=kernel.dispatcher, **named)
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-    options["no_cpython_wrapper"] = True
-    entry: Any = numba.njit(pipeline_class=InsideCompiler, **options)(wrapper)
-    entry.add_overload = lambda compiled: entry.overloads.__setitem__(tuple(compiled.signature.args), compiled)
+    wrapper = _jit.function_of(source, carray=numba.carray, function=outermost, **named)
+    options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    entry = _for_kernels(wrapper, options, InsideCompiler)
     real, whole = numba.types.CPointer(numba.types.float64), numba.types.CPointer(numba.types.int64)
     signature = (real, whole, *arrays.kinds, real)
     entry.compile(signature)
