@@ -169,8 +169,9 @@ def _assembly(kernel: Any, signature: tuple[Any, ...]) -> str:
     """Compile a kernel anew, because code from the cache cannot be inspected, and return its machine code."""
     import numba
 
-    from boulder_kernels import _numba  # noqa: F401  tells Numba of what is no kernel
+    from boulder_kernels._jit import compiler
 
+    compiler()  # tells Numba of what is no kernel
     options = {name: value for name, value in kernel.options.items() if name not in ("cache", "nopython")}
     again = numba.njit(**options)(kernel.py_func)
     again.compile(signature)

@@ -188,8 +188,9 @@ def assembly_of(kernel: Any, *arguments: Any) -> str:
     """Return the machine code of a kernel; compiled anew, because code loaded from the cache cannot be inspected."""
     import numba
 
-    from boulder_kernels import _numba  # noqa: F401  tells Numba of what is no kernel
+    from boulder_kernels._jit import compiler
 
+    compiler()  # tells Numba of what is no kernel
     options = {name: value for name, value in kernel.options.items() if name not in ("cache", "nopython")}
     again = numba.njit(**options)(kernel.py_func)
     again(*arguments)

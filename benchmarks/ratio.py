@@ -1,9 +1,9 @@
 """CPU time and memory in proportion to another checkout, such as an earlier version of the project.
 
 Run as ``python -m benchmarks.ratio FOLDER``: kernels by four settings on random designs and on those of
-``configs/m30_sizing.yaml``, whole runs of 10^6 designs from process start to table, and short commands. Each checkout has a process
-and a folder of compiled kernels of its own. Both are timed in turn in every round, so that the load of the machine hits
-both alike.
+``configs/m30_sizing.yaml``, whole runs of 10^6 designs from process start to table, and short commands. Each checkout
+has a process and a folder of compiled kernels of its own. Both are timed in turn in every round, so that the load of
+the machine hits both alike.
 """
 
 from __future__ import annotations

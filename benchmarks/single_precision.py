@@ -38,7 +38,7 @@ KEPT = ("design", "stability")
 ORDER = (
     *("design", "stability", "numerics", "modes", "soil", "layered", "layered_soil", "plastic"),
     *("soil_laws", "dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "energy", "settling"),
-    *("after_step", "second_spring", "unloading", "onset", "workspace", "impact"),
+    *("after_step", "second_spring", "unloading", "onset", "workspace", "_lowering", "impact"),
     *("lane_events", "lane_steps", "lanes"),
 )
 CHANGES = {

@@ -32,7 +32,7 @@ COMPILED = {
     "plastic-design": ("impact.simulate_motion", "Memory", 30.0),
 }
 """Kernels for tables, and for one design over time: the one that takes longest to compile, what tells this kind of
-problem from others among the types that it is compiled for (`boulder_kernels._ahead.flatten`), and seconds where
+problem from others among the types that it is compiled for (`boulder_kernels._arguments.flatten`), and seconds where
 unknown."""
 
 
@@ -60,7 +60,7 @@ def cold_start(kernels: str | None) -> str | None:
     if kernels is None:
         return None
     from boulder_kernels._ahead import is_compiled
-    from boulder_kernels._jit import CACHE_FOLDER
+    from boulder_kernels._cache import CACHE_FOLDER
 
     kernel, types, seconds = COMPILED[kernels]
     if is_compiled(kernel, types):
@@ -73,7 +73,7 @@ def cold_start(kernels: str | None) -> str | None:
 
 def _remembered(kernels: str) -> Path:
     """Return the file with the seconds that the last compilation took, of whatever version of the kernels."""
-    from boulder_kernels._jit import CACHE_FOLDER
+    from boulder_kernels._cache import CACHE_FOLDER
 
     return Path(CACHE_FOLDER or "").parent / f"compilation-of-{kernels}-kernels-in-seconds"
 

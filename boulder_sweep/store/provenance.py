@@ -173,7 +173,7 @@ def now() -> str:
 @cache
 def versions() -> dict[str, str]:
     """Versions of Python, of the packages that compute and write rows, and of the instructions that compute them."""
-    from boulder_kernels._ahead import target  # imports NumPy, which those who only read a manifest need not
+    from boulder_kernels._cache import target  # imports NumPy, which those who only read a manifest need not
 
     found = {"python": platform.python_version(), "target": target()}
     for package in _PACKAGES:

@@ -5,7 +5,8 @@ equation numbers in this package are theirs. Everything here is plain numbers in
 subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, units or tables on disk.
 """
 
-from ._jit import source_hash
+from ._cache import source_hash
+from ._jit import when_compiling
 from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected
 from .impact import Control, Problem, Record, no_record, simulate, simulate_design
 from .outcomes import SIMULATED, Maxima, Outcome, OutcomesAtRest, OutcomeTable, Status
@@ -41,3 +42,9 @@ __all__ = [
     "simulate_table",
     "source_hash",
 ]
+
+
+@when_compiling
+def _lower() -> None:
+    """Tell Numba of loads and stores in the workspace, see there."""
+    from . import _lowering  # noqa: F401

@@ -13,33 +13,22 @@ same: the code is the same.
 from __future__ import annotations
 
 import ctypes
-import functools
 import hashlib
-import importlib
-import importlib.util
 import json
-import os
-import platform
+import tempfile
 import threading
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _jit
+from . import _cache
+from ._arguments import UnsuitableError, build, flatten
 
-KINDS = {np.dtype(np.float64): "f8", np.dtype(np.int64): "i8", np.dtype(np.int8): "i1", np.dtype(np.bool_): "b1"}
-"""Numbers that an array may hold."""
-REAL, WHOLE, TRUTH, NOTHING = "f", "i", "b", "n"
-_SCALARS = {float: REAL, np.float64: REAL, int: WHOLE, np.int64: WHOLE, bool: TRUTH, np.bool_: TRUTH}
 ENTRY = "entry"
 """Name of the function in a library."""
 LIBRARY, OBJECT, RETURNS = ".so", ".o", ".json"
 _COMPILING = threading.RLock()
-
-
-class UnsuitableError(Exception):
-    """A call, or a kernel, that is left to Numba's dispatcher."""
 
 
 class Native(NamedTuple):
@@ -53,62 +42,6 @@ class Native(NamedTuple):
     """How many numbers that is."""
     library: Any
     """What must stay loaded."""
-
-
-def flatten(value: Any, reals: list[float], wholes: list[int], arrays: list[np.ndarray]) -> str:
-    """Append the numbers and arrays of an argument to lists, and return its type as text.
-
-    Raises
-    ------
-    UnsuitableError
-        It is, or holds, something else.
-    """
-    kind = type(value)
-    letter = _SCALARS.get(kind)
-    if letter is not None:
-        (reals if letter == REAL else wholes).append(value)
-        return letter
-    if value is None:
-        return NOTHING
-    if kind is np.ndarray:
-        code = KINDS.get(value.dtype)
-        if code is None or value.ndim == 0 or not value.flags.c_contiguous:
-            raise UnsuitableError
-        wholes.extend(value.shape)
-        arrays.append(value)
-        return f"{code}{value.ndim}"
-    if isinstance(value, tuple):
-        record: Any = kind
-        return f"{name_of(record)}({','.join([flatten(one, reals, wholes, arrays) for one in value])})"
-    raise UnsuitableError
-
-
-@functools.cache
-def name_of(kind: Any) -> str:
-    """Name by which a type of records is imported; empty for plain tuples."""
-    return f"{kind.__module__}:{kind.__qualname__}" if hasattr(kind, "_fields") else ""
-
-
-def build(returns: Any, numbers: Any) -> Any:
-    """Return the value that a kernel returned, from its numbers one after another."""
-    if returns == REAL:
-        return next(numbers)
-    if returns == WHOLE:
-        return int(next(numbers))
-    if returns == TRUTH:
-        return next(numbers) != 0.0
-    if returns == NOTHING:
-        return None
-    name, fields = returns
-    values = [build(field, numbers) for field in fields]
-    return record_of(name)(*values) if name else tuple(values)
-
-
-@functools.cache
-def record_of(name: str) -> Any:
-    """Return a type of records by its name."""
-    module, _, inside = name.partition(":")
-    return getattr(importlib.import_module(module), inside)
 
 
 def call(kernel: Any, arguments: tuple[Any, ...]) -> Any:
@@ -162,12 +95,25 @@ def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
                 return loaded(file)
             except OSError:  # the other half is missing, or cannot be loaded: compiled again
                 pass
-        from . import _numba
-
         try:
-            return _numba.compiled_ahead(kernel, arguments, types, file)
+            code, library, kept = kernel.compiler.compiled_ahead(kernel, arguments, types)
         except UnsuitableError:
             return UNSUITABLE
+        if file is None:
+            from . import _llvm
+
+            return native_of(_llvm.loaded(code), kept)
+        file.parent.mkdir(mode=0o700, exist_ok=True)
+        put(file.with_suffix(OBJECT if library is None else LIBRARY), code if library is None else library)
+        put(file.with_suffix(RETURNS), json.dumps(kept).encode())
+        return loaded(file)
+
+
+def put(file: Path, content: bytes) -> None:
+    """Write a file whole, or not at all."""
+    with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as part:
+        part.write(content)
+    Path(part.name).replace(file)
 
 
 def file_name(kernel: Any, types: str) -> str:
@@ -205,44 +151,9 @@ def native_of(library: Any, kept: dict[str, Any]) -> Native:
 
 def folder() -> Path | None:
     """Return the folder for this processor and compiler; None where compiled code is not kept."""
-    if _jit.CACHE_FOLDER is None:
+    if _cache.CACHE_FOLDER is None:
         return None
-    return Path(_jit.CACHE_FOLDER) / f"native-{machine_hash()[:16]}"
-
-
-def target() -> str:
-    """Return what the bits of results depend on beside the sources.
-
-    Processors of one architecture give the same bits if both have fused multiply-add, or neither: wider registers only
-    take more designs at once.
-    """
-    fused = any(line.startswith("flags") and "fma" in line.split() for line in processor())
-    named = [os.environ[name] for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES") if os.environ.get(name)]
-    return " ".join([f"{platform.machine()}{'+fma' if fused else ''}", *named])
-
-
-@functools.cache
-def processor() -> tuple[str, ...]:
-    """Return what tells the kind of processor and its features, line by line."""
-    try:
-        with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as described:
-            first = described.read(16_384).partition("\n\n")[0]
-    except OSError:
-        return (platform.processor(),)
-    return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
-
-
-@functools.cache
-def machine_hash() -> str:
-    """Hash of what code depends on beside the sources: processor, compiler and its settings."""
-    parts = [platform.machine(), platform.system(), *processor()]
-    parts += [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith("NUMBA_")]
-    for package in ("numba", "llvmlite"):
-        found = importlib.util.find_spec(package)
-        if found is not None and found.origin is not None:
-            version = Path(found.origin).with_name("_version.py").stat()
-            parts.append(f"{package} {version.st_size} {version.st_mtime_ns}")
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    return Path(_cache.CACHE_FOLDER) / f"native-{_cache.machine_hash()[:16]}"
 
 
 def is_compiled(kernel: str, types: str = "") -> bool:

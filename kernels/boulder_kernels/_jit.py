@@ -26,102 +26,32 @@ notice that a function it calls has changed in another file. Only a folder that 
 from __future__ import annotations
 
 import contextlib
-import errno
 import functools
-import hashlib
 import os
-import stat
 import sys
-import tempfile
 import threading
-import warnings
 from collections.abc import Callable
-from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
-"""Environment variable that names another folder for compiled kernels."""
+from . import _ahead
+from ._arguments import UnsuitableError, function_of
+from ._cache import source_hash
 
-
-def source_hash() -> str:
-    """Hash of all kernel sources: which code computed a table.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits (SHA-256 over names and contents, in order of name).
-    """
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.name.encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()
-
-
-def _cache_folder() -> str | None:
-    """Return a folder for this version of the kernels that only this user can write, or None with a warning.
-
-    Libraries, and the pickles in which Numba keeps what one kernel takes from another, run as the user who loads them.
-    """
-    named = os.environ.get(CACHE_VARIABLE)
-    user_caches = os.environ.get("XDG_CACHE_HOME")
-    candidates = [Path(named)] if named else []
-    with contextlib.suppress(RuntimeError):  # no home folder, as for some service accounts
-        candidates.append((Path(user_caches) if user_caches else Path.home() / ".cache") / "boulder-sweep")
-    candidates.append(Path(tempfile.gettempdir()) / f"boulder-sweep-{os.getuid()}")
-    refused = []
-    for candidate in candidates:
-        try:
-            folder = _own_folder(candidate / f"kernels-{source_hash()[:16]}")
-            with tempfile.TemporaryFile(dir=folder):
-                pass
-        except OSError as problem:
-            refused.append(f"{candidate}: {problem.strerror}")
-            continue
-        if named and refused:
-            warnings.warn(f"compiled kernels are kept in {folder} ({refused[0]})", stacklevel=2)
-        return str(folder)
-    warnings.warn(
-        f"compiled kernels are not kept, so every start takes up to half a minute ({'; '.join(refused)}). Set "
-        f"{CACHE_VARIABLE} to a folder that only you can write",
-        stacklevel=2,
-    )
-    return None
-
-
-def _own_folder(folder: Path) -> Path:
-    """Make a folder with access for this user only, and check that nobody else can put files into it.
-
-    Returns
-    -------
-    Path
-        Without symbolic links, which could be changed later.
-
-    Raises
-    ------
-    OSError
-        It cannot be made, or others can change it or a folder above it.
-    """
-    folder = Path(os.path.realpath(folder))
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
-    for place in reversed(missing):
-        if not place.parent.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, f"{place.parent} is not a folder")
-        place.mkdir(mode=0o700, exist_ok=True)
-    for place in (folder, *folder.parents):
-        found = place.lstat()
-        if not stat.S_ISDIR(found.st_mode):
-            raise NotADirectoryError(errno.ENOTDIR, f"{place} is not a folder")
-        if found.st_uid not in (os.getuid(), 0):
-            raise PermissionError(errno.EPERM, f"{place} belongs to another user")
-        # Where the sticky bit is set, as for /tmp, others cannot replace what lies in the folder.
-        open_to_others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-        if open_to_others and (place == folder or not found.st_mode & stat.S_ISVTX):
-            raise PermissionError(errno.EPERM, f"other users can write into {place}")
-    return folder
-
-
-CACHE_FOLDER = _cache_folder()
+__all__ = [
+    "Kernel",
+    "array_kernel",
+    "exact_inlined",
+    "exact_kernel",
+    "function_of",
+    "inlined",
+    "kernel",
+    "overload",
+    "source_hash",
+    "summing_kernel",
+    "unless_none",
+    "when_compiling",
+]
 
 
 class Kernel:
@@ -148,13 +78,16 @@ class Kernel:
         functools.update_wrapper(self, function)
 
     @property
+    def compiler(self) -> Any:
+        """The module `boulder_kernels._numba`."""
+        return compiler()
+
+    @property
     def dispatcher(self) -> Any:
         """What compiles the function for other kernels."""
         with _MAKING:
             if self._dispatcher is None:
-                from . import _numba
-
-                self._dispatcher = _numba.dispatcher_of(self.py_func, self.options)
+                self._dispatcher = self.compiler.dispatcher_of(self.py_func, self.options)
         return self._dispatcher
 
     @property
@@ -162,15 +95,13 @@ class Kernel:
         """Numba's dispatcher of the function for calls from Python, for which it is compiled in every process."""
         with _MAKING:
             if self._for_python is None:
-                from . import _numba
-
-                self._for_python = _numba.dispatcher_for_python(self.py_func, self.options)
+                self._for_python = self.compiler.dispatcher_for_python(self.py_func, self.options)
         return self._for_python
 
     def __call__(self, *args: Any, **named: Any) -> Any:
         """Call the compiled function: its library, or by Numba where it has none."""
         if self._is_of_the_package and not named:
-            with contextlib.suppress(_ahead.UnsuitableError):
+            with contextlib.suppress(UnsuitableError):
                 return _ahead.call(self, args)
         return self.for_python(*args, **named)
 
@@ -190,11 +121,19 @@ _REGISTRATIONS: list[Callable[[], None]] = []
 
 
 def when_compiling(register: Callable[[], None]) -> Callable[[], None]:
-    """Call a function once Numba is there; it registers what kernels call that is not a kernel itself."""
+    """Call a function before the first kernel is compiled; it tells Numba of what is called and is no kernel."""
     _REGISTRATIONS.append(register)
-    if f"{__package__}._numba" in sys.modules:
-        register()
     return register
+
+
+def compiler() -> ModuleType:
+    """Return the module that compiles, and tell Numba first of what is called and is no kernel."""
+    from . import _numba
+
+    with _MAKING:
+        while _REGISTRATIONS:
+            _REGISTRATIONS.pop(0)()
+    return _numba
 
 
 def overload(function: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -285,12 +224,6 @@ def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compiled(function, {"contract", "nsz", "reassoc"})
 
 
-def function_of(source: str, **names: Any) -> Callable[..., Any]:
-    """Return the function that a source text defines, with the names it refers to: for what `overload` writes out."""
-    exec(source, names)
-    return names[source[len("def ") : source.index("(")]]
-
-
 def unless_none(names: str, function: Callable[..., Any], otherwise: str, **known: Any) -> Callable[..., Any]:
     """Return a function that calls another unless its last argument is None; inside kernels chosen when compiled.
 
@@ -325,6 +258,3 @@ def unless_none(names: str, function: Callable[..., Any], otherwise: str, **know
 
     overload(call)(choose)
     return call
-
-
-from . import _ahead  # noqa: E402  it needs the folder above

@@ -1,13 +1,12 @@
 """How kernels are compiled: Numba's compiler without what they do not need, and its files on disk.
 
-Imported when the first kernel is compiled, see `boulder_kernels._jit`, which has the decorators and their flags.
+Imported when the first kernel is compiled, by `boulder_kernels._jit`, which has the decorators and their flags.
 """
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
-import json
 import os
 import shutil
 import subprocess
@@ -24,7 +23,16 @@ from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-from . import _ahead, _jit, _llvm
+from . import _cache, _llvm
+from ._arguments import (
+    NOTHING,
+    REAL,
+    TRUTH,
+    WHOLE,
+    UnsuitableError,
+    function_of,
+    name_of,
+)
 
 NEEDLESS = {
     "WithLifting",
@@ -138,7 +146,7 @@ class Kept(FunctionCache):
         One process at a time: Numba looks for a free number, and of two that do so at once, each for other types, both
         would take the same. One of the two would then find the other's code under its own types at every later start.
         """
-        with _alone(Path(_jit.CACHE_FOLDER or "") / "lock"):
+        with _alone(Path(_cache.CACHE_FOLDER or "") / "lock"):
             super().save_overload(sig, data)
 
 
@@ -161,9 +169,9 @@ def dispatcher_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     their wrappers would be a third of the work.
     """
     inside = _for_kernels(function, options, InsideCompiler)
-    if _jit.CACHE_FOLDER is not None:
+    if _cache.CACHE_FOLDER is not None:
         with _LOOKING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
-            before, SETTINGS.CACHE_DIR = SETTINGS.CACHE_DIR, _jit.CACHE_FOLDER
+            before, SETTINGS.CACHE_DIR = SETTINGS.CACHE_DIR, _cache.CACHE_FOLDER
             try:
                 inside._cache = Kept(function)
             finally:
@@ -183,8 +191,10 @@ def dispatcher_for_python(function: Callable[..., Any], options: dict[str, Any])
     return numba.njit(pipeline_class=KernelCompiler, **options)(function)
 
 
-def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file: Path | None) -> _ahead.Native:
-    """Compile a kernel to a library, keep it, and load it.
+def compiled_ahead(
+    kernel: Any, arguments: tuple[Any, ...], described: str
+) -> tuple[bytes, bytes | None, dict[str, Any]]:
+    """Compile a kernel with an entry point that takes numbers and addresses.
 
     Parameters
     ----------
@@ -199,7 +209,7 @@ def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file
 
     Raises
     ------
-    boulder_kernels._ahead.UnsuitableError
+    boulder_kernels.UnsuitableError
         It returns something other than numbers and records of them, or makes arrays.
     """
     types = tuple(numba_type(value) for value in arguments)
@@ -213,12 +223,12 @@ def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file
     given = [argument_text(value, reals, wholes, arrays, records) for value in arguments]
     kept |= {"arrays": arrays.count}
     pointers = [f"p{number}" for number in range(arrays.count)]
-    source = f"def {_ahead.ENTRY}(reals_at, wholes_at, {''.join(f'{name}, ' for name in pointers)}out_at):\n"
+    source = f"def {ENTRY}(reals_at, wholes_at, {''.join(f'{name}, ' for name in pointers)}out_at):\n"
     source += f" reals = carray(reals_at, ({reals.count},))\n wholes = carray(wholes_at, ({wholes.count},))\n"
     source += f" out = carray(out_at, ({len(lines)},))\n found = function({', '.join(given)})\n"
     source += "".join(f" out[{place}] = {line}\n" for place, line in enumerate(lines))
     named = {f"R{number}": record for number, record in enumerate(records)}
-    wrapper = _jit.function_of(source, carray=numba.carray, function=outermost, **named)
+    wrapper = function_of(source, carray=numba.carray, function=outermost, **named)
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     entry = _for_kernels(wrapper, options, InsideCompiler)
     real, whole = numba.types.CPointer(numba.types.float64), numba.types.CPointer(numba.types.int64)
@@ -226,22 +236,18 @@ def compiled_ahead(kernel: Any, arguments: tuple[Any, ...], described: str, file
     entry.compile(signature)
     compiled = entry.overloads[signature]
     codegen = compiled.library.codegen
-    module = _llvm.module_of(compiled.library.get_llvm_str(), compiled.fndesc.llvm_func_name, _ahead.ENTRY)
+    module = _llvm.module_of(compiled.library.get_llvm_str(), compiled.fndesc.llvm_func_name, ENTRY)
     machine = llvmlite.binding.Target.from_default_triple().create_target_machine(
         cpu=codegen._get_host_cpu_name(), features=codegen._get_host_cpu_features(), opt=3, reloc="pic"
     )
-    if strange := _llvm.keep_only(module, [_ahead.ENTRY], machine) - MATHEMATICS:
-        raise _ahead.UnsuitableError(str(strange))
+    if strange := _llvm.keep_only(module, [ENTRY], machine) - MATHEMATICS:
+        raise UnsuitableError(str(strange))
     code = machine.emit_object(module)
-    library = linked(code)
-    if file is None:
-        return _ahead.native_of(_llvm.loaded(code), kept)
-    file.parent.mkdir(mode=0o700, exist_ok=True)
-    put(file.with_suffix(_ahead.OBJECT if library is None else _ahead.LIBRARY), code if library is None else library)
-    put(file.with_suffix(_ahead.RETURNS), json.dumps(kept).encode())
-    return _ahead.loaded(file)
+    return code, linked(code), kept
 
 
+ENTRY = "entry"
+"""Name of the function in a library."""
 MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "exp", "log", "sin", "cos", "fmod"}
 """Functions of the C library that kernels may call."""
 
@@ -275,7 +281,7 @@ def numba_type(value: Any) -> Any:
 
 
 def argument_text(value: Any, reals: _Counter, wholes: _Counter, arrays: _Counter, records: list[type]) -> str:
-    """Return the expression of an argument from the numbers of a call, in the order of `_ahead.flatten`."""
+    """Return the expression of an argument from the numbers of a call, in the order of `flatten`."""
     if isinstance(value, np.ndarray):
         shape = "".join(f"wholes[{wholes.next()}], " for _ in value.shape)
         arrays.kinds.append(numba.types.CPointer(numba.from_dtype(value.dtype)))
@@ -299,19 +305,19 @@ def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
 
     Raises
     ------
-    boulder_kernels._ahead.UnsuitableError
+    boulder_kernels.UnsuitableError
         It holds something other than numbers.
     """
     types: Any = numba.types
     if isinstance(kind, types.NoneType):
-        return _ahead.NOTHING
-    for number, letter in ((types.Boolean, _ahead.TRUTH), (types.Integer, _ahead.WHOLE), (types.Float, _ahead.REAL)):
+        return NOTHING
+    for number, letter in ((types.Boolean, TRUTH), (types.Integer, WHOLE), (types.Float, REAL)):
         if isinstance(kind, number):
             lines.append(expression)
             return letter
     if not isinstance(kind, types.BaseTuple):
-        raise _ahead.UnsuitableError(str(kind))
-    name = _ahead.name_of(kind.instance_class) if isinstance(kind, types.BaseNamedTuple) else ""
+        raise UnsuitableError(str(kind))
+    name = name_of(kind.instance_class) if isinstance(kind, types.BaseNamedTuple) else ""
     parts = (
         [f"{expression}.{field}" for field in kind.fields] if name else [f"{expression}[{i}]" for i in range(len(kind))]
     )
@@ -329,14 +335,3 @@ def linked(code: bytes) -> bytes | None:
         command = [compiler, "-shared", "-s", "-o", str(target), str(source), "-lm"]
         done = subprocess.run(command, capture_output=True, check=False)
         return target.read_bytes() if done.returncode == 0 else None
-
-
-def put(file: Path, content: bytes) -> None:
-    """Write a file whole, or not at all."""
-    with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as part:
-        part.write(content)
-    Path(part.name).replace(file)
-
-
-for _register in _jit._REGISTRATIONS:
-    _register()

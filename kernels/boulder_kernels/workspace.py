@@ -15,7 +15,6 @@ from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-from ._jit import when_compiling
 from .dense_output import Track
 from .design import Constants, Design
 from .dynamics import Acceleration, State
@@ -195,9 +194,3 @@ def align_stack() -> None:
 def copy_lane(ws: np.ndarray, lane: int, other: int, end: int) -> None:
     """Copy the numbers of one lane to another, up to before a place."""
     ws[other : other + end : LANES] = ws[lane : lane + end : LANES]
-
-
-@when_compiling
-def _lower() -> None:
-    """Register them as instructions of the compiler."""
-    from . import _lowering  # noqa: F401  registers them

@@ -78,7 +78,7 @@ def test_a_wrong_question_is_refused_before_anything_is_compiled(sweep, words, m
 def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatch, tmp_path):
     folder = tmp_path / "kernels-1"
     folder.mkdir()
-    monkeypatch.setattr("boulder_kernels._jit.CACHE_FOLDER", str(folder))
+    monkeypatch.setattr("boulder_kernels._cache.CACHE_FOLDER", str(folder))
     assert progress.cold_start("table") == f"{COMPILING}15 s"
     progress._remember("table", 12.3)
     assert progress.cold_start("table") == f"{COMPILING}12 s"

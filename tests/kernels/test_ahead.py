@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels import _ahead, _jit
+from boulder_kernels import _ahead, _cache
+from boulder_kernels._arguments import UnsuitableError
 from boulder_kernels.design import constants_of, is_computable
 from boulder_kernels.impact import simulate
 from boulder_kernels.layered import uniform_layers
@@ -77,7 +78,7 @@ def test_no_call_is_refused_that_numba_takes() -> None:
     """An array in another order, or of other numbers: left to Numba, with the same result."""
     designs = np.stack(table_of(DESIGNS))
     layers = np.asfortranarray(np.stack([uniform_layers(one) for one in DESIGNS]))
-    with pytest.raises(_ahead.UnsuitableError):
+    with pytest.raises(UnsuitableError):
         _ahead.call(run_rows, (designs, layers, None, None, READINGS, HOW, bk.no_record(), designs))
     assert sine_versine(np.float32(0.3))[0] == pytest.approx(np.sin(0.3), rel=1e-6)
 
@@ -85,7 +86,7 @@ def test_no_call_is_refused_that_numba_takes() -> None:
 @pytest.fixture
 def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A kernel of the package that was not called before, and an empty folder for what it is compiled to."""
-    monkeypatch.setattr(_jit, "CACHE_FOLDER", str(tmp_path))
+    monkeypatch.setattr(_cache, "CACHE_FOLDER", str(tmp_path))
     monkeypatch.setattr(sine_versine, "natives", {})
     return tmp_path
 
@@ -113,17 +114,17 @@ def test_half_of_a_library_is_compiled_again(fresh: Path) -> None:
 
 def test_nothing_is_kept_without_a_folder(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As where no folder is safe: compiled for this process alone."""
-    monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
+    monkeypatch.setattr(_cache, "CACHE_FOLDER", None)
     assert sine_versine(0.3) == sine_versine.for_python(0.3)
     assert not list(fresh.iterdir())
 
 
 def test_code_is_kept_by_processor_and_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     """A home folder that machines share holds code for each of them."""
-    before = _ahead.machine_hash.__wrapped__()
-    assert _ahead.machine_hash.__wrapped__() == before
+    before = _cache.machine_hash.__wrapped__()
+    assert _cache.machine_hash.__wrapped__() == before
     monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
-    named = _ahead.machine_hash.__wrapped__()
+    named = _cache.machine_hash.__wrapped__()
     monkeypatch.setattr(os, "uname", lambda: os.uname_result(("Linux", "here", "6", "1", "another")))
-    assert len({before, named, _ahead.machine_hash.__wrapped__()}) >= 2
+    assert len({before, named, _cache.machine_hash.__wrapped__()}) >= 2
     assert before != named

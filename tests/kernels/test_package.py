@@ -11,7 +11,7 @@ import numba
 import pytest
 
 import boulder_kernels
-from boulder_kernels import _ahead, _jit
+from boulder_kernels import _ahead, _cache, _jit
 from tests.waiting import HANG_GUARD_S
 
 SOURCES = sorted(Path(boulder_kernels.__file__).parent.glob("*.py"))
@@ -70,12 +70,12 @@ def run(script: str, environment: dict[str, str]) -> str:
 @pytest.mark.nightly
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     """It finds all machine code on the disk: no new file, none written again, no Numba; and the same bits come out."""
-    environment = {_jit.CACHE_VARIABLE: str(tmp_path)}
+    environment = {_cache.CACHE_VARIABLE: str(tmp_path)}
     theta, has_numba = run(RUN, environment).split()
     assert has_numba == "True"
     files = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
     assert sum(file.suffix in (_ahead.LIBRARY, _ahead.OBJECT) for file in files) == 1
-    folder = f"kernels-{_jit.source_hash()[:16]}"
+    folder = f"kernels-{_cache.source_hash()[:16]}"
     assert {file.relative_to(tmp_path).parts[0] for file in files} == {folder}
     assert run(RUN, environment).split() == [theta, "False"]
     assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == files
@@ -92,43 +92,43 @@ def test_the_hash_tells_sources_apart(tmp_path: Path, monkeypatch: pytest.Monkey
     """A change of one character anywhere in the package, or another name of a file, is another hash."""
     for source in SOURCES:
         (tmp_path / source.name).write_bytes(source.read_bytes())
-    monkeypatch.setattr(_jit, "__file__", str(tmp_path / "_jit.py"))
-    before = _jit.source_hash()
+    monkeypatch.setattr(_cache, "__file__", str(tmp_path / "_jit.py"))
+    before = _cache.source_hash()
     monkeypatch.undo()
-    assert before == _jit.source_hash() == boulder_kernels.source_hash()
-    monkeypatch.setattr(_jit, "__file__", str(tmp_path / "_jit.py"))
+    assert before == _cache.source_hash() == boulder_kernels.source_hash()
+    monkeypatch.setattr(_cache, "__file__", str(tmp_path / "_jit.py"))
     soil = tmp_path / "soil.py"
     soil.write_text(soil.read_text().replace("0.25", "0.26", 1))
-    assert _jit.source_hash() != before
+    assert _cache.source_hash() != before
     soil.write_bytes(SOURCES[[s.name for s in SOURCES].index("soil.py")].read_bytes())
-    assert _jit.source_hash() == before
+    assert _cache.source_hash() == before
     soil.rename(tmp_path / "soil2.py")
-    assert _jit.source_hash() != before
+    assert _cache.source_hash() != before
 
 
 def test_folder_of_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The one that is named; else the user's; else a temporary one of this user's own; named by the hash."""
-    name = f"kernels-{_jit.source_hash()[:16]}"
-    monkeypatch.setenv(_jit.CACHE_VARIABLE, str(tmp_path / "named"))
-    assert _jit._cache_folder() == str(tmp_path / "named" / name)
-    monkeypatch.delenv(_jit.CACHE_VARIABLE)
+    name = f"kernels-{_cache.source_hash()[:16]}"
+    monkeypatch.setenv(_cache.CACHE_VARIABLE, str(tmp_path / "named"))
+    assert _cache._cache_folder() == str(tmp_path / "named" / name)
+    monkeypatch.delenv(_cache.CACHE_VARIABLE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert _jit._cache_folder() == str(tmp_path / "xdg" / "boulder-sweep" / name)
+    assert _cache._cache_folder() == str(tmp_path / "xdg" / "boulder-sweep" / name)
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert _jit._cache_folder() == str(tmp_path / "home" / ".cache" / "boulder-sweep" / name)
+    assert _cache._cache_folder() == str(tmp_path / "home" / ".cache" / "boulder-sweep" / name)
 
 
 def test_where_no_folder_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any folder to write to, there is no cache, and the kernels still work."""
     blocked = tmp_path / "file"
     blocked.write_text("a file where a folder should be")
-    monkeypatch.setenv(_jit.CACHE_VARIABLE, str(blocked))
+    monkeypatch.setenv(_cache.CACHE_VARIABLE, str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(_jit.tempfile, "gettempdir", lambda: str(blocked))
+    monkeypatch.setattr(_cache.tempfile, "gettempdir", lambda: str(blocked))
     with pytest.warns(UserWarning, match="compiled kernels are not kept.*is not a folder.*BOULDER_SWEEP_CACHE_DIR"):
-        assert _jit._cache_folder() is None
-    monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
+        assert _cache._cache_folder() is None
+    monkeypatch.setattr(_cache, "CACHE_FOLDER", None)
     assert _jit.kernel(lambda x: x + 1.0)(1.0) == 2.0
 
 
@@ -138,11 +138,11 @@ def test_without_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     def homeless() -> Path:
         raise RuntimeError("no home")
 
-    monkeypatch.delenv(_jit.CACHE_VARIABLE, raising=False)
+    monkeypatch.delenv(_cache.CACHE_VARIABLE, raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setattr(_jit.Path, "home", homeless)
-    monkeypatch.setattr(_jit.tempfile, "gettempdir", lambda: str(tmp_path))
-    folder = _jit._cache_folder()
+    monkeypatch.setattr(_cache.Path, "home", homeless)
+    monkeypatch.setattr(_cache.tempfile, "gettempdir", lambda: str(tmp_path))
+    folder = _cache._cache_folder()
     assert folder is not None
     assert Path(folder).is_relative_to(tmp_path)
 
@@ -150,7 +150,7 @@ def test_without_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def test_other_users_of_numba_keep_their_cache() -> None:
     """The folder is set while that of a kernel is looked for and at no other time."""
     before = numba.config.CACHE_DIR
-    assert Path(_jit.kernel(lambda x: x).stats.cache_path).is_relative_to(str(_jit.CACHE_FOLDER))
+    assert Path(_jit.kernel(lambda x: x).stats.cache_path).is_relative_to(str(_cache.CACHE_FOLDER))
     assert before == numba.config.CACHE_DIR
 
 
@@ -207,7 +207,7 @@ def test_compiling_after_loading(tmp_path: Path) -> None:
     """A process that has loaded kernels can still compile others, which call them."""
     for name, source in (("called.py", CALLED), ("more.py", MORE)):
         (tmp_path / name).write_text(source)
-    environment = {_jit.CACHE_VARIABLE: str(tmp_path / "cache")}
+    environment = {_cache.CACHE_VARIABLE: str(tmp_path / "cache")}
     run(f"import sys; sys.path.append({str(tmp_path)!r}); import called", environment)
     printed = run(f"import sys; sys.path.append({str(tmp_path)!r}); import more", environment)
     assert printed.split() == ["0.25", "0.5", "1.5", "0.25", "0.5", "0.0", "0.5", "1.0"]
@@ -219,7 +219,7 @@ def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
     (tmp_path / "called.py").write_text(CALLED)
     script = f"import runpy; runpy.run_path({str(tmp_path / 'called.py')!r})"
     for _ in range(2):
-        printed = run(script, {_jit.CACHE_VARIABLE: str(tmp_path / "cache")})
+        printed = run(script, {_cache.CACHE_VARIABLE: str(tmp_path / "cache")})
         assert printed.split() == ["0.25", "0.5", "1.5", "0.25"]
     (folder,) = (tmp_path / "cache").glob("kernels-*")
     assert [path.name.split("-")[0].rpartition(".")[2] for path in folder.rglob("*.nbc")] == ["half"]
@@ -283,7 +283,7 @@ def test_two_processes_keep_compiled_code_at_once(tmp_path: Path) -> None:
         os.pathsep.join([str(SOURCES[0].parents[1]), os.environ.get("PYTHONPATH", "")]),
     )
     script.write_text(SAVED)
-    environment = {**os.environ, "PYTHONPATH": path, _jit.CACHE_VARIABLE: str(tmp_path / "cache")}
+    environment = {**os.environ, "PYTHONPATH": path, _cache.CACHE_VARIABLE: str(tmp_path / "cache")}
     one, other = str(tmp_path / "one"), str(tmp_path / "other")
     both = [
         subprocess.Popen([sys.executable, str(script), *names], env=environment, stdout=subprocess.PIPE, text=True)
@@ -322,12 +322,12 @@ def test_kernels_for_kernels_are_taken_from_the_disk(tmp_path: Path) -> None:
     file.write_text(TAKEN)
     for called, printed in (("ninth", "3.0 0"), ("root", "3.0 1"), ("root third ninth", "3.0 9.0 3.0 1")):
         script = f"import runpy, sys; sys.argv[1:] = {called.split()}; runpy.run_path({str(file)!r})"
-        assert run(script, {_jit.CACHE_VARIABLE: str(tmp_path / "cache")}).split() == printed.split()
+        assert run(script, {_cache.CACHE_VARIABLE: str(tmp_path / "cache")}).split() == printed.split()
 
 
 @pytest.mark.compiled
 def test_what_kernels_call_is_no_machine_code_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
+    monkeypatch.setattr(_cache, "CACHE_FOLDER", None)
     third = _jit.kernel(lambda x: x / 3.0)
     ninth = _jit.kernel(lambda x: third(third(x)))
     assert ninth(27.0) == 3.0

@@ -116,7 +116,8 @@ def test_element_sums_are_those_of_the_oracle(elements: int) -> None:
         soil = soil_of(design, elements)
         for y in states(design, 40, seed=23):
             found, known = element_sums(lines(y, c), c), soil.totals(motion(y))
-            assert soil_reaction(lines(y, c), c) == found
+            # The sum may be cut otherwise where it is compiled into what calls it.
+            assert soil_reaction(lines(y, c), c) == pytest.approx(found, rel=1e-13)
             size = size_of(design, y)
             assert_close(found, known.F, known.M, 1e-12, size, design)
 

@@ -1,0 +1,134 @@
+"""Where compiled code is kept, and what it depends on: the sources of the kernels, the processor, the compiler."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import functools
+import hashlib
+import importlib.util
+import os
+import platform
+import stat
+import tempfile
+import warnings
+from pathlib import Path
+
+CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
+"""Environment variable that names another folder for compiled kernels."""
+
+
+def source_hash() -> str:
+    """Hash of all kernel sources: which code computed a table.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits (SHA-256 over names and contents, in order of name).
+    """
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def _cache_folder() -> str | None:
+    """Return a folder for this version of the kernels that only this user can write, or None with a warning.
+
+    Libraries, and the pickles in which Numba keeps what one kernel takes from another, run as the user who loads them.
+    """
+    named = os.environ.get(CACHE_VARIABLE)
+    user_caches = os.environ.get("XDG_CACHE_HOME")
+    candidates = [Path(named)] if named else []
+    with contextlib.suppress(RuntimeError):  # no home folder, as for some service accounts
+        candidates.append((Path(user_caches) if user_caches else Path.home() / ".cache") / "boulder-sweep")
+    candidates.append(Path(tempfile.gettempdir()) / f"boulder-sweep-{os.getuid()}")
+    refused = []
+    for candidate in candidates:
+        try:
+            folder = _own_folder(candidate / f"kernels-{source_hash()[:16]}")
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+        except OSError as problem:
+            refused.append(f"{candidate}: {problem.strerror}")
+            continue
+        if named and refused:
+            warnings.warn(f"compiled kernels are kept in {folder} ({refused[0]})", stacklevel=2)
+        return str(folder)
+    warnings.warn(
+        f"compiled kernels are not kept, so every start takes up to half a minute ({'; '.join(refused)}). Set "
+        f"{CACHE_VARIABLE} to a folder that only you can write",
+        stacklevel=2,
+    )
+    return None
+
+
+def _own_folder(folder: Path) -> Path:
+    """Make a folder with access for this user only, and check that nobody else can put files into it.
+
+    Returns
+    -------
+    Path
+        Without symbolic links, which could be changed later.
+
+    Raises
+    ------
+    OSError
+        It cannot be made, or others can change it or a folder above it.
+    """
+    folder = Path(os.path.realpath(folder))
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    for place in reversed(missing):
+        if not place.parent.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{place.parent} is not a folder")
+        place.mkdir(mode=0o700, exist_ok=True)
+    for place in (folder, *folder.parents):
+        found = place.lstat()
+        if not stat.S_ISDIR(found.st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, f"{place} is not a folder")
+        if found.st_uid not in (os.getuid(), 0):
+            raise PermissionError(errno.EPERM, f"{place} belongs to another user")
+        # Where the sticky bit is set, as for /tmp, others cannot replace what lies in the folder.
+        open_to_others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+        if open_to_others and (place == folder or not found.st_mode & stat.S_ISVTX):
+            raise PermissionError(errno.EPERM, f"other users can write into {place}")
+    return folder
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def target() -> str:
+    """Return what the bits of results depend on beside the sources.
+
+    Processors of one architecture give the same bits if both have fused multiply-add, or neither: wider registers only
+    take more designs at once.
+    """
+    fused = any(line.startswith("flags") and "fma" in line.split() for line in processor())
+    named = [os.environ[name] for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES") if os.environ.get(name)]
+    return " ".join([f"{platform.machine()}{'+fma' if fused else ''}", *named])
+
+
+@functools.cache
+def processor() -> tuple[str, ...]:
+    """Return what tells the kind of processor and its features, line by line."""
+    try:
+        with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as described:
+            first = described.read(16_384).partition("\n\n")[0]
+    except OSError:
+        return (platform.processor(),)
+    return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
+
+
+@functools.cache
+def machine_hash() -> str:
+    """Hash of what code depends on beside the sources: processor, compiler and its settings."""
+    parts = [platform.machine(), platform.system(), *processor()]
+    parts += [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith("NUMBA_")]
+    for package in ("numba", "llvmlite"):
+        found = importlib.util.find_spec(package)
+        if found is not None and found.origin is not None:
+            version = Path(found.origin).with_name("_version.py").stat()
+            parts.append(f"{package} {version.st_size} {version.st_mtime_ns}")
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
