@@ -67,7 +67,7 @@ class Kernels:
     """A process with the kernels of one checkout, which times them when asked to."""
 
     def __init__(self, checkout: Path, cache: Path, designs: Path) -> None:
-        command = [sys.executable, str(Path(__file__).resolve()), str(designs)]
+        command = [sys.executable, "-P", str(Path(__file__).resolve()), str(designs)]  # not the modules beside this one
         self._process = subprocess.Popen(
             command, env=_environment(checkout, cache), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )

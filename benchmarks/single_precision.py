@@ -78,6 +78,7 @@ def load_single_precision() -> types.ModuleType:
     _add("_jit", _decorators())
     for name in ORDER:
         _add(name, sys.modules[f"boulder_kernels.{name}"] if name in KEPT else _translated(name))
+    _jit.compiler()  # tells Numba of what is no kernel
     return sys.modules[f"{PACKAGE}.lanes"]
 
 
@@ -98,7 +99,7 @@ def _decorators() -> types.ModuleType:
     module.exact_kernel = decorator({"nsz"})
     module.exact_inlined = decorator({"nsz"}, inline=True)
     module.function_of = _jit.function_of
-    module.unless_none = _jit.unless_none
+    module.unless_none, module.overload = _jit.unless_none, _jit.overload
     module.summing_kernel = decorator({"contract", "nsz", "reassoc"})
     return module
 
@@ -112,14 +113,13 @@ def _translated(name: str) -> types.ModuleType:
             raise RuntimeError(f"{file.name} no longer holds {before!r}")
         source = source.replace(before, after)
     tree = ast.parse(source)
-    # The tableau checks itself by exact fractions; only what comes out of it is rounded.
-    tree = tree if name == "tableau" else _Rounded().visit(tree)
+    tree = _Rounded().visit(tree)
     module: Any = types.ModuleType(f"{PACKAGE}.{name}")
     module.__package__, module._single = PACKAGE, np.float32
     sys.modules[module.__name__] = module
     with np.errstate(over="ignore"):  # 1e300 means never, and so does infinity
         exec(compile(ast.fix_missing_locations(tree), str(file), "exec"), module.__dict__)
-    if name == "tableau":
+    if name == "dormand_prince":  # the tableau checks itself by exact fractions; what comes out of it is rounded
         module.C = tuple(np.float32(value) for value in module.C)
         module.A, module.AA = (tuple(tuple(np.float32(v) for v in row) for row in m) for m in (module.A, module.AA))
     return module

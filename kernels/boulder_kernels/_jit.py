@@ -106,7 +106,7 @@ class Kernel:
         return self.for_python(*args, **named)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
+        if name.startswith("__") or name in vars(type(self)):  # the latter: a property that has failed itself
             raise AttributeError(name)
         return getattr(self.dispatcher, name)
 
