@@ -12,6 +12,7 @@ same: the code is the same.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import hashlib
 import json
@@ -88,13 +89,12 @@ UNSUITABLE: Any = object()
 def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
     """Return a compiled kernel, compiled now if it is not on the disk; `UNSUITABLE` where it cannot be."""
     with _COMPILING:
-        place = folder()
-        file = None if place is None else place / file_name(kernel, types)
-        if file is not None and file.with_suffix(RETURNS).exists():
-            try:
-                return loaded(file)
-            except OSError:  # the other half is missing, or cannot be loaded: compiled again
-                pass
+        place, name = folder(), file_name(kernel, types)
+        for there in (_cache.shipped_folder(), place):
+            if there is not None and (there / name).with_suffix(RETURNS).exists():
+                with contextlib.suppress(OSError):  # the other half is missing, or cannot be loaded: compiled again
+                    return loaded(there / name)
+        file = None if place is None else place / name
         try:
             code, library, kept = kernel.compiler.compiled_ahead(kernel, arguments, types)
         except UnsuitableError:
@@ -166,9 +166,6 @@ def is_compiled(kernel: str, types: str = "") -> bool:
     types
         Part of the types that it was compiled for, as `flatten` gives them.
     """
-    place = folder()
-    if place is None:
-        return False
-    return any(
-        types in json.loads(file.read_text())["types"] for file in place.glob(f"{kernel.replace('.', '-')}-*{RETURNS}")
-    )
+    pattern = f"{kernel.replace('.', '-')}-*{RETURNS}"
+    places = [place for place in (_cache.shipped_folder(), folder()) if place is not None]
+    return any(types in json.loads(file.read_text())["types"] for place in places for file in place.glob(pattern))

@@ -121,6 +121,40 @@ def processor() -> tuple[str, ...]:
     return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
 
 
+LEVELS = {
+    "x86-64-v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
+    "x86-64-v3": {"avx2", "fma", "bmi1", "bmi2", "f16c", "abm", "movbe"},
+    "aarch64": {"asimd"},
+}
+"""Targets that a wheel may carry libraries for, the fastest first, and the features of a processor that each needs."""
+SHIPPED = Path(__file__).with_name("compiled")
+"""Folder of such libraries: for each target a folder with the hash of the sources that they were compiled from."""
+SOURCES = "sources"
+"""Name of the file with that hash."""
+
+
+def levels() -> list[str]:
+    """Return the targets whose code this processor can run, the fastest first."""
+    features = {word for line in processor() if line.startswith(("flags", "Features")) for word in line.split()}
+    return [level for level, needed in LEVELS.items() if needed <= features]
+
+
+@functools.cache
+def shipped_folder() -> Path | None:
+    """Return the folder of libraries that came with the package for this processor; None where there is none.
+
+    One that was compiled from other sources is left alone, and so are all where Numba is told to compile for another
+    processor.
+    """
+    if any(os.environ.get(name) for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")):
+        return None
+    for level in levels():
+        with contextlib.suppress(OSError):
+            if (SHIPPED / level / SOURCES).read_text() == source_hash():
+                return SHIPPED / level
+    return None
+
+
 @functools.cache
 def machine_hash() -> str:
     """Hash of what code depends on beside the sources: processor, compiler and its settings."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -325,13 +326,13 @@ def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
 
 
 def linked(code: bytes) -> bytes | None:
-    """Return object code as a shared library, linked by the C compiler of this machine; None where there is none."""
-    compiler = shutil.which(os.environ.get("CC", "cc"))
-    if compiler is None:
+    """Return object code as a shared library, linked by the C compiler (``cc`` or CC); None where there is none."""
+    compiler = shlex.split(os.environ.get("CC", "cc"))
+    if not compiler or shutil.which(compiler[0]) is None:
         return None
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "kernel.o", Path(folder) / "kernel.so"
         source.write_bytes(code)
-        command = [compiler, "-shared", "-s", "-o", str(target), str(source), "-lm"]
+        command = [*compiler, "-shared", "-s", "-o", str(target), str(source), "-lm"]
         done = subprocess.run(command, capture_output=True, check=False)
         return target.read_bytes() if done.returncode == 0 else None

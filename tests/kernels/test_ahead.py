@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -128,3 +129,35 @@ def test_code_is_kept_by_processor_and_compiler(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(os, "uname", lambda: os.uname_result(("Linux", "here", "6", "1", "another")))
     assert len({before, named, _cache.machine_hash.__wrapped__()}) >= 2
     assert before != named
+
+
+def test_libraries_that_came_with_the_package_are_used(
+    fresh: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those for the fastest code that this processor can run, if they are of these sources; else they are compiled."""
+    expected = sine_versine(0.3)
+    (compiled,) = fresh.glob("native-*")
+    shipped = tmp_path_factory.mktemp("package")
+    monkeypatch.setattr(_cache, "SHIPPED", shipped)
+    monkeypatch.setattr(_cache, "LEVELS", {"too-new": {"no-such-feature"}, "mine": set()})
+    monkeypatch.setattr(_cache, "shipped_folder", _cache.shipped_folder.__wrapped__)
+    compiled.rename(shipped / "mine")
+    for sources, is_used in (("of another version", False), (bk.source_hash(), True)):
+        (shipped / "mine" / _cache.SOURCES).write_text(sources)
+        sine_versine.natives.clear()
+        assert sine_versine(0.3) == expected
+        assert _ahead.is_compiled("numerics.sine_versine")
+        assert bool(list(fresh.glob("native-*/*"))) is not is_used
+        shutil.rmtree(compiled, ignore_errors=True)
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    assert _cache.shipped_folder() is None
+
+
+def test_levels_of_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the features that the system reports."""
+    wide = "avx512f avx512bw avx512cd avx512dq avx512vl"
+    usual = "avx2 fma bmi1 bmi2 f16c abm movbe"
+    for features, found in ((f"{wide} {usual}", ["x86-64-v4", "x86-64-v3"]), (usual, ["x86-64-v3"]), ("sse2", [])):
+        monkeypatch.setattr(_cache, "processor", lambda flags=features: ("model name : any", f"flags : {flags}"))
+        assert _cache.levels() == found
+        assert ("+fma" in _cache.target()) is (found != [])
