@@ -33,10 +33,6 @@ MATHEMATICS = {"sqrt", "tan", "atan2", "hypot"}
 """C library functions that the kernels call."""
 
 
-COUNTING = re.compile(r"^(define .*@NRT_(?:incref|decref)\(.*)$[\s\S]*?^\}$", re.MULTILINE)
-"""Reference-counting functions."""
-
-
 def sources_hash() -> str:
     """Return the hash of what the kernel is built from: kernels, entry points and this module (SHA-256, hex)."""
     from boulder_kernels import source_hash
@@ -62,9 +58,9 @@ def intermediate_code() -> str:
         The code depends on this machine: Numba was imported before it could be configured, or a structure in memory
         holds addresses, whose length differs in WebAssembly.
     """
-    import llvmlite.binding as llvm
     import numba
 
+    from boulder_kernels._llvm import module_of
     from boulder_sweep.report import entry_points
 
     if {name: os.environ.get(name) for name in PORTABLE} != PORTABLE:
@@ -77,11 +73,7 @@ def intermediate_code() -> str:
         code = compiled.library.get_llvm_str()
         code = re.sub(r"^target triple = .*$", f'target triple = "{TRIPLE}"', code, flags=re.MULTILINE)
         code = re.sub(r"^target datalayout = .*$", f'target datalayout = "{LAYOUT}"', code, flags=re.MULTILINE)
-        # Arrays are only views of the page's memory, so no references need to be counted.
-        code = COUNTING.sub(r"\1\n ret void\n}", code)
-        module = llvm.parse_assembly(code)
-        module.get_function(compiled.fndesc.llvm_func_name).name = name
-        modules.append(module)
+        modules.append(module_of(code, compiled.fndesc.llvm_func_name, name))
     whole, *others = modules
     for other in others:
         whole.link_in(other)
@@ -99,19 +91,9 @@ def _keep_only(module: Any, names: Collection[str]) -> None:
     """
     import llvmlite.binding as llvm
 
-    for function in module.functions:
-        if not function.is_declaration and function.name not in names:
-            function.linkage = "internal"
-    for variable in module.global_variables:
-        variable.linkage = "internal"
-    passes = llvm.create_new_module_pass_manager()
-    passes.add_global_dead_code_eliminate_pass()
-    passes.add_strip_dead_prototype_pass()
-    options = llvm.create_pipeline_tuning_options(speed_level=3)
-    machine = llvm.Target.from_triple(TRIPLE).create_target_machine()
-    passes.run(module, llvm.create_pass_builder(machine, options))
-    called = {function.name for function in module.functions if function.is_declaration}
-    strange = {name for name in called if not name.startswith("llvm.")} - MATHEMATICS
+    from boulder_kernels._llvm import keep_only
+
+    strange = keep_only(module, names, llvm.Target.from_triple(TRIPLE).create_target_machine()) - MATHEMATICS
     structures = [line for line in str(module).splitlines() if re.search(r"alloca [\[{].*\bptr\b", line)]
     if strange or structures:
         raise RuntimeError(f"this code cannot be compiled for WebAssembly: it needs {sorted(strange)} and {structures}")
