@@ -17,6 +17,7 @@ from pathlib import Path
 
 from boulder_kernels import source_hash
 from boulder_kernels._cache import SHIPPED, SOURCES, levels
+from boulder_sweep.store.files import put_file
 
 CONFIG = Path(__file__).parents[1] / "configs" / "rwg.yaml"
 SPRINGS = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
@@ -50,7 +51,7 @@ def compile_for(level: str, target: Path) -> None:
         shutil.rmtree(target, ignore_errors=True)
         (compiled,) = Path(name).glob("cache/kernels-*/native-*")
         shutil.copytree(compiled, target)
-    (target / SOURCES).write_text(source_hash())
+    put_file(target, SOURCES, source_hash().encode())
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from boulder_sweep.runner import estimate as limits
@@ -62,7 +63,10 @@ def test_a_disk_that_fills_up_stops_the_run_and_loses_nothing(filling, tmp_path)
     assert found.damaged == {}
     assert 0 < found.rows_done < ROWS
     assert not found.running
-    assert read_table(out)["design_id"].to_pylist() == list(range(found.rows_done))
+    # A part may have found room behind one that did not.
+    rows = read_table(out)["design_id"].to_numpy()
+    assert len(rows) == found.rows_done
+    assert (np.diff(rows) > 0).all()
     make_room()
     summary = run(grid_of(ROWS), out, resume=True, simulate=plausible)
     assert summary.rows_computed == ROWS - found.rows_done
