@@ -36,7 +36,7 @@ def source_hash() -> str:
 def _cache_folder() -> str | None:
     """Return a folder for this version of the kernels that only this user can write, or None with a warning.
 
-    Libraries, and the pickles in which Numba keeps what one kernel takes from another, run as the user who loads them.
+    Libraries run as the user who loads them.
     """
     named = os.environ.get(CACHE_VARIABLE)
     user_caches = os.environ.get("XDG_CACHE_HOME")

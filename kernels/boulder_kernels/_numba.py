@@ -1,30 +1,26 @@
-"""How kernels are compiled: Numba's compiler without what they do not need, and its files on disk.
+"""How kernels are compiled: Numba's compiler without what they do not need, and an entry point for calls by address.
 
 Imported when the first kernel is compiled, by `boulder_kernels._jit`, which has the decorators and their flags.
 """
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import os
 import shlex
 import shutil
 import subprocess
 import tempfile
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-from . import _cache, _llvm
+from . import _llvm
 from ._arguments import (
     NOTHING,
     REAL,
@@ -70,23 +66,21 @@ class KernelCompiler(Compiler):
 
 
 class InsideCompiler(KernelCompiler):
-    """The same for kernels that other kernels call."""
+    """The same for kernels that other kernels call: optimised code, without machine code."""
 
     library: type[JITCodeLibrary]
 
     def define_pipelines(self) -> list[Any]:
-        """Return the steps, and let the result be kept without machine code."""
+        """Return the steps, whose result has no machine code."""
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
         return super().define_pipelines()
 
 
 class _Taken(JITCodeLibrary):
     """Optimised code that is taken into that of others.
 
-    In place of its machine code there are only the variables that Numba sets wherever it has compiled a function or
-    loaded it from the disk.
+    In place of its machine code there are only the variables that Numba sets wherever it has compiled a function.
     """
 
     def _finalize_final_module(self) -> None:
@@ -119,7 +113,6 @@ class OutermostCompiler(InsideCompiler):
 
 SETTINGS: Any = numba.config
 """Numba's settings, which it fills in at run time."""
-_LOOKING = threading.Lock()
 
 
 def _ask_for_wide_vectors() -> None:
@@ -138,53 +131,17 @@ def _ask_for_wide_vectors() -> None:
 _ask_for_wide_vectors()
 
 
-class Kept(FunctionCache):
-    """What a kernel is compiled to for other kernels, on disk."""
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the code for arguments of some types.
-
-        One process at a time: Numba looks for a free number, and of two that do so at once, each for other types, both
-        would take the same. One of the two would then find the other's code under its own types at every later start.
-        """
-        with _alone(Path(_cache.CACHE_FOLDER or "") / "lock"):
-            super().save_overload(sig, data)
-
-
-@contextlib.contextmanager
-def _alone(file: Path) -> Iterator[None]:
-    """Keep other processes waiting that ask for the same file, where the file system has locks."""
-    with contextlib.ExitStack() as kept:
-        with contextlib.suppress(OSError):
-            lock = kept.enter_context(file.open("a"))
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            # A process forked meanwhile has the file open, too, and would keep the lock beyond its closing here.
-            kept.callback(fcntl.flock, lock, fcntl.LOCK_UN)
-        yield
-
-
-def dispatcher_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+def dispatcher_of(
+    function: Callable[..., Any], options: dict[str, Any], compiler: type[InsideCompiler] = InsideCompiler
+) -> Any:
     """Return what compiles a function for other kernels, without a wrapper for calls from Python.
 
     A wrapper takes the tuples among the arguments apart, number by number. Most kernels are called by kernels only, and
     their wrappers would be a third of the work.
     """
-    inside = _for_kernels(function, options, InsideCompiler)
-    if _cache.CACHE_FOLDER is not None:
-        with _LOOKING:  # set only meanwhile: other users of Numba in this process keep their own cache folder
-            before, SETTINGS.CACHE_DIR = SETTINGS.CACHE_DIR, _cache.CACHE_FOLDER
-            try:
-                inside._cache = Kept(function)
-            finally:
-                SETTINGS.CACHE_DIR = before
+    inside: Any = numba.njit(pipeline_class=compiler, **{**options, "no_cpython_wrapper": True})(function)
+    inside.add_overload = lambda compiled: inside.overloads.__setitem__(tuple(compiled.signature.args), compiled)
     return inside
-
-
-def _for_kernels(function: Callable[..., Any], options: dict[str, Any], compiler: type[InsideCompiler]) -> Any:
-    """Return what compiles a function without any wrapper."""
-    found: Any = numba.njit(pipeline_class=compiler, **{**options, "no_cpython_wrapper": True})(function)
-    found.add_overload = lambda compiled: found.overloads.__setitem__(tuple(compiled.signature.args), compiled)
-    return found
 
 
 def dispatcher_for_python(function: Callable[..., Any], options: dict[str, Any]) -> Any:
@@ -205,16 +162,23 @@ def compiled_ahead(
         What it is called with; only their types matter.
     described
         These types as text.
-    file
-        Where to keep it, without an ending; None for nowhere.
+
+    Returns
+    -------
+    code : bytes
+        The object code.
+    library : bytes or None
+        The same as a shared library; None where there is no linker.
+    kept : dict
+        What comes back from a call, how many numbers that is, how many arrays a call has, and the types.
 
     Raises
     ------
-    boulder_kernels.UnsuitableError
+    boulder_kernels._arguments.UnsuitableError
         It returns something other than numbers and records of them, or makes arrays.
     """
     types = tuple(numba_type(value) for value in arguments)
-    outermost = _for_kernels(kernel.py_func, kernel.options, OutermostCompiler)
+    outermost = dispatcher_of(kernel.py_func, kernel.options, OutermostCompiler)
     outermost.compile(types)
     returns = outermost.overloads[types].signature.return_type
     lines: list[str] = []
@@ -231,7 +195,7 @@ def compiled_ahead(
     named = {f"R{number}": record for number, record in enumerate(records)}
     wrapper = function_of(source, carray=numba.carray, function=outermost, **named)
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-    entry = _for_kernels(wrapper, options, InsideCompiler)
+    entry = dispatcher_of(wrapper, options, InsideCompiler)
     real, whole = numba.types.CPointer(numba.types.float64), numba.types.CPointer(numba.types.int64)
     signature = (real, whole, *arrays.kinds, real)
     entry.compile(signature)
@@ -306,7 +270,7 @@ def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
 
     Raises
     ------
-    boulder_kernels.UnsuitableError
+    boulder_kernels._arguments.UnsuitableError
         It holds something other than numbers.
     """
     types: Any = numba.types

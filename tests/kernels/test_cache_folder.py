@@ -1,10 +1,8 @@
-"""Compiled kernels are pickles: only a folder that nobody else can write is used for them."""
+"""Compiled kernels run as the user who loads them: only a folder that nobody else can write is used for them."""
 
 from __future__ import annotations
 
-import fcntl
 import os
-import pickle
 import shutil
 import stat
 import subprocess
@@ -12,11 +10,10 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
 
 import pytest
 
-from boulder_kernels import _cache, _numba
+from boulder_kernels import _ahead, _cache
 
 ROOT = Path(__file__).parents[2]
 OTHER_USER = 65534
@@ -92,32 +89,22 @@ def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 TINY = """
-from boulder_kernels import _cache, _jit
+from boulder_kernels import _cache
+from boulder_kernels.numerics import sine_versine
 
-@_jit.kernel
-def tiny(x):
-    return x + 1.0
-
-@_jit.kernel
-def call(x):
-    return tiny(x)
-
-print(call(1.0), _cache.CACHE_FOLDER)
+print(sine_versine(0.0)[0], _cache.CACHE_FOLDER)
+"""
+PLANTED = """
+int entry(void *result, void *exception, double *reals, long long *wholes, double *out)
+{
+    out[0] = 42.0;
+    return 0;
+}
 """
 
 
-class Planted:
-    """Makes a file when it is loaded."""
-
-    def __init__(self, mark: Path):
-        self.mark = mark
-
-    def __reduce__(self) -> tuple[object, tuple[str]]:
-        return os.mkdir, (str(self.mark),)
-
-
 def run_tiny(place: Path) -> subprocess.CompletedProcess[str]:
-    """Compile and run a small kernel with a cache at a place, in another process."""
+    """Call a small kernel with a cache at a place, in another process."""
     environment = {
         "PATH": os.environ["PATH"],
         "PYTHONPATH": f"{ROOT / 'kernels'}",
@@ -130,46 +117,24 @@ def run_tiny(place: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.compiled
-def test_a_planted_file_does_not_run(place: Path) -> None:
+def test_a_planted_library_does_not_run(place: Path) -> None:
     """It would, from a folder that is trusted: else this test would show nothing."""
     (place / "tiny.py").write_text(TINY)
-    assert run_tiny(place).stdout.startswith("2.0 ")
-    (index,) = (place / "cache").rglob("*.nbi")
-    mark = place / "mark"
-    index.write_bytes(pickle.dumps(Planted(mark)))
-    run_tiny(place)
-    assert mark.exists()
-    mark.rmdir()
+    (place / "planted.c").write_text(PLANTED)
+    assert run_tiny(place).stdout.startswith("0.0 ")
+    (library,) = (place / "cache").rglob(f"*{_ahead.LIBRARY}")
+    compiler = [sys.executable, "-m", "ziglang", "cc"]
+    subprocess.run([*compiler, "-shared", "-o", str(library), str(place / "planted.c")], check=True)
+    assert run_tiny(place).stdout.startswith("42.0 ")
     (place / "cache").chmod(0o777)
     done = run_tiny(place)
-    assert done.stdout.startswith("2.0 ")
+    assert done.stdout.startswith("0.0 ")
     assert str(place) not in done.stdout
     assert "other users can write into" in done.stderr
-    assert not mark.exists()
     (place / "cache").chmod(0o755)
     if os.getuid() == 0:
         shutil.chown(place / "cache", OTHER_USER)
         done = run_tiny(place)
+        assert done.stdout.startswith("0.0 ")
         assert str(place) not in done.stdout
         assert "belongs to another user" in done.stderr
-        assert not mark.exists()
-
-
-def test_a_process_forked_meanwhile_does_not_keep_others_waiting(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It has the file open as well; a second descriptor of the same opening stands for it."""
-    kept: list[int] = []
-    opened = Path.open
-
-    def forked(path: Path, mode: str) -> IO[str]:
-        file = opened(path, mode)
-        kept.append(os.dup(file.fileno()))
-        return file
-
-    monkeypatch.setattr(_numba.Path, "open", forked)
-    with _numba._alone(tmp_path / "lock"), opened(tmp_path / "lock") as other, pytest.raises(BlockingIOError):
-        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    with opened(tmp_path / "lock") as other:
-        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    os.close(kept[0])

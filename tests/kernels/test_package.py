@@ -7,12 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import pytest
 
 import boulder_kernels
 from boulder_kernels import _ahead, _cache, _jit
-from tests.waiting import HANG_GUARD_S
 
 SOURCES = sorted(Path(boulder_kernels.__file__).parent.glob("*.py"))
 ALLOWED = {"numpy", "numba", "llvmlite"}  # llvmlite is a part of Numba
@@ -147,13 +145,6 @@ def test_without_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     assert Path(folder).is_relative_to(tmp_path)
 
 
-def test_other_users_of_numba_keep_their_cache() -> None:
-    """The folder is set while that of a kernel is looked for and at no other time."""
-    before = numba.config.CACHE_DIR
-    assert Path(_jit.kernel(lambda x: x).stats.cache_path).is_relative_to(str(_cache.CACHE_FOLDER))
-    assert before == numba.config.CACHE_DIR
-
-
 def test_public_names() -> None:
     for name in boulder_kernels.__all__:
         assert getattr(boulder_kernels, name) is not None
@@ -221,108 +212,6 @@ def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
     for _ in range(2):
         printed = run(script, {_cache.CACHE_VARIABLE: str(tmp_path / "cache")})
         assert printed.split() == ["0.25", "0.5", "1.5", "0.25"]
-    (folder,) = (tmp_path / "cache").glob("kernels-*")
-    assert [path.name.split("-")[0].rpartition(".")[2] for path in folder.rglob("*.nbc")] == ["half"]
-
-
-SAVED = """
-import fcntl, sys, time
-from pathlib import Path
-from numba.core.caching import IndexDataCacheFile
-from boulder_kernels import _jit, _numba
-
-def meet(*, word, other_words):
-    Path(sys.argv[1] + word).touch()
-    for _ in range(60_000):  # hang guard
-        if any(Path(sys.argv[2] + other).exists() for other in other_words):
-            return
-        time.sleep(0.01)
-
-def at_once(save):
-    def announced(*arguments):
-        meet(word="begins", other_words=["begins"])
-        return save(*arguments)
-    return announced
-
-def asking(lock):
-    def announced(*arguments):
-        Path(sys.argv[1] + "asks").touch()
-        return lock(*arguments)
-    return announced
-
-def late(save):
-    def kept_waiting(*arguments):
-        # Where it may not come as far, the other one waits for the lock by now.
-        meet(word="saves", other_words=["saves", "asks"])
-        return save(*arguments)
-    return kept_waiting
-
-@_jit.kernel
-def twice(x):
-    return x + x
-
-@_jit.kernel
-def call(x):
-    return twice(x)
-
-if sys.argv[2:]:
-    _numba.Kept.save_overload = at_once(_numba.Kept.save_overload)
-    IndexDataCacheFile._save_index = late(IndexDataCacheFile._save_index)
-    fcntl.flock = asking(fcntl.flock)
-    print(call(1 if sys.argv[1] < sys.argv[2] else 0.5))
-else:
-    print(call(1), call(0.5), *(sum(count.values()) for count in (twice.stats.cache_hits, twice.stats.cache_misses)))
-"""
-
-
-@pytest.mark.compiled
-def test_two_processes_keep_compiled_code_at_once(tmp_path: Path) -> None:
-    """Code for different types of one function: each is found again under its own."""
-    script, path = (
-        tmp_path / "saved.py",
-        os.pathsep.join([str(SOURCES[0].parents[1]), os.environ.get("PYTHONPATH", "")]),
-    )
-    script.write_text(SAVED)
-    environment = {**os.environ, "PYTHONPATH": path, _cache.CACHE_VARIABLE: str(tmp_path / "cache")}
-    one, other = str(tmp_path / "one"), str(tmp_path / "other")
-    both = [
-        subprocess.Popen([sys.executable, str(script), *names], env=environment, stdout=subprocess.PIPE, text=True)
-        for names in ((one, other), (other, one))
-    ]
-    told = {process.communicate(timeout=HANG_GUARD_S)[0].strip() for process in both}  # hang guard
-    assert told == {"2", "1.0"}
-    later = subprocess.run([sys.executable, str(script), one], env=environment, capture_output=True, text=True)
-    assert later.stdout.split() == ["2", "1.0", "2", "0"], later.stderr
-
-
-TAKEN = """
-import sys
-from boulder_kernels import _jit
-
-@_jit.kernel
-def third(x):
-    return x / 3.0
-
-@_jit.kernel
-def ninth(x):
-    return third(third(x))
-
-@_jit.kernel
-def root(x):
-    return third(x) ** 0.5
-
-print(*(globals()[name](27.0) for name in sys.argv[1:]), sum(third.stats.cache_hits.values()))
-"""
-
-
-@pytest.mark.compiled
-def test_kernels_for_kernels_are_taken_from_the_disk(tmp_path: Path) -> None:
-    """They are compiled into what calls them, now and in a later process."""
-    file = tmp_path / "taken.py"
-    file.write_text(TAKEN)
-    for called, printed in (("ninth", "3.0 0"), ("root", "3.0 1"), ("root third ninth", "3.0 9.0 3.0 1")):
-        script = f"import runpy, sys; sys.argv[1:] = {called.split()}; runpy.run_path({str(file)!r})"
-        assert run(script, {_cache.CACHE_VARIABLE: str(tmp_path / "cache")}).split() == printed.split()
 
 
 @pytest.mark.compiled
