@@ -34,6 +34,15 @@ COMMANDS = {
     "check": ("check", "configs/rwg.yaml"),
 }
 """Short commands, in the folder of a checkout."""
+MEASURED = """
+import resource, subprocess, sys
+done = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_utime + used.ru_stime, used.ru_maxrss)
+sys.exit(done.returncode)
+"""
+"""Runs a command, and prints its CPU time [s] and largest memory [kB]. A process of its own, because a command begins
+with the memory of the process that starts it, and that counts."""
 
 
 class Setting(NamedTuple):
@@ -126,16 +135,13 @@ def command_of(checkout: Path, cache: Path, words: Sequence[str]) -> tuple[float
     RuntimeError
         It failed.
     """
-    command = [sys.executable, "-m", "boulder_sweep", *words]
+    command = [sys.executable, "-S", "-c", MEASURED, sys.executable, "-m", "boulder_sweep", *words]
     environment = _environment(checkout, cache)
-    process = subprocess.Popen(
-        command, cwd=checkout, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise RuntimeError(f"{' '.join(words)} in {checkout} ended with exit code {process.returncode}")
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
+    done = subprocess.run(command, cwd=checkout, env=environment, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(words)} in {checkout} ended with exit code {done.returncode}")
+    cpu_s, memory_kB = map(float, done.stdout.split())
+    return cpu_s, memory_kB / 1e3
 
 
 def _environment(checkout: Path, cache: Path) -> dict[str, str]:

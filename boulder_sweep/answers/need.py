@@ -7,6 +7,7 @@ run`` would judge them. If that disagrees, the row is searched again with the ac
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,8 +74,7 @@ class Need(Result):
 
     def counts(self) -> dict[str, int]:
         """Return the number of rows of each kind of answer."""
-        found = self.arrow["found"].combine_chunks().value_counts().to_pylist()
-        counted = {entry["values"]: entry["counts"] for entry in found}
+        counted = Counter(self.arrow["found"].to_pylist())
         return {word: counted[word] for word in WORDS if word in counted}
 
     @property

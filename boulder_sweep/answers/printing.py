@@ -275,7 +275,7 @@ def _varies(sweep: Sweep, table: pa.Table, name: str) -> bool:
     if name == "embedment_ratio":
         given = sweep.plan.given.get(name)
         return given is not None and bool(given.values.min() < given.values.max())
-    return name in table.column_names and len(table[name].unique()) > 1
+    return name in table.column_names and len(set(table[name].to_pylist())) > 1
 
 
 def _number(name: str) -> Cell:
