@@ -42,8 +42,6 @@ HEAD = """\
 Counts = dict[str, int]
 _INSTRUCTION = re.compile(r"^\t[a-z]")
 _SYMBOL = re.compile(r"^(\w[\w.$]*):")
-_COMPILED = {"functions": "*.nbi", "specialisations": "*.nbc"}
-"""Files in which Numba keeps what it has compiled: one for each function, one for each set of types of arguments."""
 _PROFILED = ("closed_form", "step", "work_out")
 
 
@@ -105,11 +103,8 @@ def count(what: str, *kernels: str, folder: Path | None = None, environment: Map
         The process fails.
     """
     command = [sys.executable, "-m", "benchmarks.counts", what, *kernels]
-    with tempfile.TemporaryDirectory(prefix="sweep-counts-") as cache:
-        own = {"calls": {"NUMBA_DISABLE_JIT": "1"}, "run": {}, "code": TARGET | {CACHE_VARIABLE: cache}}[what]
-        done = subprocess.run(
-            command, cwd=folder, env={**environment, **own}, capture_output=True, text=True, check=False
-        )
+    own = {"calls": {"NUMBA_DISABLE_JIT": "1"}, "run": {}, "code": TARGET}[what]
+    done = subprocess.run(command, cwd=folder, env={**environment, **own}, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise RuntimeError(f"counting the {what} failed:\n{done.stderr[-2000:]}")
     return Counts(json.loads(done.stdout))
@@ -152,17 +147,27 @@ def _of_code(names: Sequence[str]) -> Counts:
         "element_sums": (soil.element_sums, (lines, constants)),
     }
     counts: Counts = {}
-    files = dict.fromkeys(_COMPILED, 0)
+    before = _compiled()
     for name in names:
         assembly = _assembly(*found[name])
         counts[f"instructions of {name}"] = instructions(assembly)
         if name == "attempt_steps":
             counts["flops of a step, machine code"] = operations_in_machine_code(assembly).flops
-        for kind, suffix in _COMPILED.items():
-            there = len(list(Path(os.environ[CACHE_VARIABLE]).rglob(suffix)))
-            counts |= {f"{kind} compiled for {name}": there - files[kind]} if there > files[kind] else {}
-            files[kind] = there
+        there = _compiled()
+        for kind, count in there.items():
+            counts |= {f"{kind} compiled for {name}": count - before[kind]} if count > before[kind] else {}
+        before = there
     return counts
+
+
+def _compiled() -> Counts:
+    """Count the kernels that were compiled for others in this process, and the types that they were compiled for."""
+    from boulder_kernels._jit import Kernel
+
+    modules = [module for name, module in sys.modules.items() if name.startswith("boulder_kernels")]
+    kernels = {value for module in modules for value in vars(module).values() if isinstance(value, Kernel)}
+    kinds = [len(kernel.overloads) for kernel in kernels if kernel.is_compiled]
+    return {"functions": sum(kind > 0 for kind in kinds), "specialisations": sum(kinds)}
 
 
 def _assembly(kernel: Any, signature: tuple[Any, ...]) -> str:

@@ -91,6 +91,11 @@ class Kernel:
         return self._dispatcher
 
     @property
+    def is_compiled(self) -> bool:
+        """Whether there is anything that other kernels were compiled with."""
+        return self._dispatcher is not None
+
+    @property
     def for_python(self) -> Any:
         """Numba's dispatcher of the function for calls from Python, for which it is compiled in every process."""
         with _MAKING:
