@@ -33,7 +33,7 @@ KNOWN |= {name: 0.0 for name in Maxima._fields if name.startswith("t_")}
 motion depends on three lengths from which other constants have been made."""
 
 
-GROUPS = 4
+GROUPS = 2
 """Groups of lanes that are stepped in turn, so that those in need of more than a step fill a group of their own."""
 
 
