@@ -83,7 +83,7 @@ def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = N
     margins = np.empty((2 ** len(SWITCHES), 2, DRAWN))
     for place, own in enumerate(every_reading(sweep)):
         for law, resistance in enumerate(COMPARED):
-            judges = judges_of(replace(own, model=replace(own.model, resistance=resistance)))
+            judges = judges_of(replace(own, model=replace(own.model, resistance=resistance)), compared=True)
             margins[place, law] = Draws(rows, spread, judges, threads(jobs)).distance(index, z)
     return [*parted(margins), Doubt(NUMERICAL, *(2 * [_numerical(sweep, spread, rows, z, judges_of(sweep), margins)]))]
 

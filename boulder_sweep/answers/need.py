@@ -206,9 +206,15 @@ def need(
     least_margin = margin_asked(margin)
     if open_readings and probability is None:
         raise QuestionError("--open-readings needs --probability")
-    variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep)) if open_readings else ()
+    variants: tuple[Judges, ...] = ()
+    if open_readings:
+        variants = tuple(judges_of(one, least_margin, compared=True) for one in every_reading(sweep))
     sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings else [sweep]
-    asked = [_question(one, key, between, judges_of(one, least_margin), probability, seed, variants) for one in sweeps]
+    drawn = probability is not None
+    judges = [judges_of(one, least_margin, compared=drawn and one is not sweep) for one in sweeps]
+    asked = [
+        _question(one, key, between, own, probability, seed, variants) for one, own in zip(sweeps, judges, strict=True)
+    ]
     asked[0].judges.final.warm_up()
     if progress is not None:
         progress(0, asked[0].count)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boulder_kernels._jit import plain
+from boulder_kernels.settling import proof_is_possible
 from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of
 from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
@@ -106,16 +108,28 @@ class Judges:
         return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
 
 
-def judges_of(sweep: Sweep, least_margin: float = 0.0) -> Judges:
+def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False) -> Judges:
     """Return the evaluations of a sweep.
 
-    Answers compare readings. As printed nothing can be proved; there a design passes that stands to the longest
-    horizon.
+    Parameters
+    ----------
+    sweep
+        The sweep. Where its readings allow no proof of rest, as the printed ones, a design passes that stands to the
+        longest horizon.
+    least_margin
+        As of `Judges`.
+    compared
+        Whether thousands of designs are drawn of a sweep that another one is only compared with. Where no proof is
+        possible a design then passes that stands to the horizon: to go on costs fifteen times as much and more.
     """
     accuracy = accuracy_of(sweep)
     final = dataclasses.replace(evaluation_of(sweep, accuracy, proved=False), least_margin=least_margin)
     coarse = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False), proved=False)
     coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin)
+    if compared and not plain(proof_is_possible)(final.readings):
+        final, coarse = (
+            dataclasses.replace(each, control=each.control._replace(longest_horizon=0.0)) for each in (final, coarse)
+        )
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
         coarse = final
     return Judges(coarse, final, accuracy, least_margin)

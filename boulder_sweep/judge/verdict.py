@@ -13,7 +13,7 @@ for the page of a report:
    penetration stay below their limits.
 8. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
 9. ``pass``. Where a reading lets forces feed energy, as the printed ones do, nothing can be proved of later times; such
-   rows are undecided by rule 7, unless a comparison of readings asks only what stands to the longest horizon.
+   rows are undecided by rule 7, unless a comparison of readings asks only what stands to the end of the simulated time.
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
 one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.

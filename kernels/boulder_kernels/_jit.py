@@ -47,6 +47,7 @@ __all__ = [
     "inlined",
     "kernel",
     "overload",
+    "plain",
     "source_hash",
     "summing_kernel",
     "unless_none",
@@ -229,6 +230,11 @@ def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compiled(function, {"contract", "nsz", "reassoc"})
 
 
+def plain(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the Python function of a kernel, for calls that are not worth a library; what it calls is compiled."""
+    return getattr(function, "py_func", function)
+
+
 def unless_none(names: str, function: Callable[..., Any], otherwise: str, **known: Any) -> Callable[..., Any]:
     """Return a function that calls another unless its last argument is None; inside kernels chosen when compiled.
 
@@ -247,13 +253,12 @@ def unless_none(names: str, function: Callable[..., Any], otherwise: str, **know
         What else it refers to, by name.
     """
     arguments = ", ".join(names.split())
-    plain = getattr(function, "py_func", function)  # what it calls is compiled
     when_none = function_of(f"def when_none({arguments}):\n return {otherwise}", **known)
     unless = function_of(f"def unless({arguments}):\n return function({arguments})", function=function)
 
     def call(*given: Any) -> Any:
         """Call the one for these arguments."""
-        return (when_none if given[-1] is None else plain)(*given)
+        return (when_none if given[-1] is None else plain(function))(*given)  # what it calls is compiled
 
     def choose(*given: Any) -> Callable[..., Any]:
         """Return the one for arguments of these Numba types."""

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, kernel, unless_none
+from ._jit import array_kernel, kernel, plain, unless_none
 from .design import DesignTable, Readings, design_at, design_in
 from .dynamics import State
 from .impact import Control, Problem, Record, failed, misses, no_record, simulate, simulate_motion
@@ -158,7 +158,7 @@ def simulate_impact(problem: Problem, readings: Readings, control: Control, reco
     if outcome.status not in SIMULATED or outcome.status == Status.LIMIT:
         return Impact(outcome, c, np.nan, np.nan, np.nan)
     swing_back = float(c.memory.so_far[SWING])
-    if y.v_v > 0.0 or not proof_is_possible(readings):
+    if y.v_v > 0.0 or not plain(proof_is_possible)(readings):
         return Impact(outcome, c, np.nan, np.nan, swing_back)
     rest = rest_of(y, control.theta_limit, c)
     return Impact(outcome, c, rest.theta, rest.doubt, swing_back)
