@@ -36,7 +36,7 @@ SOURCES = Path(bk.__file__).parent
 KEPT = ("design", "stability")
 """Modules that stay in double precision: what is computed once per design."""
 ORDER = (
-    *("design", "stability", "numerics", "modes", "soil", "layered", "layered_soil", "plastic"),
+    *("design", "stability", "numerics", "flat", "modes", "soil", "layered", "layered_soil", "plastic"),
     *("soil_laws", "dynamics", "dense_output", "dormand_prince", "outcomes", "gaps", "events", "energy", "settling"),
     *("after_step", "second_spring", "unloading", "onset", "workspace", "_lowering", "impact"),
     *("lane_events", "lane_steps", "lanes"),
@@ -100,7 +100,6 @@ def _decorators() -> types.ModuleType:
     module.exact_inlined = decorator({"nsz"}, inline=True)
     module.function_of = _jit.function_of
     module.unless_none, module.overload = _jit.unless_none, _jit.overload
-    module.summing_kernel = decorator({"contract", "nsz", "reassoc"})
     return module
 
 

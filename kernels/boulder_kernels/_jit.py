@@ -10,8 +10,8 @@ that is called has been compiled ahead, a process does without it.
     over lanes from being vectorised.
 ``fastmath={"contract", "nsz"}``
     Fused multiply-add, and the sign of zero does not matter. Nothing may assume that NaN or infinity never
-    occur: a state that has become non-finite must be seen and reported. Sums are reordered in one place
-    only (`summing_kernel`), so a design gives the same bits wherever in a block it is computed.
+    occur: a state that has become non-finite must be seen and reported. Nor may sums be reordered, so that a design
+    gives the same bits wherever in a block, and with whatever vectors, it is computed (see `boulder_kernels.flat`).
 ``_nrt``
     Off but for what makes arrays: kernels borrow those that they are given, and do not count references to them.
     The counters are atomic, and cost a fifth of the time of short simulations.
@@ -49,7 +49,6 @@ __all__ = [
     "overload",
     "plain",
     "source_hash",
-    "summing_kernel",
     "unless_none",
     "when_compiling",
 ]
@@ -220,14 +219,6 @@ def exact_inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     twice is fused depends on the code around it.
     """
     return _compiled(function, {"nsz"}, inline=True)
-
-
-def summing_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile as `kernel` does, and let sums be reordered so that one long sum is vectorised.
-
-    For sums over thousands of soil elements only; a function compiled so must not test for NaN.
-    """
-    return _compiled(function, {"contract", "nsz", "reassoc"})
 
 
 def plain(function: Callable[..., Any]) -> Callable[..., Any]:

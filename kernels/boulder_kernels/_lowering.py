@@ -10,11 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, get_type_hints
 
+from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
+from numba.np import arrayobj
 
 from .design import Design, design_in
-from .workspace import KNOWN, LANES, RECORDS, align_stack, copy_lane, field, load, offsets_of, put, store
+from .flat import WIDTH, field, partial_sums, put
+from .workspace import KNOWN, LANES, RECORDS, align_stack, copy_lane, load, offsets_of, store
 
 LINE = 64
 """Bytes of a line of the fast memory."""
@@ -61,6 +65,23 @@ def _lower_put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     value = context.cast(builder, args[3], sig.args[3], sig.args[0].dtype)
     builder.store(value, _pointer(context, builder, sig.args[:3], args[:3]))
     return context.get_dummy_value()
+
+
+@type_callable(partial_sums)
+def _type_partial_sums(context: Any) -> Callable[..., Any]:
+    return lambda: types.Array(types.float64, 1, "C")
+
+
+@lower_builtin(partial_sums)
+def _lower_partial_sums(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Room on the stack, free again when the function returns: nothing that the array is passed to keeps it."""
+    numbers = ir.ArrayType(ir.DoubleType(), 2 * WIDTH)
+    room = cgutils.alloca_once(builder, numbers)
+    builder.store(ir.Constant(numbers, None), room)
+    size, array = context.get_constant(types.intp, 8), context.make_array(sig.return_type)(context, builder)
+    shape, data = [context.get_constant(types.intp, 2 * WIDTH)], builder.bitcast(room, array.data.type)
+    arrayobj.populate_array(array, data=data, shape=shape, strides=[size], itemsize=size, meminfo=None)
+    return array._getvalue()
 
 
 @type_callable(load)

@@ -25,6 +25,7 @@ from .events import (
     tolerance_of,
     weights_of,
 )
+from .flat import field, put
 from .gaps import gaps_at
 from .numerics import ITERATIONS
 from .outcomes import Status, compression_at
@@ -57,9 +58,7 @@ from .workspace import (
     TRUCK,
     WEIGHTS,
     align_stack,
-    field,
     load,
-    put,
     store,
 )
 

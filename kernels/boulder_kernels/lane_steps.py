@@ -13,6 +13,7 @@ from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, pass
 from .design import Readings, constants_of, design_in, is_computable
 from .dormand_prince import step
 from .events import AT_END, TOLERANCE, initial_modes, needs_moment
+from .flat import field, put
 from .impact import Control, attempt_budget, ending_of, first_step
 from .modes import TURNING_FORWARD, Modes
 from .onset import first_length
@@ -48,9 +49,7 @@ from .workspace import (
     SWITCHES,
     TIME,
     align_stack,
-    field,
     load,
-    put,
     store,
 )
 

@@ -17,6 +17,7 @@ import numpy as np
 from ._jit import inlined, kernel
 from .after_step import RUNNING
 from .design import Readings
+from .flat import field, put
 from .impact import Control, ending_of
 from .lane_events import conclude, start_steps, work_out
 from .lane_steps import attempt_steps, start_designs, take_over_steps, write_lane
@@ -35,8 +36,6 @@ from .workspace import (
     STEP_FULL,
     WHOLE,
     copy_lane,
-    field,
-    put,
 )
 
 EMPTY = -1

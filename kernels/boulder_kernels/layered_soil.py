@@ -10,7 +10,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ._jit import inlined, kernel, summing_kernel
+import numpy as np
+
+from ._jit import inlined, kernel
+from .flat import WIDTH, add, field, partial_sums, total
 from .layered import SoilElements, SoilLayers
 from .soil import TINY, Kinematics, Potential, Reaction
 
@@ -18,18 +21,27 @@ GAUSS = 1.0 / math.sqrt(3.0)
 """Nodes of the two-point Gauss rule are plus and minus this, its weights 1."""
 
 
-@summing_kernel
+@inlined
+def add_element(sums: np.ndarray, j: int, first: int, k: Kinematics, soil: SoilElements) -> None:
+    """Add force and moment of element first + j to the partial sums j."""
+    ratio, ultimate = field(soil.ratio, first, j), field(soil.ultimate, first, j)
+    spring = field(soil.stiffness, first, j) * (k.A - k.slope_x * ratio)
+    v = k.B - k.slope_v * ratio
+    pressed = min(max(spring, -ultimate), ultimate) + field(soil.drag, first, j) * v * abs(v)
+    add(sums, j, -pressed, pressed * (k.lever_d * ratio + k.q))
+
+
+@kernel
 def reaction_of_elements(k: Kinematics, soil: SoilElements) -> Reaction:
     """Sum force and moment over elements with values of their own (Eqs 19-21, 26, 28, 36)."""
-    F = M = 0.0
-    for n in range(soil.ratio.size):
-        ratio = soil.ratio[n]
-        spring = soil.stiffness[n] * (k.A - k.slope_x * ratio)
-        v = k.B - k.slope_v * ratio
-        pressed = min(max(spring, -soil.ultimate[n]), soil.ultimate[n]) + soil.drag[n] * v * abs(v)
-        F -= pressed
-        M += pressed * (k.lever_d * ratio + k.q)
-    return Reaction(F, M)
+    sums = partial_sums()
+    whole = soil.ratio.size - soil.ratio.size % WIDTH
+    for first in range(0, whole, WIDTH):
+        for j in range(WIDTH):
+            add_element(sums, j, first, k, soil)
+    for j in range(soil.ratio.size - whole):
+        add_element(sums, j, whole, k, soil)
+    return Reaction(total(sums, 0), total(sums, WIDTH))
 
 
 @kernel

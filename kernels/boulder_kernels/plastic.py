@@ -23,8 +23,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import kernel, overload, summing_kernel
+from ._jit import inlined, kernel, overload
 from .design import Constants
+from .flat import WIDTH, add, field, partial_sums, total
 from .layered import SoilElements
 from .layered_soil import power_of_elements
 from .soil import Kinematics, Potential, Reaction
@@ -118,20 +119,34 @@ def push(n: int, u: float, y: float, memory: Memory) -> float:
     return abs(memory.front[n] - front)
 
 
-@summing_kernel
+@inlined
+def add_plastic_element(
+    sums: np.ndarray, j: int, first: int, k: Kinematics, soil: SoilElements, memory: Memory
+) -> None:
+    """Add force and moment of element first + j to the partial sums j."""
+    ratio, stiffness, ultimate = (
+        field(soil.ratio, first, j),
+        field(soil.stiffness, first, j),
+        field(soil.ultimate, first, j),
+    )
+    displacement, velocity = k.A - k.slope_x * ratio, k.B - k.slope_v * ratio
+    ahead = min(max(stiffness * (displacement - field(memory.front, first, j)), 0.0), ultimate)
+    behind = min(max(stiffness * (field(memory.back, first, j) - displacement), 0.0), ultimate)
+    F_n = behind - ahead - field(soil.drag, first, j) * velocity * abs(velocity)
+    add(sums, j, F_n, -F_n * (k.lever_d * ratio + k.q))
+
+
+@kernel
 def reaction_of_plastic_elements(k: Kinematics, soil: SoilElements, memory: Memory) -> Reaction:
     """Sum force and moment over plastic elements (Eqs 19, 20, 36, 121, 122)."""
-    F = M = 0.0
-    for n in range(soil.ratio.size):
-        ratio, stiffness, ultimate = soil.ratio[n], soil.stiffness[n], soil.ultimate[n]
-        displacement = k.A - k.slope_x * ratio
-        velocity = k.B - k.slope_v * ratio
-        ahead = min(max(stiffness * (displacement - memory.front[n]), 0.0), ultimate)
-        behind = min(max(stiffness * (memory.back[n] - displacement), 0.0), ultimate)
-        F_n = behind - ahead - soil.drag[n] * velocity * abs(velocity)
-        F += F_n
-        M -= F_n * (k.lever_d * ratio + k.q)
-    return Reaction(F, M)
+    sums = partial_sums()
+    whole = soil.ratio.size - soil.ratio.size % WIDTH
+    for first in range(0, whole, WIDTH):
+        for j in range(WIDTH):
+            add_plastic_element(sums, j, first, k, soil, memory)
+    for j in range(soil.ratio.size - whole):
+        add_plastic_element(sums, j, whole, k, soil, memory)
+    return Reaction(total(sums, 0), total(sums, WIDTH))
 
 
 @kernel

@@ -21,8 +21,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ._jit import inlined, kernel, summing_kernel
+import numpy as np
+
+from ._jit import inlined, kernel
 from .design import Constants
+from .flat import WIDTH, add, partial_sums, total
 
 TINY = 1e-30
 """Stands in for a slope of zero, so that a break point at infinity is clamped and not 0/0."""
@@ -97,7 +100,16 @@ def drag_force(velocity: float, h_e: float, c: Constants) -> float:
     return c.R_soil / c.d * h_e * velocity * abs(velocity)
 
 
-@summing_kernel
+@inlined
+def add_element(sums: np.ndarray, j: int, n: int, k: Kinematics, c: Constants) -> None:
+    """Add force and moment of element n = 0 ... N - 1 to the partial sums j."""
+    h_e = c.d / c.elements
+    ratio = (n + 0.5) * (1.0 / c.elements)
+    F_n = -(spring_force(k.A - k.slope_x * ratio, ratio * c.d, h_e, c) + drag_force(k.B - k.slope_v * ratio, h_e, c))
+    add(sums, j, F_n, -F_n * (k.lever_d * ratio + k.q))
+
+
+@kernel
 def element_sums(k: Kinematics, c: Constants) -> Reaction:
     """Sum force and moment over the N elements: the paper's own method (Eqs 19-21, 26, 28, 36).
 
@@ -108,17 +120,14 @@ def element_sums(k: Kinematics, c: Constants) -> Reaction:
     c
         Constants of the design; ``c.elements`` must be positive.
     """
-    F = M = 0.0
-    h_e = c.d / c.elements
-    per_element = 1.0 / c.elements
-    for n in range(c.elements):
-        ratio = (n + 0.5) * per_element
-        F_n = -(
-            spring_force(k.A - k.slope_x * ratio, ratio * c.d, h_e, c) + drag_force(k.B - k.slope_v * ratio, h_e, c)
-        )
-        F += F_n
-        M -= F_n * (k.lever_d * ratio + k.q)
-    return Reaction(F, M)
+    sums = partial_sums()
+    whole = c.elements - c.elements % WIDTH
+    for first in range(0, whole, WIDTH):
+        for j in range(WIDTH):
+            add_element(sums, j, first + j, k, c)
+    for j in range(c.elements - whole):
+        add_element(sums, j, whole + j, k, c)
+    return Reaction(total(sums, 0), total(sums, WIDTH))
 
 
 @inlined

@@ -150,16 +150,6 @@ DESIGN = _place("design")
 RECORDS = {_place(name): record for name, record in _ALL.items()}
 
 
-def field(ws: np.ndarray, place: int, lane: int) -> float:
-    """Return the number at a place for one lane."""
-    return ws[place + lane]
-
-
-def put(ws: np.ndarray, place: int, lane: int, value: float) -> None:
-    """Write the number at a place for one lane."""
-    ws[place + lane] = value
-
-
 def offsets_of(record: Any) -> dict[str, int]:
     """Where the fields that are kept of a record lie, from its place on."""
     kept = (name for name in record._fields if name not in KNOWN)
