@@ -66,8 +66,9 @@ def intermediate_code() -> str:
     if {name: os.environ.get(name) for name in PORTABLE} != PORTABLE:
         raise RuntimeError("Numba must be configured for a generic processor before it is imported")
     modules = []
-    for name, arguments in entry_points.EXPORTS.items():
-        function = getattr(entry_points, name)
+    kinds = {"p": numba.types.CPointer(numba.types.float64), "i": numba.types.int32}
+    for name, letters in entry_points.EXPORTS.items():
+        function, arguments = getattr(entry_points, name), tuple(kinds[letter] for letter in letters)
         function.compile(numba.types.void(*arguments))
         compiled = function.overloads[tuple(arguments)]
         code = compiled.library.get_llvm_str()

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import carray, types
 
 from boulder_kernels import (
     ELASTIC,
@@ -24,7 +23,7 @@ from boulder_kernels import (
     SecondSpring,
     simulate,
 )
-from boulder_kernels._jit import array_kernel, inlined
+from boulder_kernels._jit import array_kernel, inlined, when_compiling
 from boulder_kernels.design import design_in
 from boulder_kernels.layered import SoilLayers
 from boulder_kernels.outcomes import write_outcome
@@ -52,13 +51,17 @@ HISTORY = (
 """Columns of a time history, in this order; m, rad, N, J. The parts of the energy as in `EnergyLedger`."""
 ENERGY = HISTORY.index("vehicle_kinetic")
 """Index of the first energy."""
-_DOUBLES = types.CPointer(types.float64)
-EXPORTS = {
-    "outcomes": (_DOUBLES, types.int32, _DOUBLES, types.int32, *(_DOUBLES,) * 4),
-    "rulings": (types.int32, *(_DOUBLES,) * 4),
-    "history": (_DOUBLES, _DOUBLES, types.int32, _DOUBLES, _DOUBLES, types.int32, *(_DOUBLES,) * 7),
-}
-"""The functions that the page calls, and the types of their arguments."""
+EXPORTS = {"outcomes": "pipipppp", "rulings": "ipppp", "history": "ppippippppppp"}
+"""The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number."""
+carray: Any = None
+"""`numba.carray`, which is there when kernels are compiled: a report is written without Numba."""
+
+
+@when_compiling
+def _import_carray() -> None:
+    """Import what the kernels below make arrays with."""
+    global carray
+    from numba import carray
 
 
 @inlined

@@ -89,31 +89,42 @@ UNSUITABLE: Any = object()
 def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
     """Return a compiled kernel, compiled now if it is not on the disk; `UNSUITABLE` where it cannot be."""
     with _COMPILING:
-        place, name = folder(), file_name(kernel, types)
-        for there in (_cache.shipped_folder(), place):
-            if there is not None and (there / name).with_suffix(RETURNS).exists():
-                with contextlib.suppress(OSError):  # the other half is missing, or cannot be loaded: compiled again
-                    return loaded(there / name)
-        file = None if place is None else place / name
+        name, kept_in = file_name(kernel, types), folder()
+        for place in (_cache.shipped_folder(), kept_in):
+            if place is not None:
+                with contextlib.suppress(UnusableError):
+                    return loaded(place / name)
         try:
             code, library, kept = kernel.compiler.compiled_ahead(kernel, arguments, types)
         except UnsuitableError:
             return UNSUITABLE
-        if file is None:
-            from . import _llvm
+        if kept_in is not None:
+            # There may be no room on the disk, and what was linked may be for another machine.
+            with contextlib.suppress(OSError, UnusableError):
+                kept_in.mkdir(mode=0o700, exist_ok=True)
+                ending, content = (OBJECT, code) if library is None else (LIBRARY, library)
+                put((kept_in / name).with_suffix(ending), content)
+                put((kept_in / name).with_suffix(RETURNS), json.dumps(kept).encode())
+                return loaded(kept_in / name)
+        from . import _llvm
 
-            return native_of(_llvm.loaded(code), kept)
-        file.parent.mkdir(mode=0o700, exist_ok=True)
-        put(file.with_suffix(OBJECT if library is None else LIBRARY), code if library is None else library)
-        put(file.with_suffix(RETURNS), json.dumps(kept).encode())
-        return loaded(file)
+        return native_of(_llvm.loaded(code), kept)
+
+
+class UnusableError(Exception):
+    """Files of a compiled kernel that are not there, or not whole."""
 
 
 def put(file: Path, content: bytes) -> None:
     """Write a file whole, or not at all."""
     with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as part:
-        part.write(content)
-    Path(part.name).replace(file)
+        try:
+            part.write(content)
+            part.flush()
+            Path(part.name).replace(file)
+        except OSError:
+            Path(part.name).unlink()
+            raise
 
 
 def file_name(kernel: Any, types: str) -> str:
@@ -128,16 +139,34 @@ def loaded(file: Path) -> Native:
 
     Raises
     ------
-    OSError
-        It is not there.
+    UnusableError
+        One of its files is not there, or not whole.
     """
-    kept = json.loads(file.with_suffix(RETURNS).read_text())
-    library = file.with_suffix(LIBRARY)
-    if library.exists():
-        return native_of(ctypes.CDLL(str(library)), kept)
+    kept, library = described(file.with_suffix(RETURNS)), file.with_suffix(LIBRARY)
+    try:
+        if library.exists():
+            return native_of(ctypes.CDLL(str(library)), kept)
+        code = file.with_suffix(OBJECT).read_bytes()
+    except (OSError, AttributeError) as problem:  # ctypes says so of a library without the function
+        raise UnusableError(str(problem)) from problem
     from . import _llvm
 
-    return native_of(_llvm.loaded(file.with_suffix(OBJECT).read_bytes()), kept)
+    return native_of(_llvm.loaded(code), kept)
+
+
+def described(file: Path) -> dict[str, Any]:
+    """Return what was written beside a compiled kernel.
+
+    Raises
+    ------
+    UnusableError
+        It is not there, or not whole.
+    """
+    try:
+        kept: dict[str, Any] = json.loads(file.read_text())
+    except (OSError, ValueError) as problem:
+        raise UnusableError(str(problem)) from problem
+    return kept
 
 
 def native_of(library: Any, kept: dict[str, Any]) -> Native:
@@ -166,6 +195,9 @@ def is_compiled(kernel: str, types: str = "") -> bool:
     types
         Part of the types that it was compiled for, as `flatten` gives them.
     """
-    pattern = f"{kernel.replace('.', '-')}-*{RETURNS}"
-    places = [place for place in (_cache.shipped_folder(), folder()) if place is not None]
-    return any(types in json.loads(file.read_text())["types"] for place in places for file in place.glob(pattern))
+    for place in (_cache.shipped_folder(), folder()):
+        for file in [] if place is None else place.glob(f"{kernel.replace('.', '-')}-*{RETURNS}"):
+            with contextlib.suppress(UnusableError):
+                if types in described(file)["types"]:
+                    return True
+    return False

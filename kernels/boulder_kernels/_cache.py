@@ -121,9 +121,10 @@ def processor() -> tuple[str, ...]:
     return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
 
 
+_V3 = {"avx2", "fma", "bmi1", "bmi2", "f16c", "abm", "movbe"}
 LEVELS = {
-    "x86-64-v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
-    "x86-64-v3": {"avx2", "fma", "bmi1", "bmi2", "f16c", "abm", "movbe"},
+    "x86-64-v4": _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
+    "x86-64-v3": _V3,
     "aarch64": {"asimd"},
 }
 """Targets that a wheel may carry libraries for, the fastest first, and the features of a processor that each needs."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from pathlib import Path
@@ -102,15 +103,45 @@ def test_a_machine_without_a_linker(fresh: Path, monkeypatch: pytest.MonkeyPatch
     assert sorted(file.suffix for file in fresh.glob("native-*/*")) == [_ahead.RETURNS, _ahead.OBJECT]
 
 
-def test_half_of_a_library_is_compiled_again(fresh: Path) -> None:
-    """A process that was killed, or a full disk, leaves no kernel that cannot be called."""
+@pytest.mark.parametrize(
+    ("ending", "content"),
+    [(_ahead.LIBRARY, None), (_ahead.RETURNS, None), (_ahead.RETURNS, b""), (_ahead.RETURNS, b"{")],
+    ids=["no library", "nothing beside it", "empty", "cut"],
+)
+def test_half_of_a_library_is_compiled_again(fresh: Path, ending: str, content: bytes | None) -> None:
+    """A process that was killed, or a power cut, leaves no kernel that cannot be called."""
     expected = sine_versine(0.3)
-    (library,) = fresh.glob(f"native-*/*{_ahead.LIBRARY}")
-    library.unlink()
+    (file,) = fresh.glob(f"native-*/*{ending}")
+    file.unlink()
+    if content is not None:
+        file.write_bytes(content)
+    assert _ahead.is_compiled("numerics.sine_versine") is (ending == _ahead.LIBRARY)
     sine_versine.natives.clear()
     assert sine_versine(0.3) == expected
-    assert library.exists()
-    assert not [file for file in library.parent.iterdir() if file.suffix not in (_ahead.LIBRARY, _ahead.RETURNS)]
+    assert file.stat().st_size > 1
+    assert not [file for file in file.parent.iterdir() if file.suffix not in (_ahead.LIBRARY, _ahead.RETURNS)]
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\x7fELF" + bytes(60)], ids=["empty", "no library", "cut"])
+def test_a_library_that_is_not_whole_is_refused(fresh: Path, tmp_path: Path, content: bytes) -> None:
+    """Under another name, because the system loads a library that it has loaded only once."""
+    sine_versine(0.3)
+    (kept,) = fresh.glob(f"native-*/*{_ahead.RETURNS}")
+    (tmp_path / f"other{_ahead.RETURNS}").write_bytes(kept.read_bytes())
+    (tmp_path / f"other{_ahead.LIBRARY}").write_bytes(content)
+    with pytest.raises(_ahead.UnusableError):
+        _ahead.loaded(tmp_path / "other")
+
+
+def test_a_full_disk_keeps_nothing(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel is compiled for this process alone, and no half of a file stays."""
+
+    def full(self: Path, target: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(_ahead.Path, "replace", full)
+    assert sine_versine(0.3) == sine_versine.for_python(0.3)
+    assert not [file for file in fresh.rglob("*") if file.is_file()]
 
 
 def test_nothing_is_kept_without_a_folder(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
