@@ -10,6 +10,7 @@ from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import Acceleration
 from boulder_kernels.events import AT_END, TOLERANCE, initial_modes
+from boulder_kernels.flat import field
 from boulder_kernels.lane_steps import start_designs
 from boulder_kernels.lanes import start_again
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
@@ -28,7 +29,6 @@ from boulder_kernels.workspace import (
     STEP_FULL,
     TIME,
     WHOLE,
-    field,
     load,
 )
 from tests import oracle
