@@ -27,12 +27,13 @@ import numpy as np
 from boulder_kernels import DesignTable
 from boulder_kernels.design import G
 from boulder_kernels.layered import LayeredTable
+from boulder_sweep import elementary
 from boulder_sweep.settings.model import WATER_KG_M3, Ground
 
 
 def passive_coefficient(phi: np.ndarray) -> np.ndarray:
     """Return Rankine's coefficient K_p of passive earth pressure for angles phi [rad] (with Eq 27)."""
-    return np.tan(0.25 * np.pi + 0.5 * phi) ** 2
+    return elementary.tan(0.25 * np.pi + 0.5 * phi) ** 2
 
 
 def kp_squared(table: DesignTable) -> np.ndarray:
@@ -52,7 +53,7 @@ def width_capped(table: DesignTable) -> np.ndarray:
     soil beside it, after Ovesen and Brinch Hansen, for a wall that stands alone and reaches the surface.
     """
     K_p = passive_coefficient(table.phi)
-    R = 1.0 + 1.6 * (K_p - 1.0 / K_p) ** 0.67 / (1.0 + 5.0 * table.W / table.d)
+    R = 1.0 + 1.6 * elementary.power(K_p - 1.0 / K_p, 0.67) / (1.0 + 5.0 * table.W / table.d)
     return np.minimum(K_p**2, K_p * R)
 
 
@@ -98,8 +99,9 @@ def slope_factor(phi: np.ndarray, slope: float) -> np.ndarray:
     slope
         Angle of the ground [rad].
     """
-    falling = 1.0 - np.sqrt(np.sin(phi) * np.sin(np.maximum(phi - slope, 0.0)) / np.cos(slope))
-    return ((1.0 - np.sin(phi)) / falling) ** 2
+    sin = elementary.sin(phi)
+    falling = 1.0 - np.sqrt(sin * elementary.sin(np.maximum(phi - slope, 0.0)) / elementary.cos(slope))
+    return ((1.0 - sin) / falling) ** 2
 
 
 def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0) -> Any:

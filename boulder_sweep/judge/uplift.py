@@ -8,6 +8,7 @@ import numpy as np
 
 from boulder_kernels import DesignTable
 from boulder_kernels.design import G
+from boulder_sweep import elementary
 
 WALL_FRICTION = 2.0 / 3.0
 """Friction angle between boulder and soil over that of the soil: EN 1997-1, 9.5.1, for smooth concrete."""
@@ -23,7 +24,7 @@ def side_friction(table: DesignTable) -> np.ndarray:
     table
         n designs, SI.
     """
-    coefficient = run_by_run(lambda phi: (1.0 - np.sin(phi)) * np.tan(WALL_FRICTION * phi), table.phi)
+    coefficient = run_by_run(lambda phi: (1.0 - elementary.sin(phi)) * elementary.tan(WALL_FRICTION * phi), table.phi)
     return coefficient * table.rho_s * G * table.d**2 * table.L
 
 

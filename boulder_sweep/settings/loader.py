@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from boulder_sweep import elementary
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
 from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
@@ -121,7 +122,7 @@ def _apply_partial_factor(entries: Entries, factor: float) -> None:
     field = fields.BY_NAME["friction_angle_deg"]
 
     def design(angle: np.ndarray) -> np.ndarray:
-        return np.degrees(np.arctan(np.tan(np.radians(angle)) / factor))
+        return np.degrees(elementary.arctan(elementary.tan(np.radians(angle)) / factor))
 
     leaf = entries.leaves.get(field.name)
     if leaf is not None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boulder_sweep import elementary
 from boulder_sweep.settings.fields import BY_NAME, Field
 from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.problems import Position, Problem
@@ -170,4 +171,4 @@ def terzaghi_curve(angle: np.ndarray) -> np.ndarray:
 
 
 def _log_line(angle: np.ndarray, angles: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.exp(np.interp(angle, angles, np.log(values)))
+    return elementary.exp(np.interp(angle, angles, elementary.log(values)))

@@ -32,6 +32,7 @@ _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 _DECIDING_SOURCES = (
     "designs.py",
     "columns.py",
+    "elementary.py",
     "soils.py",
     "judge/*.py",
     *(f"settings/{name}.py" for name in ("fields", "model", "notes")),

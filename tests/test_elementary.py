@@ -1,0 +1,57 @@
+"""Elementary functions of arrays: those of the C library, one number after another."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boulder_sweep import elementary
+
+ROOT = Path(__file__).parents[1]
+BITS = """
+import numpy as np
+from boulder_sweep import soils
+from boulder_sweep.settings.model import Ground
+from boulder_sweep.settings.notes import api_curve
+from tests.kernels.samples import random_designs, table_of
+table = table_of(random_designs(500, seed=11))
+found = [soils.with_law(table, law).K_epsilon for law in soils.LAWS]
+found += [api_curve(np.degrees(table.phi)), soils.slope_factor(table.phi, 0.2)]
+found += [soils.layers_of(table, law, Ground(water_table_m=0.7, cohesion_kPa=3.0)).ravel() for law in soils.LAWS]
+print(*(value.hex() for values in found for value in values.tolist()))
+"""
+
+
+@pytest.mark.parametrize("name", ["tan", "sin", "cos", "arctan", "exp"])
+def test_numbers_are_those_of_the_library(name: str) -> None:
+    """Of arrays of any shape, and of single numbers; NaN stays NaN."""
+    function, known = getattr(elementary, name), getattr(math, name.replace("arc", "a"))
+    angles = np.linspace(0.0, 1.2, 12).reshape(3, 4)
+    assert function(angles).tolist() == [[known(angle) for angle in row] for row in angles.tolist()]
+    assert function(angles).dtype == np.float64
+    assert function(0.7) == known(0.7)
+    assert math.isnan(function(np.array([math.nan]))[0])
+
+
+def test_powers_and_logarithms() -> None:
+    values = np.array([0.5, 2.0, 3.7])
+    assert elementary.power(values, 0.67).tolist() == [math.pow(value, 0.67) for value in values.tolist()]
+    assert elementary.log(values).tolist() == [math.log(value) for value in values.tolist()]
+    assert len(elementary.tan(np.empty(0))) == 0
+
+
+def test_soils_have_the_same_bits_with_vectors_of_any_width() -> None:
+    """NumPy is told to leave its widest ones alone, in another process; one that does not know the names warns."""
+    found = set()
+    for disabled in ("", "X86_V4 AVX512_ICL AVX512_SPR", "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"):
+        environment = os.environ | {"NPY_DISABLE_CPU_FEATURES": disabled}
+        command = [sys.executable, "-W", "ignore", "-c", BITS]
+        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+        found.add(done.stdout)
+    assert len(found) == 1
