@@ -44,7 +44,7 @@ MUTATIONS = (
     Mutation((16,), _DESIGN, "own *= 0.25", "own *= 0.5"),
     Mutation((17,), _DYNAMICS, "-s.k_truck * u,", "s.k_truck * u,"),
     Mutation((19, 20), _SOIL, "F_n = -(", "F_n = +("),
-    Mutation((20,), _SOIL, "M -= F_n * (k.lever_d * ratio + k.q)", "M -= F_n * (k.lever_d * ratio - k.q)"),
+    Mutation((20,), _SOIL, "-F_n * (k.lever_d * ratio + k.q)", "-F_n * (k.lever_d * ratio - k.q)"),
     Mutation((19, 20), _SOIL, "pressed_r = c.K_soil * spring_r + R", "pressed_r = c.K_soil * spring_r - R"),
     Mutation((19,), _SOIL, "drag = BB * (2.0 * r_0 - 1.0)", "drag = BB * (2.0 * r_0 + 1.0)"),
     Mutation(
@@ -95,7 +95,7 @@ MUTATIONS = (
     Mutation(
         (106,), _GROUND, "stress = stress + weight * (bottom - top)", "stress = stress + G * rho_s * (bottom - top)"
     ),
-    Mutation((107,), _GROUND, "/ np.cos(slope))", ")"),
+    Mutation((107,), _GROUND, "/ elementary.cos(slope))", ")"),
     Mutation((108,), _LAYERS, "pressed_r += r * spring", "pressed_r += middle * spring"),
     Mutation((108,), _LAYERS, "0.5 if within else 1.0", "0.5"),
     Mutation((108,), _LAYERS, "stored += P_0 * P_0 * math.log", "stored -= P_0 * P_0 * math.log"),

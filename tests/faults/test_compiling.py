@@ -31,15 +31,35 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 """
 
 
+COMMAND = """
+import os, sys
+from numba.core import event
+
+compiled = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+
+class Told(event.Listener):
+    def on_start(self, started):
+        pass
+
+    def on_end(self, ended):
+        os.write(compiled, b".")
+
+event.register("numba:compile", Told())
+from boulder_sweep.cli.main import main
+main(sys.argv[2:])
+"""
+"""A command of sweep that writes a dot into a file for every function that it has compiled."""
+
+
 class Compiling(NamedTuple):
-    """A command that compiles, and where the compiled functions come to lie."""
+    """A command that compiles, and the file with a dot for every function."""
 
     process: subprocess.Popen[str]
-    cache: Path
+    compiled: Path
 
     def count(self) -> int:
         """How many functions are compiled."""
-        return len(list(self.cache.rglob("*.nbi")))
+        return self.compiled.stat().st_size if self.compiled.exists() else 0
 
     def _has_taken(self, number: int) -> bool:
         """Whether a signal has arrived: then it is no longer caught."""
@@ -62,9 +82,9 @@ def start(tmp_path):
     started = []
 
     def begin(*words, functions=1):
-        cache = tmp_path / f"cache-{len(started)}"
+        cache, compiled = tmp_path / f"cache-{len(started)}", tmp_path / f"compiled-{len(started)}"
         process = subprocess.Popen(
-            [sys.executable, "-m", "boulder_sweep", *words],
+            [sys.executable, "-c", COMMAND, str(compiled), *words],
             cwd=tmp_path,
             env={**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'kernels'}", "BOULDER_SWEEP_CACHE_DIR": str(cache)},
             stdout=subprocess.PIPE,
@@ -72,7 +92,7 @@ def start(tmp_path):
             text=True,
         )
         started.append(process)
-        compiling = Compiling(process, cache)
+        compiling = Compiling(process, compiled)
         wait_until(lambda: compiling.count() >= functions or process.poll() is not None, "functions are compiled")
         assert process.poll() is None, process.communicate()
         return compiling
