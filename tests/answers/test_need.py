@@ -13,15 +13,24 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
+import boulder_sweep.answers.need as need_module
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.printing import need_lines
-from boulder_sweep.answers.trials import judges_of
+from boulder_sweep.answers.trials import Judges, judges_of
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.settings import SettingsError, Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import DEPTH, passes, random_designs, site
+
+ONE_UNCERTAIN = """
+name: one
+boulder: {length: 1.65 m, width: 1.68 m, height: 3.2 m, density: 2596 kg/m^3}
+site: {embedment_depth: 2.2 m}
+soil: {density: 1859.9 kg/m^3, friction_angle: {mean: 40 deg, sd: 2 deg}, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
 
 
 def certify(found: Need) -> int:
@@ -173,6 +182,23 @@ def test_both_readings() -> None:
     pd.testing.assert_series_equal(
         found.frame.least_embedment_depth_m_as_printed, printed.frame.least_embedment_depth_m, check_names=False
     )
+
+
+def test_only_what_is_drawn_for_other_readings_ends_at_the_horizon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And only where nothing can be proved: an answer's own readings are simulated as far as those of a table."""
+    asked = []
+
+    def noted(sweep: Sweep, *rest: float, **named: bool) -> Judges:
+        judges = judges_of(sweep, *rest, **named)
+        longest = {each.control.longest_horizon for each in (judges.coarse, judges.final)}
+        asked.append((sweep.model.preset, *longest))
+        return judges
+
+    monkeypatch.setattr(need_module, "judges_of", noted)
+    need(site())
+    sweep = load_text(ONE_UNCERTAIN, Path("one.yaml"))
+    need(sweep, probability=0.9)
+    assert asked == [("corrected", 10.0), ("as_printed", 10.0), ("corrected", 10.0), ("as_printed", 0.0)]
 
 
 @pytest.mark.parametrize(
