@@ -122,7 +122,7 @@ def operations_of_step() -> tuple[Operations, Operations]:
 def _count() -> tuple[Operations, Operations]:
     """Count; runs in a process with the compiler off."""
     import boulder_kernels as bk
-    from boulder_kernels import soil
+    from boulder_kernels import design, soil
     from boulder_kernels.design import design_at
     from boulder_kernels.dormand_prince import step
     from boulder_kernels.dynamics import Acceleration, State, acceleration
@@ -142,6 +142,7 @@ def _count() -> tuple[Operations, Operations]:
         tally = Tally()
         counting = _CountingMath(tally)
         vars(soil).update(math=counting, min=counting.min, max=counting.max)
+        vars(design).update(min=counting.min)
         c = counted(bk.Constants, plain, tally)
         s = counted(Switches, switches_of(modes, readings, plain), tally)
         y = counted(State, (0.02, 1.0, 0.03, 0.5, 0.2, 10.0), tally)

@@ -22,7 +22,6 @@ from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 
@@ -50,7 +49,7 @@ def plain(evaluation: Evaluation, parts: Sequence[Designs]) -> Callable[[], None
     def work() -> None:
         for part in parts:
             outcomes = evaluation.simulate(part.table, evaluation.readings, control)
-            judge(outcomes, part, evaluation.limits, reported_step_s(control), columns)
+            judge(outcomes, part, evaluation.limits, columns)
 
     return work
 

@@ -243,7 +243,7 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "float64",
         "s",
         "time step that decided the row, shortened further where stability asks for it",
-        lambda facts: np.full(len(facts.verdict), facts.step_s),
+        lambda facts: facts.outcomes.step,
     ),
 )
 

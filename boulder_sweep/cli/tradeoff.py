@@ -162,5 +162,5 @@ def _table(found: Tradeoff, *, whole: bool) -> RichTable:
 
 def _short(method: Method) -> str:
     """Steps of a method in a narrow column [ms]."""
-    steps = f"{method.step_ms:g}+{method.finer_step_ms:g}" if method.error_estimate else f"{method.step_ms:g}"
+    steps = "+".join(f"{step:g}" for step in method.steps_ms)
     return f"{steps} y" if method.locate_yield else steps

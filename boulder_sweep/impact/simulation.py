@@ -12,6 +12,7 @@ import numpy as np
 
 from boulder_kernels import (
     Control,
+    Design,
     DesignTable,
     Outcome,
     OutcomeTable,
@@ -20,13 +21,23 @@ from boulder_kernels import (
     no_record,
 )
 from boulder_kernels.design import design_at
-from boulder_kernels.outcomes import empty_outcomes, write_outcome
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors, problem_at, simulate_impact
+from boulder_kernels.embedded import step_errors
+from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
+from boulder_kernels.table import (
+    SAFETY,
+    SAFETY_PRINTED,
+    estimate_errors,
+    halved,
+    is_paired,
+    problem_at,
+    reported_step,
+    simulate_impact,
+)
 from boulder_sweep.columns import AT_REST, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.judged import ERROR, Judged
+from boulder_sweep.judge.judged import ERROR, OVERTURNS, Judged
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import judge
@@ -42,6 +53,7 @@ SAMPLE_S = 0.0005
 MOST_SAMPLES = 1_000_000
 _DECIDED = ("verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s")
 """Columns that are those of a row of ``sweep run``, which stops at the limit."""
+_ERRORS = ("rotation_error_deg", "displacement_error_m")
 BEFORE_THE_END = 1.0 - 1e-14
 """The last sample is taken this close to the end, so that rounding cannot place it after the end."""
 
@@ -115,18 +127,18 @@ def simulate(
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     decided = evaluation.judged(designs)
-    control = _control(evaluation.control, decided)
+    control = _control(evaluation.control, how, float(decided["step_s"][0]))
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
     problem = problem_at(designs.table, 0, control, designs.springs, len(record.times))
     outcome, c, *_ = simulate_impact(problem, how, control, record)
-    row = _outcome_row(outcome)
-    if control.error_estimate:
-        coarse_control = control._replace(refined=False)
-        alike = problem_at(designs.table, 0, coarse_control, designs.springs)
-        coarser = simulate_impact(alike, how, coarse_control, no_record()).outcome
-        _estimate(row, _outcome_row(coarser), plain(designs.table), how)
-    judged = judge(row, designs, evaluation.limits, reported_step_s(control))
+    row = _outcome_row(outcome, one, control)
+    if control.error_estimate and is_paired(how, control):
+        coarser = control._replace(refined=False)
+        alike = problem_at(designs.table, 0, coarser, designs.springs)
+        other = simulate_impact(alike, how, coarser, no_record()).outcome
+        _estimate(row, _outcome_row(other, one, coarser), plain(designs.table), how)
+    judged = judge(row, designs, evaluation.limits)
     if judged.verdict[0] != ERROR:
         judged = _as_decided(judged, decided)
     motion = Motion(one, how, c, control, _kept(record, times, outcome), outcome, problem.second)
@@ -183,20 +195,23 @@ def _changed(
     return dataclasses.replace(sweep, model=model, solver=solver)
 
 
-def _control(control: Control, decided: Judged) -> Control:
-    """How the time history is integrated: by the steps that decided the row, and beyond the limit.
-
-    Where a coarser solution estimates its error, by a third of the step.
-    """
+def _control(control: Control, how: Readings, step_s: float) -> Control:
+    """How the time history is integrated: by the step that decided the row [s], and beyond the limit."""
     for finer in finer_controls(control):
-        if reported_step_s(finer) == decided["step_s"][0]:
+        if reported_step_s(finer) == step_s:
             control = finer
-    return control._replace(stop_at_limit=False, refined=control.error_estimate)
+    control = control._replace(stop_at_limit=False, refined=control.error_estimate)
+    checked = control.error_estimate and not is_paired(how, control)
+    return halved(control) if checked and reported_step(control) != step_s else control
 
 
 def _as_decided(judged: Judged, decided: Judged) -> Judged:
-    """Return the maxima of the whole time history with the verdict of a row of ``sweep run``."""
-    own = (*_DECIDED, *(spec.name for spec in AT_REST if spec.name in decided.columns))
+    """Return the maxima of the whole time history with the verdict of a row of ``sweep run``.
+
+    Unless the boulder overturns the maxima are the same, and so are their errors.
+    """
+    errors = () if decided.reason[0] == OVERTURNS else _ERRORS
+    own = (*_DECIDED, *errors, *(spec.name for spec in AT_REST if spec.name in decided.columns))
     columns = judged.columns | {name: decided[name] for name in own}
     return Judged(columns, judged.words | {name: decided.words[name] for name in _DECIDED if name in decided.words})
 
@@ -219,11 +234,11 @@ def _empty_record(times: np.ndarray) -> Record:
     return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged, np.zeros(n))
 
 
-def _outcome_row(outcome: Outcome) -> OutcomeTable:
-    """Return one outcome as a table of one row, without an estimate of its error."""
+def _outcome_row(outcome: Outcome, design: Design, control: Control) -> OutcomeTable:
+    """Return one outcome as a table of one row, with the error of its steps."""
     row = empty_outcomes(1)
-    write_outcome(row, 0, outcome)
-    return OutcomeTable(row[0].astype(np.int8), *row[1:])
+    write_outcome(row, 0, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
+    return outcome_table(row, reported_step(control))
 
 
 def _estimate(row: OutcomeTable, coarser: OutcomeTable, table: DesignTable, how: Readings) -> None:

@@ -15,14 +15,14 @@ class Steps(NamedTuple):
     """Time steps of the integrator."""
 
     step_s: float
-    """Length of a step [s]; where errors are estimated, the solution reported has a third of it."""
+    """Length of a step [s]; where errors are checked, the solution reported has a third of it."""
     locate_yield: bool = False
     """Whether steps also end where the soil reaches its ultimate resistance. This costs a little more per step, and the
     error falls with the fifth power of the step instead of the third."""
 
 
 STEPS = {"fast": Steps(0.012), "balanced": Steps(0.012), "fine": Steps(0.006, locate_yield=True)}
-"""Steps of each named accuracy."""
+"""Steps of each named accuracy: but for ``fast``, three times those of the solution that is reported."""
 STEPS_PRINTED = {"fast": Steps(0.006), "balanced": Steps(0.006), "fine": Steps(0.003, locate_yield=True)}
 """The same where the restoring moment is read as printed: it jumps where the angular velocity passes zero, and a
 design close to that jump needs shorter steps to end on the right side of it."""
@@ -47,9 +47,10 @@ class Accuracy:
     asked
         ``fast``, ``balanced``, ``fine``, ``0.01 deg`` or ``step``.
     steps
-        Steps of the integrator; where the error is estimated, a second solution with a third of the step is reported.
+        Steps of the integrator; where ``error_estimate``, a solution with a third of the step is reported.
     error_estimate
-        Whether the error of every row is estimated; verdicts closer to a limit than that error are undecided.
+        Whether doubtful rows are solved a second time, and rows closer to a limit than their error again by finer
+        steps; without, the error of a row is that of the steps of one solution, and such rows stay undecided.
     achieved_deg
         Quantile `QUANTILE` of the estimated error of the rotation over the designs of a pilot run [deg]; None unless
         the requested accuracy is a number.
@@ -57,6 +58,8 @@ class Accuracy:
         Designs of the pilot run; 0 without one.
     met
         Whether the requested accuracy was achieved.
+    paired
+        Whether every row is solved twice for its error, see `boulder_kernels.table.is_paired`.
     """
 
     asked: str
@@ -65,15 +68,19 @@ class Accuracy:
     achieved_deg: float | None = None
     pilot_designs: int = 0
     met: bool = True
+    paired: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data, for the metadata of the table."""
+        reported_s = finer_step_s(self.steps.step_s) if self.error_estimate else self.steps.step_s
         found: dict[str, Any] = {
             "asked": self.asked,
-            "step_s": self.steps.step_s,
-            "reported_step_s": finer_step_s(self.steps.step_s) if self.error_estimate else self.steps.step_s,
+            "step_s": self.steps.step_s if self.paired else reported_s,
+            "reported_step_s": reported_s,
             "yield_located": self.steps.locate_yield,
-            "verdicts": "guarded by the estimated error" if self.error_estimate else "unguarded: no error is estimated",
+            "verdicts": "guarded by the estimated error"
+            if self.error_estimate
+            else "guarded by the error of one solution, neither confirmed nor refined",
         }
         if self.achieved_deg is not None:
             found["pilot_designs"] = self.pilot_designs

@@ -19,7 +19,7 @@ from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
-from boulder_sweep.judge.refinement import RowStates, finer_controls, reported_step_s, rows_of
+from boulder_sweep.judge.refinement import RowStates, finer_controls, rows_of
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 from boulder_sweep.soils import with_soil
@@ -143,7 +143,7 @@ class Evaluation:
         judged = rows.judged
         if rows.unconfirmed.any():
             doubted = np.flatnonzero(rows.unconfirmed)
-            judged = self._doubted(judged, doubted, designs, rows.outcomes, rows.reported_s)
+            judged = self._doubted(judged, doubted, designs, rows.outcomes)
         judged = joined([judged])
         return self._margins_proved(judged, designs) if self.least_margin > 0.0 else judged
 
@@ -167,15 +167,13 @@ class Evaluation:
     def _once(self, designs: Designs, control: Control) -> tuple[Judged, OutcomeTable]:
         """Simulate and judge designs once."""
         outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
-        return judge(outcomes, designs, self.limits, reported_step_s(control), self.only), outcomes
+        return judge(outcomes, designs, self.limits, self.only), outcomes
 
-    def _doubted(
-        self, judged: Judged, places: np.ndarray, designs: Designs, outcomes: OutcomeTable, steps_s: np.ndarray
-    ) -> Judged:
+    def _doubted(self, judged: Judged, places: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> Judged:
         """Judge late rows, on which no two solutions agree, as of unknown error."""
         unknown = np.full(len(places), np.inf)
         doubted = rows_of(outcomes, places)._replace(theta_error=unknown, x_error=unknown)
-        return with_rows(judged, places, judge(doubted, designs.rows(places), self.limits, steps_s[places], self.only))
+        return with_rows(judged, places, judge(doubted, designs.rows(places), self.limits, self.only))
 
     @property
     def columns(self) -> tuple[OutcomeColumn, ...]:
@@ -263,4 +261,5 @@ def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
         locate_yield=accuracy.steps.locate_yield,
         longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
         unloading=UNLOADINGS.index(sweep.model.unloading),
+        paired=accuracy.paired,
     )

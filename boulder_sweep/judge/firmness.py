@@ -102,7 +102,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
         # Not beyond the horizon: without a proof that would cost ten times as much for a few verdicts.
         fast = control._replace(h=steps.step_s, locate_yield=False, error_estimate=False, longest_horizon=0.0)
         changed = designs._replace(table=table)
-        return judge(simulated(changed, read, fast), changed, limits, steps.step_s)
+        return judge(simulated(changed, read, fast), changed, limits)
 
     def by(law: str, change: float = 0.0) -> DesignTable:
         """Return the designs by a law, with all friction angles changed [rad]."""
@@ -148,14 +148,12 @@ def other_law(law: str) -> str:
 def _numerical_errors(designs: Designs, readings: Readings, control: Control) -> dict[str, float | None]:
     """Estimated errors not exceeded by most of the designs that did not overturn."""
     error_deg = error_m = None
-    if control.error_estimate:
-        share = min(1.0, reported_step_s(control) / SHORTEST_STEP_S)
-        some = designs.rows(slice(None, None, max(1, round(1.0 / share))))
-        control = control._replace(longest_horizon=0.0)
-        outcomes = simulated(some, readings, control)
-        counts = np.isfinite(outcomes.theta_error) & (outcomes.theta_error > 0.0)
-        if counts.any():
-            of_all = (np.degrees(outcomes.theta_error[counts]), outcomes.x_error[counts])
-            # Rounded so that a processor that differs in the last bits finds the same.
-            error_deg, error_m = (float(f"{np.quantile(values, QUANTILE, method='higher'):.2g}") for values in of_all)
+    share = min(1.0, reported_step_s(control) / SHORTEST_STEP_S)
+    some = designs.rows(slice(None, None, max(1, round(1.0 / share))))
+    outcomes = simulated(some, readings, control._replace(longest_horizon=0.0))
+    counts = np.isfinite(outcomes.theta_error) & (outcomes.theta_error > 0.0)
+    if counts.any():
+        of_all = (np.degrees(outcomes.theta_error[counts]), outcomes.x_error[counts])
+        # Rounded so that a processor that differs in the last bits finds the same.
+        error_deg, error_m = (float(f"{np.quantile(values, QUANTILE, method='higher'):.2g}") for values in of_all)
     return {"numerical_error_deg": error_deg, "numerical_error_m": error_m}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import numpy as np
 
 from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
 from boulder_kernels.layered import LayeredTable
+from boulder_kernels.table import is_paired
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, LADDER, Accuracy, Steps, steps_of
 from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
@@ -102,7 +104,8 @@ def accuracy_of(sweep: Sweep) -> Accuracy:
     if isinstance(solver.accuracy, float):
         return pilot(sweep, solver.accuracy)
     name = str(solver.accuracy)
-    return Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
+    found = Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
+    return replace(found, paired=found.error_estimate and is_paired(readings_of(sweep), control_of(sweep, found)))
 
 
 @lru_cache(maxsize=8)
@@ -125,7 +128,7 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     readings = readings_of(sweep)
     found: list[tuple[float, int]] = []
     for rung, steps in enumerate(LADDER):
-        control = control_of(sweep, Accuracy("", steps, error_estimate=True))
+        control = control_of(sweep, Accuracy("", steps, error_estimate=True, paired=True))
         # Rounded, so that a processor that differs in the last bits finds the same.
         achieved = float(f"{estimated_error_deg(designs, readings, control):.3g}")
         found.append((achieved, rung))
@@ -139,6 +142,7 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
         achieved_deg=achieved,
         pilot_designs=designs.size,
         met=achieved <= wanted_deg,
+        paired=True,
     )
 
 

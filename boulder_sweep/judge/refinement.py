@@ -1,5 +1,7 @@
 """Finer steps for the rows that need them: refused for their time steps, undecided for their error, or late.
 
+Designs whose estimated error may be wrong have a second solution already, see `boulder_kernels.embedded`.
+
 A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking amplifies
 every error: both solutions from which the error is estimated can follow the same wrong branch, where the estimate does
 not see it. So a late row passes or overturns only if `AGREEING` others agree with it, each with steps `FACTOR` times as
@@ -57,28 +59,32 @@ def finer_controls(control: Control) -> Iterator[Control]:
     h = control.h
     while h > finest or (control.error_estimate and h > control.h * FACTOR**AGREEING):
         h *= FACTOR
-        yield control._replace(h=h, locate_yield=True)
+        yield control._replace(h=h, locate_yield=True, paired=True)
     if control.elements == 0:
         h = min(control.h, control.horizon / LAST_RESORT_STEPS)
         for finer in range(1 + AGREEING if control.error_estimate else 1):
-            yield control._replace(h=h * FACTOR**finer, locate_yield=True, last_resort=True)
+            yield control._replace(h=h * FACTOR**finer, locate_yield=True, paired=True, last_resort=True)
 
 
 def reported_step_s(control: Control) -> float:
-    """Return the step of the solution that is reported [s]."""
+    """Return the step of the solution that is reported [s]; of a doubtful design it is half of that."""
     return finer_step_s(control.h) if control.error_estimate else control.h
 
 
 def is_open(judged: Judged, control: Control) -> np.ndarray:
-    """Return which rows finer steps, those of a control, may decide (bool, shape (n,))."""
+    """Return which rows finer steps, those of a control, may decide (bool, shape (n,)).
+
+    Where errors are not confirmed, as by `fast`, rows nearer to a limit than their error stay undecided.
+    """
     refused = [code for code, reason in enumerate(judged.reasons) if code >= len(REASONS) and reason in STEP_REASONS]
-    return np.isin(judged.reason, refused if control.last_resort else [NUMERICAL_ERROR, *refused])
+    unsure = [NUMERICAL_ERROR] if control.error_estimate and not control.last_resort else []
+    return np.isin(judged.reason, [*unsure, *refused])
 
 
 def is_late(judged: Judged, outcomes: OutcomeTable, control: Control) -> np.ndarray:
     """Return which rows need another solution to agree with them before they pass or overturn (bool, shape (n,)).
 
-    None where no error is estimated: such verdicts are unguarded. None either in plastic soil, where every
+    None where errors are not confirmed, as by `fast`. None either in plastic soil, where every
     motion goes on until it rests, and loses its energy to the soil instead of rocking.
     """
     if not control.error_estimate or control.unloading != ELASTIC:
@@ -92,7 +98,7 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: np.ndarray) -> np.ndarr
     Parameters
     ----------
     coarse, fine
-        Solutions whose steps differ by `FACTOR` or more, each with its estimated errors.
+        Solutions whose steps differ by half of `FACTOR` or more, each with its estimated errors.
     v_0
         Speeds of impact [m/s]: an error of the displacement is one of the time, too, see
         `boulder_kernels.table.estimate_errors`.
@@ -118,8 +124,6 @@ class RowStates:
         The rows as judged by the solution that counts so far.
     outcomes : OutcomeTable
         That solution, written in place.
-    reported_s : ndarray
-        Its step [s], shape (n,).
     unconfirmed : ndarray
         Number of further solutions that must agree with it before a late row counts, shape (n,).
     """
@@ -128,7 +132,6 @@ class RowStates:
         n = designs.size
         self._v_0 = designs.table.v_0
         self.judged, self.outcomes = judged, outcomes
-        self.reported_s = np.full(n, reported_step_s(control))
         self.unconfirmed = AGREEING * is_late(judged, outcomes, control)
         # Step of the last solution compared or taken over [s], and rows that the last resort has refused.
         self._compared_s, self._given_up = np.full(n, control.h), np.zeros(n, dtype=bool)
@@ -160,6 +163,5 @@ class RowStates:
         replaced = rows[better]
         self.unconfirmed[replaced] = AGREEING * is_late(judged, outcomes, control)[better]
         self.judged = with_rows(self.judged, replaced, judged.rows(better))
-        self.reported_s[replaced] = reported_step_s(control)
         for values, new in zip(self.outcomes, outcomes, strict=True):
             values[replaced] = new[better]

@@ -17,7 +17,7 @@ for the page of a report:
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
 one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.
-Where no error was estimated (NaN), rule 8 cannot apply and the verdict is unguarded.
+Where errors are those of one solution, as by ``fast``, rows of rule 8 stay as they are; else finer steps decide them.
 """
 
 from __future__ import annotations
@@ -115,8 +115,6 @@ class Facts(NamedTuple):
     designs: Designs
     """Inputs of the same rows."""
     limits: Limits
-    step_s: float | np.ndarray
-    """Step of the solution that is judged [s], of all rows or of each."""
     rows: dict[Rows, np.ndarray]
     """Masks, see `OutcomeColumn`."""
     overlap: np.ndarray
@@ -141,7 +139,6 @@ def judge(
     outcomes: OutcomeTable,
     designs: Designs,
     limits: Limits,
-    step_s: float | np.ndarray,
     only: tuple[str, ...] = (),
 ) -> Judged:
     """Apply the rules of this module to n rows.
@@ -154,8 +151,6 @@ def judge(
         Inputs of the same rows.
     limits
         Limits of the criterion, and what the model was tested on.
-    step_s
-        Step of the solution [s], one or of each row.
     only
         Columns wanted; all of the table where empty.
 
@@ -164,7 +159,7 @@ def judge(
     Judged
         One verdict a row; no row is dropped.
     """
-    facts = facts_of(outcomes, designs, limits, step_s)
+    facts = facts_of(outcomes, designs, limits)
     columns, words = {}, {}
     for spec in (*OUTCOMES, *(AT_REST if isinstance(outcomes, OutcomesAtRest) else ())):
         if only and spec.name not in only:
@@ -181,7 +176,7 @@ def judge(
     return Judged(columns, words)
 
 
-def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: float | np.ndarray) -> Facts:
+def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
     table = designs.table
@@ -204,7 +199,6 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, step_s: f
         outcomes=outcomes,
         designs=designs,
         limits=limits,
-        step_s=step_s,
         rows={
             "judged": verdict != ERROR,
             "computed": computed,

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Control, Readings, SecondSpring, Status
+from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE, SoilLayers
+from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES, VERDICTS
 from boulder_sweep.columns import REASONS as VERDICT_REASONS
 from boulder_sweep.designs import REASONS
@@ -70,12 +71,13 @@ def page_data(
 ) -> dict[str, Any]:
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
     ground = Ground.of_dict(settings["model"].get("ground", {}))
+    closed = control._replace(elements=0, unloading=ELASTIC)
     return {
         "title": title,
         "units": units,
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
-        "settings": [float(value) for value in (*readings, *control._replace(elements=0))],
+        "settings": [float(value) for value in (*readings, *closed._replace(paired=is_paired(readings, closed)))],
         "rules": _rules(control.theta_limit, settings),
         "inputs": [_input(spec.name, start, settings) for spec in (*INPUTS, *OPTIONAL_INPUTS) if spec.name in start],
         "outcomes": [
@@ -91,8 +93,13 @@ def page_data(
         "words": REASON_WORDS,
         "step_s": reported_step_s(control),
         "finer": [
-            {"h": finer.h, "locate_yield": float(finer.locate_yield), "step_s": reported_step_s(finer)}
-            for finer in finer_controls(control._replace(elements=0))
+            {
+                "h": finer.h,
+                "locate_yield": float(finer.locate_yield),
+                "paired": float(finer.paired),
+                "step_s": reported_step_s(finer),
+            }
+            for finer in finer_controls(closed)
             if not finer.last_resort
         ],
         "parts": list(PARTS),

@@ -25,11 +25,13 @@ from boulder_kernels import (
 )
 from boulder_kernels._jit import array_kernel, inlined, when_compiling
 from boulder_kernels.design import design_in
+from boulder_kernels.embedded import step_errors
+from boulder_kernels.impact import STEP_RATIO
 from boulder_kernels.layered import SoilLayers
-from boulder_kernels.outcomes import write_outcome
+from boulder_kernels.outcomes import DOUBTFUL, STEP, THETA_MAX, write_outcome
 from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, estimate_errors
+from boulder_kernels.table import SAFETY, SAFETY_PRINTED, confirm_error, estimate_error
 from boulder_kernels.verdict import VerdictLimits, write_rulings
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
@@ -38,6 +40,10 @@ first, from a crush on that it never reaches: its results have the same bits."""
 SETTINGS = (*Readings._fields, *Control._fields)
 """Settings of the simulation, in this order; booleans are 0 or 1."""
 SETTINGS_COUNT = len(SETTINGS)
+PAIRED_AT = SETTINGS.index("paired")
+CHECKED, PAIRED, ONCE = range(3)
+"""What the setting ``paired`` may be in the page, where errors are estimated: doubtful designs have two solutions, or
+all have, or none has."""
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
 LIMITS = VerdictLimits._fields
@@ -73,7 +79,16 @@ def readings_from(s: np.ndarray) -> Readings:
 @inlined
 def control_from(s: np.ndarray, refined: bool) -> Control:
     """Return the control, which follows the readings, with its step or a third of it."""
-    return Control(s[5], s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, s[11] > 0.0, refined, s[13], False, ELASTIC)
+    h, yield_located = s[5], s[11] > 0.0
+    return Control(
+        h, s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, yield_located, refined, s[13], False, ELASTIC, False
+    )
+
+
+@inlined
+def halved_control_from(s: np.ndarray) -> Control:
+    """Return the control of a second solution, `boulder_kernels.table.halved`."""
+    return Control(0.5 * s[5], s[6], s[7], int(s[8]), True, s[10] > 0.0, True, True, s[13], False, ELASTIC, False)
 
 
 @inlined
@@ -85,7 +100,7 @@ def table_from(t: np.ndarray) -> DesignTable:
 @inlined
 def outcomes_from(t: np.ndarray) -> OutcomeTable:
     """Return the rows of an array as the columns of a table."""
-    return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9])
+    return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9], t[10])
 
 
 @inlined
@@ -95,10 +110,34 @@ def layers_from(t: np.ndarray) -> SoilLayers:
 
 
 @array_kernel
+def solve(
+    out: np.ndarray,
+    row: int,
+    designs: np.ndarray,
+    layers: np.ndarray,
+    soil: SoilLayers,
+    readings: Readings,
+    control: Control,
+    record: Record,
+) -> bool:
+    """Simulate one design, write its outcome with the error of its steps, and return whether it is doubtful."""
+    design, spring = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
+    if layers.shape[1] == 0:
+        outcome = simulate(Problem(design, None, spring), readings, control, record)
+    else:
+        outcome = simulate(Problem(design, SoilProfile(layers[row], soil, None), spring), readings, control, record)
+    out[:, row] = np.nan
+    write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
+    doubtful = out[DOUBTFUL, row] > 0.0
+    out[STEP, row] = control.h / STEP_RATIO if control.refined else control.h
+    return doubtful
+
+
+@array_kernel
 def outcomes(
     designs_at: Any, n: int, layers_at: Any, m: int, soil_at: Any, settings_at: Any, fine_at: Any, coarse_at: Any
 ) -> None:
-    """Simulate n designs, and estimate their errors if the settings ask for it.
+    """Simulate n designs, and estimate their errors as the settings ask for it.
 
     Parameters
     ----------
@@ -117,31 +156,31 @@ def outcomes(
     fine_at
         Where the results go, shape (len(OUTCOME), n).
     coarse_at
-        Room for as many again, the coarser solution.
+        Room for as many again, the coarser solutions.
     """
     s = carray(settings_at, (SETTINGS_COUNT,))
-    readings, estimated = readings_from(s), s[9] > 0.0
-    designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (10, n)), carray(coarse_at, (10, n))
+    readings, estimated, way = readings_from(s), s[9] > 0.0, int(s[PAIRED_AT])
+    designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (11, n)), carray(coarse_at, (11, n))
     layers, soil = carray(layers_at, (n, m, 6)), layers_from(carray(soil_at, (5, m)))
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
-    for row in range(n):
-        design, second = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
-        finer[:, row] = np.nan
-        for solution in range(2 if estimated else 1):
-            refined = estimated and solution == 0
-            control = control_from(s, refined)
-            if m == 0:
-                outcome = simulate(Problem(design, None, second), readings, control, record)
-            else:
-                profile = SoilProfile(layers[row], soil, None)
-                outcome = simulate(Problem(design, profile, second), readings, control, record)
-            write_outcome(coarser if solution else finer, row, outcome)
-    if not estimated:
-        return
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
-    estimate_errors(coarse, fine, table, SAFETY if readings.restoring_gravity else SAFETY_PRINTED)
+    safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     for row in range(n):
+        doubtful = solve(finer, row, designs, layers, soil, readings, control_from(s, estimated), record)
+        if not estimated or way == ONCE:
+            continue
+        if way == CHECKED:
+            if not doubtful:
+                continue
+            solve(coarser, row, designs, layers, soil, readings, halved_control_from(s), record)
+            if not np.isnan(coarser[THETA_MAX, row]):
+                confirm_error(fine, coarse, table, row)
+                for column in range(11):
+                    finer[column, row] = coarser[column, row]
+                continue
+        solve(coarser, row, designs, layers, soil, readings, control_from(s, False), record)
+        estimate_error(coarse, fine, table, safety, row)
         # The status of a simulation that continues beyond the limit does not say that it reached it.
         if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
             fine.theta_error[row] = fine.x_error[row] = np.inf
@@ -166,7 +205,7 @@ def rulings(n: int, outcomes_at: Any, sizes_at: Any, limits_at: Any, rulings_at:
     """
     s = carray(limits_at, (4,))
     limits = VerdictLimits(s[0], s[1], s[2], s[3] > 0.0)
-    table = outcomes_from(carray(outcomes_at, (10, n)))
+    table = outcomes_from(carray(outcomes_at, (11, n)))
     write_rulings(table, carray(sizes_at, (5, n)), limits, carray(rulings_at, (4, n)))
 
 

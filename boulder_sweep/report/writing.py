@@ -207,7 +207,7 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:
-        notes.append("No numerical error was estimated: verdicts near a limit are unguarded.")
+        notes.append("Numerical errors are those of one solution: a verdict nearer to a limit than that is undecided.")
     if control.unloading:
         notes.append(
             f"The table was computed with plastic soil ({UNLOADING_WORDS[control.unloading]}); what is simulated in "

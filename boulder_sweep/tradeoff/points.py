@@ -32,7 +32,9 @@ class Method(NamedTuple):
     locate_yield: bool
     """Whether steps end where the soil yields."""
     error_estimate: bool
-    """Whether a second solution by a third of the step is reported, and its difference from the first as the error."""
+    """Whether a solution by a third of the step is reported, with an error that a second solution gives or confirms."""
+    checked: bool = False
+    """Whether only doubtful designs have a second solution, as by a named accuracy; else all have one, by the step."""
 
     @property
     def is_plain(self) -> bool:
@@ -47,12 +49,19 @@ class Method(NamedTuple):
     @property
     def steps(self) -> str:
         """Steps in words."""
-        steps = f"{self.step_ms:g} + {self.finer_step_ms:g} ms" if self.error_estimate else f"{self.step_ms:g} ms"
+        steps = " + ".join(f"{step:g}" for step in self.steps_ms) + " ms"
         return f"{steps}, yield located" if self.locate_yield else steps
 
     @property
+    def steps_ms(self) -> tuple[float, ...]:
+        """Steps of the solutions that every design has [ms]."""
+        if not self.error_estimate:
+            return (self.step_ms,)
+        return (self.finer_step_ms,) if self.checked else (self.step_ms, self.finer_step_ms)
+
+    @property
     def finer_step_ms(self) -> float:
-        """Step of the second solution, where there is one [ms]."""
+        """Step of the solution that is reported where errors are estimated [ms]."""
         return self.step_ms / STEP_RATIO
 
 

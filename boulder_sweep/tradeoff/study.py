@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import OutcomeTable, Readings, as_printed, corrected
+from boulder_kernels._jit import plain
+from boulder_kernels.settling import proof_is_possible
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import NothingToMeasureError
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps
@@ -58,17 +60,27 @@ class Sample:
         self.designs, self.readings, self.limits, self.control = designs, readings, limits, control
 
     def solve(
-        self, step_s: float, elements: int = 0, *, error_estimate: bool = False, locate_yield: bool = False
+        self,
+        step_s: float,
+        elements: int = 0,
+        *,
+        error_estimate: bool = False,
+        checked: bool = False,
+        locate_yield: bool = False,
     ) -> OutcomeTable:
         """Simulate the designs."""
         control = self.control._replace(
-            h=step_s, elements=elements, error_estimate=error_estimate, locate_yield=locate_yield
+            h=step_s,
+            elements=elements,
+            error_estimate=error_estimate,
+            locate_yield=locate_yield,
+            paired=not checked,
         )
         return simulated(self.designs, self.readings, control)
 
-    def judged(self, outcomes: OutcomeTable, step_s: float) -> Judged:
+    def judged(self, outcomes: OutcomeTable) -> Judged:
         """Return their verdicts."""
-        return judge(outcomes, self.designs, self.limits, step_s)
+        return judge(outcomes, self.designs, self.limits)
 
     def measured(self, method: Method, known: OutcomeTable, accuracy: str) -> Point:
         """Simulate the designs by one method, long enough to time it, and compare."""
@@ -82,13 +94,13 @@ class Sample:
                 1e-3 * method.step_ms,
                 method.soil_elements,
                 error_estimate=method.error_estimate,
+                checked=method.checked,
                 locate_yield=method.locate_yield,
             )
             took = time.thread_time() - begun
             spent, best = spent + took, min(best, took)
         ref = type(known)(*(column[rows] for column in known))
-        step_s = 1e-3 * method.step_ms
-        both = (out, fewer.judged(out, step_s)), (ref, fewer.judged(ref, step_s))
+        both = (out, fewer.judged(out)), (ref, fewer.judged(ref))
         return compared(method, accuracy, 1e6 * best / len(rows), *both)
 
     def rows(self, chosen: np.ndarray) -> Sample:
@@ -197,14 +209,13 @@ class Tradeoff:
         guarded, plain = (self.best(wanted_deg, error_estimate=estimate) for estimate in (True, False))
         more = ""
         if plain is not None:
-            more = f"; without one, solver: {{step: {plain.method.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
+            more = f"; unconfirmed, solver: {{step: {plain.method.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
         if guarded is None:
             return f"{self._none_guarded(plain)}{more}"
         ask = guarded.accuracy or f"{_rounded_up(guarded.estimated_p99_9_deg):g} deg"
         return (
             f"use solver: {{accuracy: {ask}}} (steps of {guarded.method.steps}): {guarded.cpu_us:.3g} us a design, "
-            f"{_duration(guarded, self.sweep.n_designs)} for this grid on one core, with an error for every design"
-            f"{more}"
+            f"{_duration(guarded, self.sweep.n_designs)} for this grid on one core, with confirmed errors{more}"
         )
 
     def _none_guarded(self, plain: Point | None) -> str:
@@ -212,8 +223,8 @@ class Tradeoff:
         if any(method.error_estimate and method.readings == self.own_readings for method in self.left_out):
             measured = any(point.method.error_estimate for point in self._own())
             which = "accurate enough " if measured else ""
-            return f"no method with an error estimate {which}was measured in the time; allow more --seconds"
-        return "no measured step is short enough" if plain is None else "no step with an error estimate is short enough"
+            return f"no method with confirmed errors {which}was measured in the time; allow more --seconds"
+        return "no measured step is short enough" if plain is None else "no step with confirmed errors is short enough"
 
     def table(self) -> pa.Table:
         """Return one row for every method."""
@@ -311,7 +322,7 @@ def measure(
     references: dict[str, float] = {}
     for name, readings in presets.items():
         if time.monotonic() - begun > seconds:
-            left_out += _methods(name)
+            left_out += _methods(name, readings)
             continue
         sample = Sample(sample_designs, readings, limits, control)
         if progress is not None:
@@ -319,7 +330,7 @@ def measure(
         known = sample.solve(REFERENCE_STEP_S, locate_yield=True)
         twice = sample.solve(2.0 * REFERENCE_STEP_S, locate_yield=True)
         references[name] = _largest_difference_deg(known, twice)
-        for method in _methods(name):
+        for method in _methods(name, readings):
             if time.monotonic() - begun > seconds:
                 left_out.append(method)
                 continue
@@ -330,13 +341,16 @@ def measure(
     return Tradeoff(sweep, tuple(points), references, tuple(left_out))
 
 
-def _methods(readings: str) -> Iterator[Method]:
-    """Yield the methods, cheap ones first."""
-    yield from (Method(readings, 0, step, False, False) for step in STEPS_MS)
-    yield from (Method(readings, 0, step, True, False) for step in STEPS_LOCATED_MS)
-    yield from (Method(readings, 0, step, False, True) for step in STEPS_WITH_ERROR_MS)
-    yield from (Method(readings, 0, step, True, True) for step in STEPS_LOCATED_WITH_ERROR_MS)
-    yield from (Method(readings, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
+def _methods(name: str, readings: Readings) -> Iterator[Method]:
+    """Yield the methods, cheap ones first; named accuracies as they are computed by these readings."""
+    yield from (Method(name, 0, step, False, False) for step in STEPS_MS)
+    yield from (Method(name, 0, step, True, False) for step in STEPS_LOCATED_MS)
+    for located, steps in ((False, STEPS_WITH_ERROR_MS), (True, STEPS_LOCATED_WITH_ERROR_MS)):
+        for step in steps:
+            method = Method(name, 0, step, located, True)
+            checked = bool(_name_of(method, readings)) and plain(proof_is_possible)(readings)
+            yield method._replace(checked=checked)
+    yield from (Method(name, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
 
 
 def _name_of(method: Method, readings: Readings) -> str:

@@ -15,7 +15,6 @@ from boulder_sweep.judge.accuracy import STEPS
 from boulder_sweep.judge.evaluation import LONGEST_HORIZON, Evaluation
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, UNDECIDED, Judged
-from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import STATUS_REASONS, Limits, judge
 from boulder_sweep.settings.fields import FIELDS, INPUTS, MAX_ELEMENTS
 
@@ -74,7 +73,7 @@ def box_shares_table(count: int = 4000, seed: int = 1) -> Table:
     limits = Limits(float(np.radians(20.0)), "P1")
     control = Control(STEPS["balanced"].step_s, 1.0, limits.rotation, 0, True, longest_horizon=LONGEST_HORIZON)
     evaluation = Evaluation(corrected(), control, limits)
-    once = judge(evaluation.simulate(designs.table, corrected(), control), designs, limits, reported_step_s(control))
+    once = judge(evaluation.simulate(designs.table, corrected(), control), designs, limits)
     table = Table(("ends as", "by the usual steps", "with finer steps", "share"))
     counts = [Counter(_endings(rows)) for rows in (once, evaluation.judged(designs))]
     for ending in sorted({**counts[0], **counts[1]}, key=lambda word: -counts[1][word]):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined
+from ._jit import exact_inlined, inlined
 from .numerics import direction, half_tangent
 
 
@@ -159,6 +159,15 @@ class Constants(NamedTuple):
     """Angle beyond which sin(gamma_N + theta_b) < 0 [rad]; infinite where no reading asks for it."""
     u_0: float
     """Compression at which the vehicle's spring exerts no force [m]: 0, but for a vehicle on its second spring."""
+
+
+@inlined
+def error_arm(c: Constants) -> float:
+    """Arm by which an angle is compared with a displacement in what is said of errors [m].
+
+    The embedment depth, or the height of the centre of mass over the base where that is more.
+    """
+    return c.d - min(c.z_0, 0.0)
 
 
 @exact_inlined

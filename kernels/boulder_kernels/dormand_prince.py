@@ -17,7 +17,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from ._jit import inlined
-from .design import Constants
+from .design import Constants, error_arm
 from .dynamics import Acceleration, State, acceleration
 from .modes import Switches
 
@@ -63,6 +63,8 @@ C = tuple(float(c) for c in _C)
 """Nodes, shape (7,)."""
 A = tuple(tuple(float(_entry(i, j)) for j in range(STAGES)) for i in range(STAGES))
 """Stage weights, shape (7, 7); the last row is the fifth-order solution."""
+ERROR = tuple(float(_entry(6, j) - _B_FOURTH[j]) for j in range(STAGES))
+"""Weights of the accelerations in the difference of the solutions of fifth and of fourth order, shape (7,)."""
 AA = tuple(
     tuple(float(sum((_entry(i, m) * _entry(m, j) for m in range(STAGES)), Fraction(0))) for j in range(STAGES))
     for i in range(STAGES)
@@ -129,7 +131,14 @@ def stage_7(x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: f
 
 
 @inlined
-def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tuple[State, Acceleration]:
+def difference(a1: float, a3: float, a4: float, a5: float, a6: float, a7: float) -> float:
+    """Modulus by which the solutions of fifth and of fourth order differ in a velocity, per length of the step."""
+    d = ERROR[0] * a1 + ERROR[2] * a3 + ERROR[3] * a4 + ERROR[4] * a5 + ERROR[5] * a6 + ERROR[6] * a7
+    return abs(d)
+
+
+@inlined
+def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tuple[State, Acceleration, float]:
     """Advance the state by one step with the modes frozen.
 
     Parameters
@@ -151,6 +160,9 @@ def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tup
         State at the end, of fifth order.
     Acceleration
         Acceleration there, which the next step starts with.
+    float
+        Difference of the solutions of fifth and of fourth order: the sum of those of the velocities, that of the
+        rotation at the arm of `boulder_kernels.design.error_arm` [m/s].
     """
     b = stage_2(y.x_b, y.v_b, h, k1.a_b)
     r = stage_2(y.theta_b, y.omega_b, h, k1.alpha_b)
@@ -176,4 +188,7 @@ def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tup
     r = stage_7(y.theta_b, y.omega_b, h, k1.alpha_b, k3.alpha_b, k4.alpha_b, k5.alpha_b, k6.alpha_b)
     t = stage_7(y.x_v, y.v_v, h, k1.a_v, k3.a_v, k4.a_v, k5.a_v, k6.a_v)
     k7 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    return State(b.x, b.v, r.x, r.v, t.x, t.v), k7
+    off = difference(k1.a_b, k3.a_b, k4.a_b, k5.a_b, k6.a_b, k7.a_b)
+    off += difference(k1.a_v, k3.a_v, k4.a_v, k5.a_v, k6.a_v, k7.a_v)
+    off += error_arm(c) * difference(k1.alpha_b, k3.alpha_b, k4.alpha_b, k5.alpha_b, k6.alpha_b, k7.alpha_b)
+    return State(b.x, b.v, r.x, r.v, t.x, t.v), k7, h * off

@@ -31,6 +31,7 @@ from .gaps import (
 from .modes import (
     FREE,
     HELD,
+    LAST_OF_GRAVITY,
     LIMITED_BACK,
     LIMITED_FORWARD,
     SEATED,
@@ -373,6 +374,22 @@ def yield_mode(displacement: float, c: Constants) -> int:
     if abs(displacement) <= c.x_yield:
         return 0
     return 1 if displacement > 0.0 else -1
+
+
+@inlined
+def changes_counted(event: float, begun: float, modes: Modes) -> float:
+    """Return 1.0 if an event changes how a boulder rocks, else 0.0.
+
+    Parameters
+    ----------
+    event
+        The event a step was cut at.
+    begun
+        Start of the step [s]. That a boulder begins to turn in the first step does not count.
+    modes
+        Modes before; those of printed readings do not count.
+    """
+    return 1.0 if event == ROTATION and begun > 0.0 and modes.turning <= LAST_OF_GRAVITY else 0.0
 
 
 @inlined

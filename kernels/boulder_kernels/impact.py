@@ -27,8 +27,9 @@ from .after_step import (
 from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, Readings, is_computable
 from .dormand_prince import step
+from .embedded import error_time
 from .energy import Exchanged, add_exchanged, nothing_exchanged
-from .events import NONE, SHORTEN, change_mode, initial_modes, locate_limit
+from .events import NONE, SHORTEN, change_mode, changes_counted, initial_modes, locate_limit
 from .modes import Modes, Switches
 from .onset import first_length
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
@@ -72,7 +73,8 @@ class Control(NamedTuple):
     elements: int
     """Number N of soil elements; 0 for the closed form."""
     error_estimate: bool
-    """Whether the numerical error of each design is estimated."""
+    """Whether the estimated error of a design is confirmed by a second solution where one could be wrong, see
+    `boulder_kernels.table.simulate_table`. Without, it is that of the steps of one solution."""
     stop_at_limit: bool = True
     """Whether the simulation ends where the rotation reaches its limit."""
     locate_yield: bool = False
@@ -90,6 +92,8 @@ class Control(NamedTuple):
     unloading: int = ELASTIC
     """How the soil unloads: ELASTIC, or PLASTIC or PLASTIC_WITH_GAP by plastic elements, of which there must be
     some. Their simulations go on until the boulder is at rest, and are not ended by a proof before the horizon."""
+    paired: bool = False
+    """Where errors are estimated: whether every design is solved twice for it, and not only doubtful ones."""
 
 
 class Record(NamedTuple):
@@ -162,7 +166,7 @@ def write_samples(
 @kernel
 def failed(status: int) -> Outcome:
     """Outcome of a design that was not simulated, or not to its end."""
-    return Outcome(status, undefined_maxima(), np.nan, np.nan, 0)
+    return Outcome(status, undefined_maxima(), np.nan, np.nan, 0, np.nan, np.nan, 0.0)
 
 
 @kernel
@@ -297,10 +301,11 @@ def simulate_by_steps(
     h_next = first_length(h_full, factors, c)
     barrier, horizon = NO_PROOF, control.horizon
     latest, stiffening = 1.0, True
+    error = rotation_changes = 0.0
     while attempts < budget:
         attempts += 1
         h = min(h_next, horizon - t)
-        y_end, k_end = step(y, k1, h, switches, c)
+        y_end, k_end, step_error = step(y, k1, h, switches, c)
         passing, end = passes(y, y_end, k_end, factors, switches, c, 0.0)
         if second is not None and stiffening:
             crush, latest = largest_crush(start, end, h)
@@ -328,6 +333,7 @@ def simulate_by_steps(
             decided = until_rest(decided, kept.y, ending, c, memory)
             end = compression_at(kept.y, switches, c)
         h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
+        error += step_error
         if recording or not control.stop_at_limit:
             dense = dense_output(y, k1, y_end, k_end, h)
             if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
@@ -338,17 +344,20 @@ def simulate_by_steps(
                 written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
                 exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
         remember(y, kept.y, kept.tau * h, c, memory)
-        t = decided.t
+        begun, t = t, decided.t
         if decided.status != RUNNING:
             if decided.status == Status.LIMIT.value:
                 m = at_limit(m, t, theta_stop)
                 t_limit = t if control.stop_at_limit else t_limit
-            return Outcome(decided.status, m, t_limit, t, attempts)
+            yield_located = control.locate_yield and control.elements == 0
+            moved = error_time(h_full, yield_located) * error
+            return Outcome(decided.status, m, t_limit, t, attempts, moved, kept.y.omega_b, rotation_changes)
         y, k1, start = kept.y, rate_after(k_end, kept.y, switches, c, memory), end
         if kept.event > NONE:
             if second is not None and kept.event == STIFFENS:
                 c = on_second_spring(c, second.k_2, offset_of(start.u, c.k_v, second.k_2))
                 stiffening = False
+            rotation_changes += changes_counted(kept.event, begun, modes)
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
             switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
             k1, start = rate_of(y, switches, c), compression_at(y, switches, c)

@@ -18,6 +18,7 @@ from .events import (
     SHORTEN,
     begin_search,
     change_mode,
+    changes_counted,
     first_event,
     gaps_within,
     go_on_searching,
@@ -39,6 +40,7 @@ from .workspace import (
     END,
     END_GAPS,
     END_STATE,
+    ERROR,
     EVENT,
     FACTORS,
     HORIZON,
@@ -48,9 +50,11 @@ from .workspace import (
     MOMENT,
     OPEN,
     ROTATION,
+    ROTATION_CHANGES,
     START,
     STATE,
     STEP,
+    STEP_ERROR,
     STEP_FULL,
     SWITCHES,
     TAU,
@@ -163,10 +167,12 @@ def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, loca
     if event == SHORTEN:
         put(mine, STEP, 0, tau * h)
         return RUNNING
+    put(mine, ERROR, 0, field(mine, ERROR, 0) + field(mine, STEP_ERROR, 0))
     c, g, m = load(mine, CONSTANTS, 0), load(mine, FACTORS, 0), load(mine, MAXIMA, 0)
     kept = Kept(event, tau, y, m)
+    begun = field(mine, TIME, 0)
     decided = decide(
-        field(mine, TIME, 0),
+        begun,
         h,
         load(mine, STATE, 0),
         kept,
@@ -182,7 +188,10 @@ def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, loca
     if decided.status == Status.LIMIT.value:
         store(mine, MAXIMA, 0, at_limit(m, decided.t, g.limit))
     if event > NONE and decided.status == RUNNING:
-        y, modes = change_mode(int(event), y, field(mine, MOMENT, 0), load(mine, MODES, 0), c)
+        modes = load(mine, MODES, 0)
+        changes = field(mine, ROTATION_CHANGES, 0) + changes_counted(event, begun, modes)
+        put(mine, ROTATION_CHANGES, 0, changes)
+        y, modes = change_mode(int(event), y, field(mine, MOMENT, 0), modes, c)
         switches, factors = enter_modes(modes, readings, g.limit, locate_yield, c)
         store(mine, MODES, 0, modes)
         store(mine, SWITCHES, 0, switches)

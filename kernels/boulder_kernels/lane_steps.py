@@ -12,6 +12,7 @@ from ._jit import inlined, kernel
 from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
 from .design import Readings, constants_of, design_in, is_computable
 from .dormand_prince import step
+from .embedded import error_time, step_errors
 from .events import AT_END, TOLERANCE, initial_modes, needs_moment
 from .flat import field, put
 from .impact import Control, attempt_budget, ending_of, first_step
@@ -36,15 +37,18 @@ from .workspace import (
     DESIGN,
     END,
     END_STATE,
+    ERROR,
     FACTORS,
     HORIZON,
     LANES,
     MAXIMA,
     MODES,
+    ROTATION_CHANGES,
     START,
     STATE,
     STATUS_OF_LANE,
     STEP,
+    STEP_ERROR,
     STEP_FULL,
     SWITCHES,
     TIME,
@@ -59,7 +63,7 @@ def attempt_steps(ws: np.ndarray) -> None:
     """Advance every lane by its step, in one vectorised loop."""
     align_stack()
     for lane in range(LANES):
-        y_end, k_end = step(
+        y_end, k_end, error = step(
             load(ws, STATE, lane),
             load(ws, START, lane),
             field(ws, STEP, lane),
@@ -68,6 +72,7 @@ def attempt_steps(ws: np.ndarray) -> None:
         )
         store(ws, END_STATE, lane, y_end)
         store(ws, END, lane, k_end)
+        put(ws, STEP_ERROR, lane, error)
 
 
 @kernel
@@ -90,6 +95,7 @@ def take_over_steps(ws: np.ndarray) -> int:
         waiting += 0 if plain else 1
         if plain:
             put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
+            put(ws, ERROR, lane, field(ws, ERROR, lane) + field(ws, STEP_ERROR, lane))
             store(ws, STATE, lane, y_end)
             store(ws, START, lane, k_end)
             store(ws, COMPRESSION, lane, end)
@@ -101,7 +107,9 @@ def take_over_steps(ws: np.ndarray) -> int:
 
 
 @kernel
-def write_lane(ws: np.ndarray, lane: int, status: int, out: np.ndarray, row: int) -> None:
+def write_lane(
+    ws: np.ndarray, lane: int, status: int, designs: np.ndarray, control: Control, out: np.ndarray, row: int
+) -> None:
     """Write the outcome of a lane into its row; a design that failed leaves its row NaN."""
     mine = ws[lane:]
     t = field(mine, TIME, 0)
@@ -109,7 +117,10 @@ def write_lane(ws: np.ndarray, lane: int, status: int, out: np.ndarray, row: int
         out[STATUS, row] = status
     else:
         t_limit = t if status == Status.LIMIT.value else np.nan
-        write_outcome(out, row, Outcome(status, load(mine, MAXIMA, 0), t_limit, t, 0))
+        moved = error_time(field(mine, STEP_FULL, 0), control.locate_yield) * field(mine, ERROR, 0)
+        omega_b, changes = load(mine, END_STATE, 0).omega_b, field(mine, ROTATION_CHANGES, 0)
+        o = Outcome(status, load(mine, MAXIMA, 0), t_limit, t, 0, moved, omega_b, changes)
+        write_outcome(out, row, o, step_errors(o, design_in(designs, row), control.theta_limit, control.horizon))
 
 
 @kernel
@@ -149,6 +160,8 @@ def stand_still(ws: np.ndarray, readings: Readings, control: Control) -> None:
         store(ws, COMPRESSION, lane, compression_at(y, switches, c))
         store(ws, MAXIMA, lane, no_maxima())
         put(ws, TIME, lane, 0.0)
+        put(ws, ERROR, lane, 0.0)
+        put(ws, ROTATION_CHANGES, lane, 0.0)
         put(ws, STEP, lane, min(first_length(h_full, factors, c), control.horizon))
         put(ws, ATTEMPTS_LEFT, lane, attempt_budget(h_full, ending_of(control, readings, h_full).longest))
         put(ws, BARRIER, lane, NO_PROOF)
@@ -171,6 +184,7 @@ def take_over_first_steps(ws: np.ndarray, readings: Readings, control: Control) 
         fresh = rate_of(y_end, following, c)
         if passing & (h < control.horizon) & (y_end.v_v > 0.0):
             put(ws, ATTEMPTS_LEFT, lane, field(ws, ATTEMPTS_LEFT, lane) - 1.0)
+            put(ws, ERROR, lane, field(ws, STEP_ERROR, lane))
             store(ws, STATE, lane, y_end)
             store(ws, COMPRESSION, lane, end)
             store(ws, MAXIMA, lane, m)

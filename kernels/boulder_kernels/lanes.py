@@ -204,7 +204,7 @@ def handle(
             lane = EVENTS + side * EVENT_SIZE + k
             status = start_again(ws, lane, designs, row, readings, control, RETRY * h)
         if status != RUNNING:
-            write_lane(events, k, status, out, row)
+            write_lane(events, k, status, designs, control, out, row)
         elif counts[IDLE] > 0:
             counts[IDLE] -= 1
             counts[BUSY] += 1

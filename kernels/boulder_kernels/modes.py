@@ -26,6 +26,8 @@ TURNING_FORWARD = 1
 """Gravity reading: theta_b > 0."""
 TURNING_BACK = 2
 """Gravity reading: theta_b < 0."""
+LAST_OF_GRAVITY = TURNING_BACK
+"""Modes up to this one are of the gravity reading."""
 HELD = 3
 """Printed reading, omega > 0, or come to rest: the restoring moment equals the net moment (Eq 39)."""
 LIMITED_FORWARD = 4

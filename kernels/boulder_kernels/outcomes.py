@@ -98,6 +98,27 @@ class Outcome(NamedTuple):
     """Simulated time [s]."""
     attempts: int
     """Steps tried."""
+    moved: float
+    """Error of the displacements by those of all steps [m], see `boulder_kernels.embedded`."""
+    omega_b: float
+    """Rate of rotation in the end [rad/s]."""
+    rotation_changes: float
+    """How often the mode of rotation changed after the first step, in which a boulder begins to turn."""
+
+
+LEAST_ROTATION = 1e-4
+"""Rotation that an error of the truck may stand for even where the boulder turns less [rad]."""
+
+
+class StepErrors(NamedTuple):
+    """What is known of the error of one solution."""
+
+    theta: float
+    """Estimated error of the largest rotation [rad]; 0 where that is the limit."""
+    x: float
+    """The same of the displacements; at the limit, of the truck's way until the limit is reached, too [m]."""
+    doubtful: bool
+    """Whether a second solution should confirm it."""
 
 
 class OutcomeTable(NamedTuple):
@@ -123,6 +144,8 @@ class OutcomeTable(NamedTuple):
     """Estimated numerical error of theta_max [rad]."""
     x_error: np.ndarray
     """Estimated numerical error of x_b_max, x_v_max and crush_max, the largest [m]."""
+    step: np.ndarray
+    """Step asked for of the solution that is reported [s]; NaN where there is none."""
 
 
 _record: Any = namedtuple
@@ -131,22 +154,32 @@ OutcomesAtRest = _record("OutcomesAtRest", (*OutcomeTable._fields, "theta_rest",
 the boulder comes to rest, signed, how far it swings back from its largest rotation, and by how much that rest may
 be wrong, by the numerical error and by the energy that is left at the end of the simulation [rad]."""
 OUTCOME_FIELDS = OutcomeTable._fields
-STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END = (
-    OUTCOME_FIELDS.index(name)
-    for name in ("status", "theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max", "t_limit", "t_end")
-)
+ROWS = len(OUTCOME_FIELDS)
+STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END, THETA_ERROR, X_ERROR, STEP = range(ROWS)
+DOUBTFUL = STEP
+"""Row of the array of `empty_outcomes` in place of the step: 1.0 where a second solution should confirm the first."""
 
 
 def empty_outcomes(n: int) -> np.ndarray:
-    """Return an array for n outcomes, the columns of an `OutcomeTable` as its rows: INVALID and NaN until written."""
-    out = np.full((len(OUTCOME_FIELDS), n), np.nan)
-    out[0] = Status.INVALID.value
+    """Return an array for n outcomes, see `write_outcome`: INVALID and NaN until written."""
+    out = np.full((ROWS, n), np.nan)
+    out[STATUS] = Status.INVALID.value
     return out
 
 
+def outcome_table(out: np.ndarray, step: float) -> OutcomeTable:
+    """Return an array of outcomes as a table, by its step [s]."""
+    steps = np.where(np.isnan(out[T_END]), np.nan, step)
+    columns = (out[STATUS].astype(np.int8), *out[THETA_MAX:STEP], steps)
+    return OutcomeTable(*columns)
+
+
 @kernel
-def write_outcome(out: np.ndarray, row: int, o: Outcome) -> None:
-    """Write one outcome into the array of `empty_outcomes`; the rows of errors are left alone."""
+def write_outcome(out: np.ndarray, row: int, o: Outcome, errors: StepErrors) -> None:
+    """Write one outcome into an array whose rows are the columns of an `OutcomeTable`, but for its step.
+
+    In place of the step it has 1.0 where the outcome is doubtful, see `boulder_kernels.embedded`.
+    """
     out[STATUS, row] = o.status
     out[THETA_MAX, row] = o.maxima.theta
     out[X_B_MAX, row] = o.maxima.x_b
@@ -155,6 +188,9 @@ def write_outcome(out: np.ndarray, row: int, o: Outcome) -> None:
     out[CRUSH_MAX, row] = o.maxima.crush
     out[T_LIMIT, row] = o.t_limit
     out[T_END, row] = o.t_end
+    out[THETA_ERROR, row] = errors.theta
+    out[X_ERROR, row] = errors.x
+    out[DOUBTFUL, row] = 1.0 if errors.doubtful else 0.0
 
 
 @kernel

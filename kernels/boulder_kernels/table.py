@@ -9,17 +9,31 @@ import numpy as np
 from ._jit import array_kernel, kernel, plain, unless_none
 from .design import DesignTable, Readings, design_at, design_in
 from .dynamics import State
-from .impact import Control, Problem, Record, failed, misses, no_record, simulate, simulate_motion
+from .embedded import step_errors
+from .impact import (
+    STEP_RATIO,
+    Control,
+    Problem,
+    Record,
+    failed,
+    misses,
+    no_record,
+    simulate,
+    simulate_motion,
+)
 from .lanes import simulate_lanes
 from .last_resort import simulate_last_resort
 from .layered import LayeredTable
 from .outcomes import (
+    DOUBTFUL,
+    LEAST_ROTATION,
     SIMULATED,
     Outcome,
     OutcomesAtRest,
     OutcomeTable,
     Status,
     empty_outcomes,
+    outcome_table,
     write_outcome,
 )
 from .plastic import ELASTIC, LAST, PLASTIC_WITH_GAP, SWING, empty_memory, memory_of
@@ -34,8 +48,10 @@ more of all designs, and for those that are not stopped at the limit of rotation
 SAFETY_PRINTED = 5.0
 """The same where the restoring moment is read as printed: two of its jumps can come and go within a step of either
 solution, and both then miss them alike."""
-LEAST_ROTATION = 1e-4
-"""Rotation that an error of the truck may stand for even where the boulder turns less [rad]."""
+SAFETY_CONFIRMED = 4.0
+"""The same where a doubtful design is solved again by half the step."""
+LEAST_CONFIRMED_RAD, LEAST_CONFIRMED_M = 1e-8, 2e-7
+"""No error of a doubtful design is said to be less."""
 
 
 @array_kernel
@@ -70,7 +86,9 @@ def run_rows(
     """Simulate designs one by one; arguments: see `simulate_rows`, a record that keeps nothing, and its result."""
     for row in range(designs.shape[1]):
         profile, second = profile_in(row, soil, layers), second_spring_in(row, springs)
-        write_outcome(out, row, simulate(Problem(design_in(designs, row), profile, second), readings, control, record))
+        design = design_in(designs, row)
+        outcome = simulate(Problem(design, profile, second), readings, control, record)
+        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
 
 
 @kernel
@@ -84,8 +102,10 @@ def run_last_resort(
 ) -> None:
     """The same for designs that need more steps than are allowed, see `boulder_kernels.last_resort`."""
     for row in range(designs.shape[1]):
-        problem = Problem(design_in(designs, row), None, second_spring_in(row, springs))
-        write_outcome(out, row, simulate_last_resort(problem, readings, control, record))
+        design = design_in(designs, row)
+        problem = Problem(design, None, second_spring_in(row, springs))
+        outcome = simulate_last_resort(problem, readings, control, record)
+        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
 
 
 def simulate_rows(
@@ -171,19 +191,37 @@ def simulate_plastic_rows(
     n = len(table.L)
     out, rest = empty_outcomes(n), np.full((3, n), np.nan)
     for row in range(n):
-        impact = simulate_impact(problem_at(table, row, control, springs), readings, control, no_record())
-        write_outcome(out, row, impact.outcome)
+        problem = problem_at(table, row, control, springs)
+        impact = simulate_impact(problem, readings, control, no_record())
+        errors = step_errors(impact.outcome, problem.design, control.theta_limit, control.horizon)
+        write_outcome(out, row, impact.outcome, errors)
         rest[:, row] = impact.theta_rest, impact.swing_back, impact.doubt
-    return OutcomesAtRest(out[0].astype(np.int8), *out[1:], *rest)
+    return OutcomesAtRest(*outcome_table(out, reported_step(control)), *rest)
+
+
+def reported_step(control: Control) -> float:
+    """Return the step that a solution is reported by [s], rounded to twelve digits.
+
+    A third of 18 ms in binary numbers is not quite 6 ms.
+    """
+    return float(f"{control.h / (STEP_RATIO if control.refined else 1.0):.12g}")
 
 
 def simulate_once(
     table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
-) -> OutcomeTable:
-    """Simulate every design of a table once: in lanes where they can be, else one by one."""
+) -> tuple[OutcomeTable, np.ndarray]:
+    """Simulate every design of a table once: in lanes where they can be, else one by one.
+
+    Returns
+    -------
+    OutcomeTable
+        With the errors of the steps of one solution.
+    ndarray of bool, shape (n,)
+        Which of them are doubtful, see `boulder_kernels.embedded`.
+    """
     if control.unloading != ELASTIC:
         outcomes: OutcomeTable = simulate_plastic_rows(table, readings, control, springs)
-        return outcomes
+        return outcomes, np.zeros(len(table.L), dtype=bool)
     designs = np.stack(table[: len(DesignTable._fields)])
     stacked = None if springs is None else np.stack(springs)
     if isinstance(table, LayeredTable):
@@ -196,7 +234,29 @@ def simulate_once(
         out = simulate_lanes(designs, readings, control)
     else:
         out = simulate_rows(designs, None, None, stacked, readings, control)
-    return OutcomeTable(out[0].astype(np.int8), *out[1:])
+    return outcome_table(out, reported_step(control)), out[DOUBTFUL] > 0.0
+
+
+@kernel
+def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
+    """Estimate the numerical error of one design; see `estimate_errors`."""
+    limit = Status.LIMIT.value
+    if np.isnan(fine.theta_max[row]):
+        return
+    if np.isnan(coarse.theta_max[row]) or (coarse.status[row] == limit) != (fine.status[row] == limit):
+        fine.theta_error[row] = fine.x_error[row] = np.inf
+        return
+    arm = max(table.d[row], 0.5 * table.H[row])
+    turn = abs(coarse.theta_max[row] - fine.theta_max[row])
+    x = max(abs(coarse.x_b_max[row] - fine.x_b_max[row]), abs(coarse.x_v_max[row] - fine.x_v_max[row]))
+    x = max(x, arm * turn)
+    if fine.status[row] == limit:
+        x = max(x, table.v_0[row] * abs(coarse.t_limit[row] - fine.t_limit[row]))
+        fine.theta_error[row] = 0.0
+    else:
+        fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
+    x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
+    fine.x_error[row] = safety * x
 
 
 @kernel
@@ -223,24 +283,34 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
     Where only one of the two reached the limit of rotation, or failed, no estimate could be trusted: the error is
     infinite. Where both did, the rotation is the limit itself.
     """
-    limit = Status.LIMIT.value
     for row in range(fine.status.size):
-        if np.isnan(fine.theta_max[row]):
-            continue
-        if np.isnan(coarse.theta_max[row]) or (coarse.status[row] == limit) != (fine.status[row] == limit):
-            fine.theta_error[row] = fine.x_error[row] = np.inf
-            continue
-        arm = max(table.d[row], 0.5 * table.H[row])
-        turn = abs(coarse.theta_max[row] - fine.theta_max[row])
-        x = max(abs(coarse.x_b_max[row] - fine.x_b_max[row]), abs(coarse.x_v_max[row] - fine.x_v_max[row]))
-        x = max(x, arm * turn)
-        if fine.status[row] == limit:
-            x = max(x, table.v_0[row] * abs(coarse.t_limit[row] - fine.t_limit[row]))
-            fine.theta_error[row] = 0.0
-        else:
-            fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
-        x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
-        fine.x_error[row] = safety * x
+        estimate_error(coarse, fine, table, safety, row)
+
+
+@kernel
+def confirm_error(first: OutcomeTable, second: OutcomeTable, table: DesignTable, row: int) -> None:
+    """Estimate the numerical error of one doubtful design; see `confirm_errors`."""
+    if np.isnan(second.theta_max[row]):
+        return
+    theta, x = second.theta_error[row], second.x_error[row]
+    estimate_error(first, second, table, SAFETY_CONFIRMED, row)
+    second.theta_error[row] = max(second.theta_error[row], theta, LEAST_CONFIRMED_RAD)
+    second.x_error[row] = max(second.x_error[row], x, LEAST_CONFIRMED_M)
+
+
+@kernel
+def confirm_errors(first: OutcomeTable, second: OutcomeTable, table: DesignTable) -> None:
+    """Estimate the numerical errors of doubtful designs from their second solutions.
+
+    Parameters
+    ----------
+    first, second
+        Solutions by a step and by half of it, with the errors of their steps; the estimates go into the second.
+    table
+        The designs.
+    """
+    for row in range(second.status.size):
+        confirm_error(first, second, table, row)
 
 
 def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
@@ -257,6 +327,59 @@ def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
     fine.rest_error[:] += safety * differing
 
 
+def is_paired(readings: Readings, control: Control) -> bool:
+    """Return whether every design is solved twice for its error, where errors are estimated.
+
+    What is read as printed may jump within a step, unseen by the error of the steps; that of element sums and of
+    plastic soil has not been measured.
+    """
+    measured = control.elements == 0 and control.unloading == ELASTIC and not control.last_resort
+    return control.paired or not measured or not plain(proof_is_possible)(readings)
+
+
+def halved(control: Control) -> Control:
+    """Return how a doubtful design is simulated a second time: by half the step, and steps that end at yield."""
+    return control._replace(h=0.5 * control.h, locate_yield=True)
+
+
+def some_rows(table: Any, rows: np.ndarray) -> Any:
+    """Return some rows of a named tuple of columns."""
+    return type(table)(*(np.ascontiguousarray(column[rows]) for column in table))
+
+
+def simulate_checked(
+    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None
+) -> OutcomeTable:
+    """Simulate every design once and the doubtful ones a second time.
+
+    Parameters
+    ----------
+    table, readings, springs
+        As of `simulate_table`.
+    control
+        How they are simulated first. A doubtful design that cannot be simulated by the finer steps of `halved` is
+        simulated by the coarser ones of `is_paired` instead, and reported by its first solution.
+    """
+    out, doubtful = simulate_once(table, readings, control, springs)
+    for again, finer in ((halved(control), True), (control._replace(refined=False), False)):
+        rows = np.flatnonzero(doubtful)
+        if not len(rows):
+            break
+        some, theirs = some_rows(table, rows), None if springs is None else some_rows(springs, rows)
+        designs = DesignTable(*some[: len(DesignTable._fields)])
+        first, (second, _) = some_rows(out, rows), simulate_once(some, readings, again, theirs)
+        if finer:
+            confirm_errors(first, second, designs)
+        else:
+            estimate_errors(second, first, designs, SAFETY)
+            second = first
+        there = ~np.isnan(second.theta_max)
+        doubtful[rows[there]] = False
+        for values, new in zip(out, second, strict=True):
+            values[rows[there]] = new[there]
+    return out
+
+
 def simulate_table(
     table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
 ) -> OutcomeTable:
@@ -269,8 +392,10 @@ def simulate_table(
     readings
         Which formulas are read as printed.
     control
-        Step, horizon, limit, soil. With ``error_estimate`` every design is simulated with the step and
-        with a third of it, and the finer result is reported.
+        Step, horizon, limit, soil. Every outcome has the error of its steps, see `boulder_kernels.embedded`. With
+        ``error_estimate`` designs are simulated by a third of the step, and doubtful ones again by half of that, with
+        whose result they are reported. Where `is_paired` says so, every design is simulated with the step and with a
+        third of it instead, and the finer result is reported.
     springs
         Second springs of the vehicles, where they have any; such designs are simulated one by one.
 
@@ -279,10 +404,13 @@ def simulate_table(
     OutcomeTable
         Arrays of shape (n,), in the order of the designs; `OutcomesAtRest` for plastic soil.
     """
-    out = simulate_once(table, readings, control, springs)
     if not control.error_estimate:
-        return out
-    fine = simulate_once(table, readings, control._replace(refined=True), springs)
+        return simulate_once(table, readings, control, springs)[0]
+    refined = control._replace(refined=True)
+    if not is_paired(readings, control):
+        return simulate_checked(table, readings, refined, springs)
+    out, _ = simulate_once(table, readings, control, springs)
+    fine, _ = simulate_once(table, readings, refined, springs)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     estimate_errors(out, fine, DesignTable(*table[: len(DesignTable._fields)]), safety)
     if control.unloading != ELASTIC:

@@ -59,10 +59,13 @@ _LAYOUT: dict[str, Any] = {
     "barrier": Number,
     "horizon": Number,
     "attempts_left": Number,
+    "error": Number,
+    "rotation_changes": Number,
     # What the attempt at a step gives.
     "attention": Number,
     "end_state": State,
     "end": Acceleration,
+    "step_error": Number,
     "status": Number,
 }
 _EVENT_LAYOUT: dict[str, Any] = {
@@ -133,6 +136,12 @@ HORIZON = _place("horizon")
 ATTENTION = _place("attention")
 """1.0 where a step cannot simply be accepted."""
 ATTEMPTS_LEFT = _place("attempts_left")
+ERROR = _place("error")
+"""Sum of the errors of the steps so far [m/s], see `boulder_kernels.embedded`."""
+ROTATION_CHANGES = _place("rotation_changes")
+"""How often the mode of rotation has changed."""
+STEP_ERROR = _place("step_error")
+"""Error of the step [m/s]."""
 BOULDER, ROTATION, TRUCK = _place("boulder"), _place("rotation"), _place("truck")
 """The motion within the step."""
 WEIGHTS = _place("weights")

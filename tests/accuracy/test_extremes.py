@@ -76,7 +76,7 @@ def test_heavy_boulder_is_a_wall_and_a_featherweight_truck_does_nothing() -> Non
 def test_refusals_name_their_cause(changes: dict[str, float], status: Status) -> None:
     out = run(**changes)
     assert out.status[0] == status
-    reasons = judge(out, plain_designs(L=1.65), Limits(LIMIT, "P1"), 0.004)
+    reasons = judge(out, plain_designs(L=1.65), Limits(LIMIT, "P1"))
     assert "time steps" in reasons.reasons[reasons.reason[0]]
 
 
@@ -119,7 +119,7 @@ def test_a_limit_exactly_at_the_peak(off: float) -> None:
     """The peak is the limit to the last digits: it is located, or the row is undecided; never a pass by luck."""
     peak = run(how(0.004)).theta_max[0] * (1.0 + off)
     out = run(Control(0.008, 1.0, float(peak), 0, True))
-    rows = judge(out, plain_designs(L=1.65), Limits(float(peak), "P1"), 0.004)
+    rows = judge(out, plain_designs(L=1.65), Limits(float(peak), "P1"))
     assert rows.verdict[0] in (1, 2)  # fail or undecided
 
 

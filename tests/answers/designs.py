@@ -70,5 +70,6 @@ def passes(found: Need, frame: pd.DataFrame, values: pd.Series, column: str) -> 
     """Judge the designs of some answers with a value in a column, as `sweep run` judges a list of designs."""
     listed = {name: frame[name].to_numpy(dtype=float) for name in INPUT_COLUMNS if name != "impact_height_m"}
     listed[column] = values.to_numpy(dtype=float)
-    sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed), model=found.sweep.model)
+    asked = found.sweep
+    sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed), model=asked.model, solver=asked.solver)
     return evaluation_of(sweep, accuracy_of(sweep), proved=False)(sweep.block(0, sweep.n_designs)).verdict == PASS

@@ -95,7 +95,7 @@ def test_set_and_accuracy_reach_the_table(sweep, possible_grid):
     table = read("out")
     assert len(table) == 6
     assert set(table["impact_speed_m_s"]) == {8.9408}
-    assert table["rotation_error_deg"].isna().all()  # none is estimated then
+    assert (table["step_s"] == 0.012).all()
 
 
 def test_a_dry_run_writes_nothing(sweep, grid):

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 import boulder_sweep
+from boulder_kernels import corrected
+from boulder_kernels.table import halved, simulate_once
 from boulder_sweep.columns import VERDICTS
 from boulder_sweep.impact import simulation
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge import evaluation
 from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings.model import PRESETS
 
@@ -36,11 +39,15 @@ def test_error_is_estimated_also_where_the_step_is_shortened(preset: str, change
 
 
 def between_the_peaks_of_the_first_two_solutions() -> boulder_sweep.Sweep:
-    coarse, fine = (
-        simulate(boulder_sweep.load(CONFIGS / "rwg.yaml"), step_s=step).summary()["max_rotation_deg"]
-        for step in (0.012, 0.004)
-    )
-    limit = 0.75 * coarse + 0.25 * fine
+    """A limit that only the first of the two solutions of a doubtful design reaches."""
+    sweep = boulder_sweep.load(CONFIGS / "rwg.yaml", ["solver.accuracy=balanced"])
+    control = evaluation_of(sweep, accuracy_of(sweep)).control._replace(refined=True)
+    design = designs_of(sweep.block(0, 1), None).table
+    peaks = [
+        float(np.degrees(simulate_once(design, corrected(), how)[0].theta_max[0])) for how in (control, halved(control))
+    ]
+    assert peaks[0] > peaks[1]
+    limit = 0.25 * peaks[0] + 0.75 * peaks[1]
     return boulder_sweep.load(
         CONFIGS / "rwg.yaml", ["solver.accuracy=balanced", f"criterion.max_rotation={limit!r} deg"]
     )
@@ -56,12 +63,13 @@ def test_error_is_infinite_where_only_one_solution_reaches_the_limit(monkeypatch
     assert found.verdict == VERDICTS[row.verdict[0]] == "undecided"
     assert np.isinf(row["displacement_error_m"][0])
     assert np.isinf(found.judged["displacement_error_m"][0])
+    assert row["step_s"][0] == 0.002
 
 
 def test_a_limit_between_two_solutions_is_decided_by_finer_ones() -> None:
     between = between_the_peaks_of_the_first_two_solutions()
     row = evaluation_of(between, accuracy_of(between))(between.block(0, 1))
     found = simulate(between)
-    assert found.verdict == VERDICTS[row.verdict[0]] == "fail"
-    assert row["step_s"][0] < 0.004
-    assert 0.0 < row["time_to_limit_error_s"][0] < 1e-4
+    assert found.verdict == VERDICTS[row.verdict[0]] == "pass"
+    assert row["step_s"][0] < 0.002
+    assert 0.0 < row["rotation_error_deg"][0] < 1e-5

@@ -71,15 +71,13 @@ def test_it_stands_in_summary_and_metadata_and_repeats_itself(tmp_path: Path) ->
 
 
 def test_the_numerical_error_is_that_of_the_accuracy_asked_for() -> None:
-    assert firmness_of(grid()).numerical_error_deg is None  # a plain step
     errors = []
-    for accuracy in ("balanced", "fine"):
+    for accuracy in ("fast", "balanced", "fine"):
         sweep = grid()
         asked = replace(sweep, solver=replace(sweep.solver, accuracy=accuracy, step_s=None))
         errors.append(firmness_of(asked).numerical_error_deg)
-    assert errors[0] is not None
-    assert errors[1] is not None
-    assert 0.0 < errors[1] < errors[0] < 1.0
+    assert all(error is not None for error in errors)
+    assert 0.0 < errors[2] < errors[1] < errors[0] < 1.0
 
 
 def test_nothing_to_simulate() -> None:

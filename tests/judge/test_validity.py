@@ -33,9 +33,7 @@ def flags_of(row: Judged) -> str:
 
 def judged(status: Status = Status.SETTLED, changes: dict[str, float] | None = None, **outcomes: float) -> Judged:
     """One row inside what the model was tested on unless told otherwise."""
-    return judge(
-        outcome(status, **{"F_v_max": 1e3} | outcomes), plain_designs(**INSIDE | (changes or {})), LIMITS, 0.004
-    )
+    return judge(outcome(status, **{"F_v_max": 1e3} | outcomes), plain_designs(**INSIDE | (changes or {})), LIMITS)
 
 
 def test_inside_there_are_none() -> None:

@@ -37,6 +37,7 @@ def outcome(status: Status, **values: float) -> OutcomeTable:
         "t_end": 0.3,
         "theta_error": NAN,
         "x_error": NAN,
+        "step": 0.004,
         **values,
     }
     arrays = {name: np.array([value]) for name, value in row.items()}
@@ -50,7 +51,7 @@ def not_simulated(status: Status) -> OutcomeTable:
 
 def judged(outcomes: OutcomeTable, rating: str = "P1") -> Judged:
     n = len(outcomes.status)
-    return judge(outcomes, plain_designs(n, L=LENGTH, bed_offset=BED), Limits(LIMIT, rating), 0.004)
+    return judge(outcomes, plain_designs(n, L=LENGTH, bed_offset=BED), Limits(LIMIT, rating))
 
 
 def only(row: Judged) -> tuple[str, str]:
@@ -69,9 +70,9 @@ def test_what_cannot_be_proved_is_undecided_unless_readings_are_compared():
     assert only(row) == ("undecided", "horizon")
     assert np.isnan(row["margin"][0])
     designs = plain_designs(1, L=LENGTH, bed_offset=BED)
-    stands = judge(unprovable, designs, Limits(LIMIT, "P1", proved=False), 0.004)
+    stands = judge(unprovable, designs, Limits(LIMIT, "P1", proved=False))
     assert only(stands) == ("pass", "")
-    assert only(judge(outcome(Status.HORIZON), designs, Limits(LIMIT, "P1", proved=False), 0.004))[0] == "undecided"
+    assert only(judge(outcome(Status.HORIZON), designs, Limits(LIMIT, "P1", proved=False)))[0] == "undecided"
 
 
 @pytest.mark.parametrize("status", [Status.SETTLED, Status.BELOW_LIMIT])
@@ -157,11 +158,11 @@ def test_more_crush_than_the_front_is_long_is_never_a_pass():
 @pytest.mark.parametrize(("overlap", "found"), [(0.26, ("pass", "")), (0.24, ("undecided", "override"))])
 def test_a_boulder_that_barely_reaches_the_bumper_does_not_pass(overlap, found):
     designs = plain_designs(H=2.0 + overlap, d=1.5, e_bumper=0.5)
-    row = judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1"), 0.004)
+    row = judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1"))
     assert only(row) == found
     assert row["overlap_m"][0] == pytest.approx(overlap)
-    assert only(judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1", min_overlap=0.0), 0.004)) == ("pass", "")
-    overturned = judge(outcome(Status.LIMIT), designs, Limits(LIMIT, "P1"), 0.004)
+    assert only(judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1", min_overlap=0.0))) == ("pass", "")
+    overturned = judge(outcome(Status.LIMIT), designs, Limits(LIMIT, "P1"))
     assert only(overturned) == ("fail", "overturns")
 
 
@@ -256,6 +257,7 @@ rows = st.fixed_dictionaries(
         "t_end": st.floats(0.0, 1.0),
         "theta_error": st.one_of(st.just(NAN), st.floats(0.0, 0.5)),
         "x_error": st.one_of(st.just(NAN), st.floats(0.0, 50.0)),
+        "step": st.just(0.004),
     }
 )
 

@@ -48,7 +48,7 @@ def advance(begin: Start, T: float, steps: int, locate_yield: bool = False) -> t
     h_next = h_full
     while T - t > 1e-12 * T:
         h = min(h_next, T - t)
-        y_end, k_end = step(y, k, h, switches, c)
+        y_end, k_end, _ = step(y, k, h, switches, c)
         dense, start = dense_output(y, k, y_end, k_end, h), compression_at(y, switches, c)
         kept = keep_step(t, y, k.M, y_end, k_end.M, start, no_maxima(), dense, factors, switches, locate_yield, c)
         if kept.event == SHORTEN:

@@ -17,6 +17,7 @@ from boulder_kernels.design import constants_of, is_computable
 from boulder_kernels.impact import simulate
 from boulder_kernels.layered import uniform_layers
 from boulder_kernels.numerics import sine_versine
+from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.soil_laws import profile_of
 from boulder_kernels.table import estimate_errors, problem_at, run_rows
 
@@ -57,7 +58,7 @@ def test_arrays_are_read_and_written_in_place() -> None:
     """Inputs of any number of dimensions, and results."""
     found = []
     for call in (run_rows, run_rows.for_python):
-        out = np.full((10, len(DESIGNS)), np.nan)
+        out = empty_outcomes(len(DESIGNS))
         call(np.stack(table_of(DESIGNS)), None, None, None, READINGS, HOW, bk.no_record(), out)
         found.append(out)
     assert np.isfinite(found[0][1]).all()

@@ -53,7 +53,7 @@ def test_within_a_step_of_the_integrator() -> None:
     k = rate_of(y, switches, c)
     gaps, steps = [], np.array([8e-3, 4e-3, 2e-3])
     for h in steps:
-        y_end, k_end = step(y, k, h, switches, c)
+        y_end, k_end, _ = step(y, k, h, switches, c)
         dense = dense_output(y, k, y_end, k_end, h)
         assert np.array(state_at(dense, 0.0)) == pytest.approx(np.array(y), rel=1e-13, abs=1e-13)
         assert np.array(state_at(dense, 1.0)) == pytest.approx(np.array(y_end), rel=1e-12, abs=1e-12)

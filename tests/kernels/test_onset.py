@@ -86,7 +86,7 @@ def test_a_step_to_the_onset_ends_just_behind_it() -> None:
     switches, factors = enter_modes(modes, CORRECTED, LIMIT, False, c)
     y = initial_state(c)
     k = rate_of(y, switches, c)
-    y_end, k_end = step(y, k, onset_of(c), switches, c)
+    y_end, k_end, _ = step(y, k, onset_of(c), switches, c)
     assert 1.0 < k_end.M / c.C_cos < 1.0 + AT_END * TOLERANCE
     for beyond, passing in ((0.0, False), (AT_END * TOLERANCE * c.C_cos, True)):
         assert passes(y, y_end, k_end, factors, switches, c, beyond)[0] == passing

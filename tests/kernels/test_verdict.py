@@ -33,6 +33,7 @@ STANDS = {
     "t_end": 0.6,
     "theta_error": 1e-5,
     "x_error": 1e-5,
+    "step": 4e-3,
 }
 BOULDER = {"L": 1.5, "H": 3.0, "d": 1.5, "e_bumper": 0.5, "bed_offset": 2.9}
 

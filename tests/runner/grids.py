@@ -77,6 +77,7 @@ def plausible(table: DesignTable, readings: Readings, control: Control) -> Outco
         t_end=kept(0.3 + share),
         theta_error=kept(1e-4 * share),
         x_error=kept(1e-5 * share),
+        step=np.full(len(share), control.h),
     )
 
 

@@ -108,9 +108,9 @@ MADE = [
 ]
 ASKED = {
     12.0: "use solver: {accuracy: balanced} (steps of 12 + 4 ms): 6 us a design, 0.0026 s for this grid on one core, "
-    "with an error for every design; without one, solver: {step: 8 ms} takes 2 us.",
+    "with confirmed errors; unconfirmed, solver: {step: 8 ms} takes 2 us.",
     3.0: "use solver: {accuracy: 4e-05 deg} (steps of 3 + 1 ms): 20 us a design, 0.0088 s for this grid on one core, "
-    "with an error for every design",
+    "with confirmed errors",
 }
 SUMS = (
     "Sums over 5000 soil elements cost 1,000 times the closed form, which is their limit, and are 4e-05 deg off it at "
@@ -127,7 +127,7 @@ def test_recommendation_names_the_cheapest_that_keeps_to_every_target() -> None:
     assert recommended(MADE) == [
         f"For 0.1 or 0.01 deg {ASKED[12.0]}",
         f"For 0.001 deg {ASKED[12.0].replace('{step: 8 ms} takes 2 us', '{step: 2 ms} takes 8 us')}",
-        f"For 0.0001 deg {ASKED[3.0]}; without one, solver: {{step: 2 ms}} takes 8 us.",
+        f"For 0.0001 deg {ASKED[3.0]}; unconfirmed, solver: {{step: 2 ms}} takes 8 us.",
         f"For 1e-05 deg {ASKED[3.0]}.",
         LARGER,
         SUMS,
@@ -138,15 +138,15 @@ def test_recommendation_says_once_what_holds_for_several_targets() -> None:
     cheap = [replace(MADE[0], rotation_max_deg=1e-6), replace(MADE[4], rotation_max_deg=2e-5)]
     assert recommended(cheap) == [
         f"For 0.1 or 0.01 or 0.001 or 0.0001 deg {ASKED[12.0]}",
-        "For 1e-05 deg no step with an error estimate is short enough; without one, solver: {step: 8 ms} takes 2 us.",
+        "For 1e-05 deg no step with confirmed errors is short enough; unconfirmed, solver: {step: 8 ms} takes 2 us.",
     ]
 
 
 def test_recommendation_tells_a_lack_of_time_from_a_lack_of_accuracy() -> None:
     """Plain steps of 8 and 2 ms keep to 1e-3 and 1e-4 deg; what estimates errors was not measured, or in part."""
-    late = "no method with an error estimate was measured in the time; allow more --seconds"
+    late = "no method with confirmed errors was measured in the time; allow more --seconds"
     steps = [replace(MADE[0], rotation_max_deg=1e-3), replace(MADE[1], rotation_max_deg=1e-4)]
-    step, shorter = (f"; without one, solver: {{step: {p.method.step_ms:g} ms}} takes {p.cpu_us:g} us" for p in steps)
+    step, shorter = (f"; unconfirmed, solver: {{step: {p.method.step_ms:g} ms}} takes {p.cpu_us:g} us" for p in steps)
     left = (guarded(12.0), guarded(3.0))
     none = Tradeoff(grid(), tuple(steps), {}, left).recommendation()
     assert none == [
@@ -158,7 +158,7 @@ def test_recommendation_tells_a_lack_of_time_from_a_lack_of_accuracy() -> None:
     some = Tradeoff(grid(), (*steps, coarse), {}, left[1:]).recommendation()
     assert some[0] == f"For 0.1 or 0.01 or 0.001 deg {late.replace('was', 'accurate enough was')}{step}."
     every = Tradeoff(grid(), (*steps, coarse), {}, ()).recommendation()
-    assert every[0] == f"For 0.1 or 0.01 or 0.001 deg no step with an error estimate is short enough{step}."
+    assert every[0] == f"For 0.1 or 0.01 or 0.001 deg no step with confirmed errors is short enough{step}."
     assert every[2] == "For 1e-05 deg no measured step is short enough."
 
 

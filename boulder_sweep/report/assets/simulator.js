@@ -8,6 +8,8 @@ const NEVER = 1e300;
 const BEFORE_THE_END = 1 - 1e-14;
 /** Columns that `sweep simulate`, which goes on beyond the limit, takes from a row of `sweep run`, which stops there. */
 const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"];
+/** Those of the maxima, which are the same unless the boulder overturns. */
+const ERRORS = ["rotation_error_deg", "displacement_error_m"];
 
 /**
  * The soil where it is not the same at every depth or not level; written by Python.
@@ -82,14 +84,28 @@ function layersOf(law, ground, design, gravity) {
   });
 }
 
+/** How the kernel estimates errors, see `boulder_sweep.report.entry_points`. */
+const PAIRED = 1;
+const ONCE = 2;
+
+/** @param {number} step [s] @returns {number} the same to twelve digits, as tables have it */
+function exact(step) {
+  return Number(step.toPrecision(12));
+}
+
 /** Designs by the columns of the table in, judged rows and motions out. */
 class Simulator {
   /** @param {any} data of the page @param {Kernel} kernel */
   constructor(data, kernel) {
     this.data = data;
     this.kernel = kernel;
-    const horizon = data.settings[data.layout.settings.indexOf("horizon")];
+    const horizon = data.settings[this.at("horizon")];
     this.times = Float64Array.from({ length: SAMPLES + 1 }, (_, k) => ((horizon * k) / SAMPLES) * BEFORE_THE_END);
+  }
+
+  /** @param {string} setting of the kernel @returns {number} its place among them */
+  at(setting) {
+    return this.data.layout.settings.indexOf(setting);
   }
 
   /** @param {Record<string, number>} changed by name @returns {number[]} settings of the kernel */
@@ -162,7 +178,9 @@ class Simulator {
 
   /** @param {Judged} one @returns {boolean} whether finer steps may decide it */
   isOpen(one) {
-    return (one.verdict === "undecided" && one.reason === "error") || this.data.rules.open.includes(one.reason);
+    const refined = this.data.settings[this.at("error_estimate")] > 0;
+    const unsure = refined && one.verdict === "undecided" && one.reason === "error";
+    return unsure || this.data.rules.open.includes(one.reason);
   }
 
   /**
@@ -177,8 +195,12 @@ class Simulator {
     const finer = this.data.finer;
     const steps = finer.find((one) => this.step(one) === decided.step_s) ?? {};
     const beyond = { ...steps, stop_at_limit: 0 };
+    const halved = decided.step_s === exact(this.data.step_s / 2);
+    if (halved) Object.assign(beyond, { h: this.data.settings[this.at("h")] / 2, locate_yield: 1 });
+    if (this.settings(beyond)[this.at("paired")] !== PAIRED) beyond.paired = ONCE;
     const [judged] = this.judged([design], beyond);
-    if (judged.verdict !== "error") for (const name of DECIDED) judged[name] = decided[name];
+    const names = decided.reason === "overturns" ? DECIDED : [...DECIDED, ...ERRORS];
+    if (judged.verdict !== "error") for (const name of names) judged[name] = decided[name];
     const times = refusal === "" ? this.times : new Float64Array(0);
     const one = this.kernelDesign(inputs);
     return { judged, motion: this.kernel.history(one, this.layers(one), this.settings(beyond), times), inputs };
@@ -191,7 +213,7 @@ class Simulator {
 
   /**
    * @param {Record<string, number>[]} designs
-   * @param {Record<string, number>} changed settings; with another step `h` also the `step_s` that is reported
+   * @param {Record<string, number>} changed settings
    * @returns {Judged[]}
    */
   judged(designs, changed) {
@@ -202,7 +224,7 @@ class Simulator {
     const rulings = this.kernel.rulings(outcomes, complete.map(({ inputs }) => inputs), rules.limits);
     return complete.map(({ inputs, refusal }, row) => {
       const found = judge(outcomes, rulings, row, inputs, rules);
-      found.step_s = found.end_time_s === null ? null : this.step(changed);
+      found.step_s = found.end_time_s === null ? null : exact(outcomes.step[row]);
       if (refusal === "") return found;
       const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
       return { ...nothing, verdict: "error", reason: refusal, rating: null };
