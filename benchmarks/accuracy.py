@@ -35,9 +35,11 @@ REFERENCE_STEP_S = 5e-5
 PRESETS = {"corrected": bk.corrected(), "as_printed": bk.as_printed()}
 
 
-def control(step_s: float, *, error_estimate: bool = False, locate_yield: bool = False) -> bk.Control:
+def control(
+    step_s: float, *, error_estimate: bool = False, locate_yield: bool = False, paired: bool = False
+) -> bk.Control:
     """Return the control: simulate to the rotation limit, the horizon, or the proof of rest."""
-    return bk.Control(step_s, HORIZON, ROTATION_LIMIT, 0, error_estimate, True, locate_yield)
+    return bk.Control(step_s, HORIZON, ROTATION_LIMIT, 0, error_estimate, True, locate_yield, paired=paired)
 
 
 def reference_of(table: bk.DesignTable, readings: bk.Readings) -> bk.OutcomeTable:
@@ -50,7 +52,7 @@ def kernel_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable, re
     readings, points = PRESETS[preset], []
     ways = {
         "events located": (STEPS_MS, {}),
-        "with error estimate": (STEPS_WITH_ERROR_MS, {"error_estimate": True}),
+        "with error estimate": (STEPS_WITH_ERROR_MS, {"error_estimate": True, "paired": True}),
         "yield located, too": (STEPS_MS, {"locate_yield": True}),
     }
     for way, (steps_ms, options) in ways.items():

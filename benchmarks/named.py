@@ -13,6 +13,7 @@ import numpy as np
 
 import boulder_kernels as bk
 from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.table import is_paired
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
 
 from .accuracy import PRESETS, control, reference_of
@@ -29,10 +30,14 @@ def named_control(name: str, steps: Steps) -> bk.Control:
     return control(steps.step_s, error_estimate=name != "fast", locate_yield=steps.locate_yield)
 
 
-def steps_text(name: str, steps: Steps) -> str:
-    """Return the steps in words."""
+def steps_text(name: str, steps: Steps, readings: bk.Readings) -> str:
+    """Return in words the steps of the solutions that every design has."""
     longer = 1e3 * steps.step_s
-    text = f"{longer:g} ms" if name == "fast" else f"{longer:g} and {longer / STEP_RATIO:g} ms"
+    finer = f"{longer / STEP_RATIO:g} ms"
+    if name == "fast":
+        text = f"{longer:g} ms"
+    else:
+        text = f"{longer:g} and {finer}" if is_paired(readings, named_control(name, steps), layered=False) else finer
     return text + (", yield located" if steps.locate_yield else "")
 
 
@@ -69,7 +74,7 @@ def measure(count: int = DESIGNS, rounds: int = ROUNDS) -> Table:
                 [
                     preset,
                     f"`{name}`",
-                    steps_text(name, named[name]),
+                    steps_text(name, named[name], readings),
                     f"{cpu_us:.2f} us",
                     f"{median_ratio(times[name], times['fast']):.2f}",
                     significant(p.theta_max_deg),

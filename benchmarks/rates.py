@@ -26,7 +26,7 @@ ROUNDS = 7
 WAYS = {
     "0.01 deg, 0.1 mm": control(0.014),
     "1e-4 deg, 0.002 mm": control(0.004),
-    "0.01 deg, 0.1 mm, error estimates": control(0.018, error_estimate=True),
+    "0.01 deg, 0.1 mm, error estimates": control(0.018, error_estimate=True, paired=True),
 }
 
 

@@ -37,19 +37,8 @@ KEPT = ("design", "stability")
 """Modules that stay in double precision: what is computed once per design."""
 ORDER = (
     *("design", "stability", "numerics", "flat", "modes", "soil", "layered", "layered_soil", "plastic"),
-    *(
-        "soil_laws",
-        "dynamics",
-        "dense_output",
-        "dormand_prince",
-        "outcomes",
-        "embedded",
-        "gaps",
-        "events",
-        "energy",
-        "settling",
-    ),
-    *("after_step", "second_spring", "unloading", "onset", "workspace", "_lowering", "impact"),
+    *("soil_laws", "dynamics", "dense_output", "dormand_prince", "outcomes", "embedded", "gaps", "events", "energy"),
+    *("settling", "after_step", "second_spring", "unloading", "onset", "workspace", "_lowering", "impact"),
     *("lane_events", "lane_steps", "lanes"),
 )
 CHANGES = {

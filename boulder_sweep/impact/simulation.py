@@ -22,6 +22,7 @@ from boulder_kernels import (
 )
 from boulder_kernels.design import design_at
 from boulder_kernels.embedded import step_errors
+from boulder_kernels.layered import LayeredTable
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.table import (
     SAFETY,
@@ -127,13 +128,14 @@ def simulate(
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     decided = evaluation.judged(designs)
-    control = _control(evaluation.control, how, float(decided["step_s"][0]))
+    layered = isinstance(designs.table, LayeredTable)
+    control = _control(evaluation.control, how, float(decided["step_s"][0]), layered=layered)
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)
     problem = problem_at(designs.table, 0, control, designs.springs, len(record.times))
     outcome, c, *_ = simulate_impact(problem, how, control, record)
     row = _outcome_row(outcome, one, control)
-    if control.error_estimate and is_paired(how, control):
+    if control.error_estimate and is_paired(how, control, layered=layered):
         coarser = control._replace(refined=False)
         alike = problem_at(designs.table, 0, coarser, designs.springs)
         other = simulate_impact(alike, how, coarser, no_record()).outcome
@@ -195,13 +197,13 @@ def _changed(
     return dataclasses.replace(sweep, model=model, solver=solver)
 
 
-def _control(control: Control, how: Readings, step_s: float) -> Control:
+def _control(control: Control, how: Readings, step_s: float, *, layered: bool) -> Control:
     """How the time history is integrated: by the step that decided the row [s], and beyond the limit."""
     for finer in finer_controls(control):
         if reported_step_s(finer) == step_s:
             control = finer
     control = control._replace(stop_at_limit=False, refined=control.error_estimate)
-    checked = control.error_estimate and not is_paired(how, control)
+    checked = control.error_estimate and not is_paired(how, control, layered=layered)
     return halved(control) if checked and reported_step(control) != step_s else control
 
 

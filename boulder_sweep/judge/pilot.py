@@ -105,7 +105,9 @@ def accuracy_of(sweep: Sweep) -> Accuracy:
         return pilot(sweep, solver.accuracy)
     name = str(solver.accuracy)
     found = Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
-    return replace(found, paired=found.error_estimate and is_paired(readings_of(sweep), control_of(sweep, found)))
+    layered = not sweep.model.ground.is_proportional
+    paired = is_paired(readings_of(sweep), control_of(sweep, found), layered=layered)
+    return replace(found, paired=found.error_estimate and paired)
 
 
 @lru_cache(maxsize=8)

@@ -72,12 +72,13 @@ def page_data(
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
     ground = Ground.of_dict(settings["model"].get("ground", {}))
     closed = control._replace(elements=0, unloading=ELASTIC)
+    closed = closed._replace(paired=is_paired(readings, closed, layered=not ground.is_proportional))
     return {
         "title": title,
         "units": units,
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
-        "settings": [float(value) for value in (*readings, *closed._replace(paired=is_paired(readings, closed)))],
+        "settings": [float(value) for value in (*readings, *closed)],
         "rules": _rules(control.theta_limit, settings),
         "inputs": [_input(spec.name, start, settings) for spec in (*INPUTS, *OPTIONAL_INPUTS) if spec.name in start],
         "outcomes": [

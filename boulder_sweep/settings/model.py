@@ -366,7 +366,7 @@ class SolverSettings:
     step_s: float | None = setting(
         "solver.step",
         "s",
-        "time step in place of an accuracy; no error is estimated",
+        "time step in place of an accuracy; errors are estimated but not confirmed, as by fast",
         None,
         admitted=Bound(1e-7, 1.0, "a step of some milliseconds is usual"),
     )

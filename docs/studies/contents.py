@@ -205,8 +205,8 @@ def _front_face(root: Path) -> str:
     return one_face_words(root / GRID)
 
 
-def _wild_families(_: Path) -> str:
-    return wild_table().markdown()
+def _wild_families(root: Path) -> str:
+    return wild_table(root / "configs" / "m30_sizing.yaml").markdown()
 
 
 CONTENTS: dict[str, Callable[[Path], str]] = {

@@ -26,6 +26,10 @@ NUMBERS = tuple(steps for steps in LADDER if finer_step_s(steps.step_s) in (0.00
 """Some of those that an accuracy given as a number may come to."""
 
 
+LEAST, LEAST_UNCONFIRMED = 0.99, 0.98
+"""Least share of the errors that must be covered, and that of one solution as printed."""
+
+
 @dataclass(frozen=True)
 class Coverage:
     """Estimated and true errors of some designs, by one reading and one step.
@@ -37,7 +41,9 @@ class Coverage:
     readings, accuracy : str
         How they were read, and what was asked for.
     steps : Steps
-        The longer one of the two, and whether the yield is located.
+        Of the accuracy, and whether the yield is located.
+    steps_s : tuple of float
+        Steps of the solutions that every design has [s].
     standing : int
         Designs that turn no further than the limit.
     rotation : float
@@ -60,6 +66,7 @@ class Coverage:
     readings: str
     accuracy: str
     steps: Steps
+    steps_s: tuple[float, ...]
     standing: int
     rotation: float
     displacement: float
@@ -70,6 +77,12 @@ class Coverage:
     largest_m: float
     flips: int
     undecided: int
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether so many estimated errors hold as must."""
+        unconfirmed = self.accuracy == "fast" and self.readings != "corrected"
+        return min(self.rotation, self.displacement) >= (LEAST_UNCONFIRMED if unconfirmed else LEAST)
 
 
 def random_table(count: int, seed: int) -> DesignTable:
@@ -95,10 +108,14 @@ def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:
         for preset, readings in PRESETS.items():
             known = _solved(table, readings, Steps(REFERENCE_STEP_S, locate_yield=True), estimate=False)
             named = STEPS if readings.restoring_gravity else STEPS_PRINTED
-            ways = [(name, named[name]) for name in ("balanced", "fine")] + [("a number", steps) for steps in NUMBERS]
-            for accuracy, steps in ways:
-                found = _solved(table, readings, steps, estimate=True)
-                yield _compared(designs, preset, accuracy, steps, found, known)
+            for accuracy, steps in [*named.items(), *(("a number", steps) for steps in NUMBERS)]:
+                paired = accuracy == "a number" or not readings.restoring_gravity
+                finer_s = finer_step_s(steps.step_s)
+                steps_s = (steps.step_s, finer_s) if paired else (finer_s,)
+                if accuracy == "fast":
+                    steps_s = (steps.step_s,)
+                found = _solved(table, readings, steps, estimate=accuracy != "fast", paired=paired)
+                yield _compared(designs, preset, accuracy, steps, steps_s, found, known)
 
 
 def coverage_table(found: list[Coverage]) -> Table:
@@ -117,7 +134,7 @@ def coverage_table(found: list[Coverage]) -> Table:
             c.designs,
             c.readings,
             c.accuracy,
-            f"{1e3 * c.steps.step_s:g} + {1e3 * finer_step_s(c.steps.step_s):g}{' *' if c.steps.locate_yield else ''}",
+            " + ".join(f"{1e3 * step:g}" for step in c.steps_s) + (" *" if c.steps.locate_yield else ""),
             f"{c.rotation:.1%} of {c.standing}",
             f"{c.largest_miss_deg:.0e}" if c.largest_miss_deg else "none",
             f"{c.displacement:.1%}",
@@ -129,14 +146,22 @@ def coverage_table(found: list[Coverage]) -> Table:
     return table
 
 
-def _solved(table: DesignTable, readings: Readings, steps: Steps, *, estimate: bool) -> OutcomeTable:
+def _solved(
+    table: DesignTable, readings: Readings, steps: Steps, *, estimate: bool, paired: bool = False
+) -> OutcomeTable:
     """Simulate a table of designs."""
-    control = Control(steps.step_s, HORIZON_S, LIMIT, 0, estimate, True, steps.locate_yield)
+    control = Control(steps.step_s, HORIZON_S, LIMIT, 0, estimate, True, steps.locate_yield, paired=paired)
     return simulate_table(table, readings, control)
 
 
 def _compared(
-    designs: str, readings: str, accuracy: str, steps: Steps, found: OutcomeTable, known: OutcomeTable
+    designs: str,
+    readings: str,
+    accuracy: str,
+    steps: Steps,
+    steps_s: tuple[float, ...],
+    found: OutcomeTable,
+    known: OutcomeTable,
 ) -> Coverage:
     """Compare estimated with true errors."""
     computed = np.isfinite(found.theta_max) & np.isfinite(known.theta_max)
@@ -155,6 +180,7 @@ def _compared(
         readings=readings,
         accuracy=accuracy,
         steps=steps,
+        steps_s=steps_s,
         standing=int(standing.sum()),
         rotation=1.0 - float(missed.sum() / max(standing.sum(), 1)),
         displacement=1.0 - float(missed_x.sum() / max(alike.sum(), 1)),

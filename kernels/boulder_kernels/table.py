@@ -327,13 +327,13 @@ def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
     fine.rest_error[:] += safety * differing
 
 
-def is_paired(readings: Readings, control: Control) -> bool:
+def is_paired(readings: Readings, control: Control, *, layered: bool) -> bool:
     """Return whether every design is solved twice for its error, where errors are estimated.
 
-    What is read as printed may jump within a step, unseen by the error of the steps; that of element sums and of
-    plastic soil has not been measured.
+    What is read as printed may jump within a step, unseen by the error of the steps, and a soil in layers yields at
+    many instants. The error time of element sums and of plastic soil has not been measured.
     """
-    measured = control.elements == 0 and control.unloading == ELASTIC and not control.last_resort
+    measured = control.elements == 0 and control.unloading == ELASTIC and not (layered or control.last_resort)
     return control.paired or not measured or not plain(proof_is_possible)(readings)
 
 
@@ -407,7 +407,7 @@ def simulate_table(
     if not control.error_estimate:
         return simulate_once(table, readings, control, springs)[0]
     refined = control._replace(refined=True)
-    if not is_paired(readings, control):
+    if not is_paired(readings, control, layered=isinstance(table, LayeredTable)):
         return simulate_checked(table, readings, refined, springs)
     out, _ = simulate_once(table, readings, control, springs)
     fine, _ = simulate_once(table, readings, refined, springs)

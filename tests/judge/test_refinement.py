@@ -61,8 +61,8 @@ def test_a_design_that_is_too_stiff_for_its_steps_is_decided_by_finer_ones() -> 
 def test_a_row_says_by_which_step_it_was_decided() -> None:
     row = evaluation().judged(plain_designs()).row(0)
     assert row["step_s"] == reported_step_s(CONTROL) == 0.004
-    unguarded = CONTROL._replace(error_estimate=False)
-    assert evaluation(unguarded).judged(plain_designs()).row(0)["step_s"] == 0.012
+    unconfirmed = CONTROL._replace(error_estimate=False)
+    assert evaluation(unconfirmed).judged(plain_designs()).row(0)["step_s"] == 0.012
     assert evaluation().judged(plain_designs(H=1.5)).row(0)["step_s"] is None  # no contact: nothing was simulated
 
 
@@ -75,6 +75,17 @@ def test_a_limit_within_the_error_of_the_peak_is_decided_by_finer_steps() -> Non
     row = evaluation(control, Limits(limit, "P1")).judged(standing).row(0)
     assert row["verdict"] == "pass"
     assert row["step_s"] < reported_step_s(CONTROL)
+
+
+def test_an_unconfirmed_row_within_its_error_of_a_limit_stays_undecided() -> None:
+    """As by `fast` and a given step; the row of a confirmed accuracy is decided, see above."""
+    standing = designs_of(crash_test("rwg").block(0, 1))
+    once = CONTROL._replace(error_estimate=False)
+    found = by_kernels(standing.table, corrected(), once)
+    limit = float(found.theta_max[0] + 0.3 * found.theta_error[0])
+    row = evaluation(once._replace(theta_limit=limit), Limits(limit, "P1")).judged(standing).row(0)
+    assert (row["verdict"], row["reason"]) == ("undecided", "error")
+    assert row["step_s"] == once.h
 
 
 HARD = {"beta": 1e9, "rho_b": 1e-3, "rho_s": 1e-3, "L": 0.1}

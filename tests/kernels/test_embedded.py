@@ -1,0 +1,207 @@
+"""The error of one solution, and which designs have a second one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.integrate import RK45
+
+import boulder_kernels as bk
+from boulder_kernels import Status
+from boulder_kernels.design import error_arm
+from boulder_kernels.dormand_prince import ERROR
+from boulder_kernels.embedded import (
+    AT_LIMIT,
+    AT_LIMIT_AFTER_CHANGES,
+    CHATTERING,
+    CHATTERING_T,
+    CHATTERING_THETA,
+    CHATTERING_X,
+    LONG_MOTION,
+    ROCKING,
+    YIELD_LOCATED,
+    YIELD_PASSED,
+    error_time,
+    step_errors,
+)
+from boulder_kernels.outcomes import LEAST_ROTATION, no_maxima
+from boulder_kernels.table import (
+    LEAST_CONFIRMED_M,
+    SAFETY_CONFIRMED,
+    halved,
+    is_paired,
+    reported_step,
+    simulate_checked,
+    simulate_once,
+)
+from tests import oracle
+
+from .samples import control, design_of, random_designs, table_of
+
+LIMIT = np.radians(20.0)
+CORRECTED = bk.corrected()
+
+
+def test_the_weights_are_those_of_scipy() -> None:
+    """SciPy's are the fourth-order weights less those of fifth order."""
+    assert np.allclose(ERROR, -RK45.E, rtol=1e-15, atol=0.0)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a motion ended, where it does not matter more."""
+
+    status: Status = Status.SETTLED
+    theta: float = 0.1
+    t_end: float = 0.4
+    moved: float = 1e-6
+    omega_b: float = 1.0
+    changes: float = 0.0
+
+
+DESIGN = design_of(oracle.RWG)._replace(L=1.0, H=3.0, d=1.6, m_v=6800.0, k_v=3e6, v_0=13.0)
+ARM = 1.6
+
+
+def errors(ended: Ended, **changed: float) -> tuple[float, float, bool]:
+    m = no_maxima()._replace(theta=ended.theta, x_b=0.2)
+    o = bk.Outcome(ended.status, m, np.nan, ended.t_end, 100, ended.moved, ended.omega_b, ended.changes)
+    theta, x, doubtful = step_errors(o, DESIGN._replace(**changed), LIMIT, 2.0)
+    return theta, x, bool(doubtful)
+
+
+@pytest.mark.parametrize(
+    ("ended", "changed", "factor"),
+    [
+        (Ended(), {}, 1.0),
+        (Ended(changes=3.0), {}, 1.0),
+        (Ended(t_end=1.0), {}, LONG_MOTION),
+        (Ended(t_end=0.6), {}, 1.0),
+        (Ended(t_end=0.6), {"H": 4.0}, LONG_MOTION),
+        (Ended(), {"m_v": 15e3}, 1.0),
+        (Ended(changes=1.0), {"m_v": 15e3}, LONG_MOTION),
+    ],
+)
+def test_a_long_motion_has_a_larger_error(ended: Ended, changed: dict[str, float], factor: float) -> None:
+    theta, x, _ = errors(ended, **changed)
+    assert x == pytest.approx(factor * 1e-6)
+    assert theta == pytest.approx(factor * 1e-6 / max(ARM, 0.5 * changed.get("H", 3.0)))
+
+
+@pytest.mark.parametrize(("changes", "factor"), [(0.0, AT_LIMIT), (1.0, AT_LIMIT_AFTER_CHANGES)])
+def test_at_the_limit_the_time_is_uncertain_too(changes: float, factor: float) -> None:
+    theta, x, _ = errors(Ended(Status.LIMIT, theta=LIMIT, omega_b=-2.0, changes=changes))
+    assert theta == 0.0
+    assert x == pytest.approx(factor * 1e-6 * (1.0 + 13.0 / (2.0 * ARM)))
+
+
+def test_a_boulder_that_hardly_turns_has_no_large_error_of_its_rotation() -> None:
+    assert errors(Ended(theta=1e-9, moved=1.0))[0] == LEAST_ROTATION
+
+
+def test_a_boulder_that_chatters_has_an_error_of_a_fraction() -> None:
+    theta, x, _ = errors(Ended(changes=CHATTERING + 1.0))
+    assert (theta, x) == (pytest.approx(CHATTERING_THETA * 0.1), pytest.approx(CHATTERING_X * 0.2))
+    theta, x, _ = errors(Ended(Status.LIMIT, t_end=1.5, changes=CHATTERING + 1.0))
+    assert (theta, x) == (0.0, pytest.approx(CHATTERING_T * 13.0 * 1.5))
+
+
+@pytest.mark.parametrize(
+    ("ended", "changed"),
+    [
+        (Ended(changes=ROCKING + 1.0), {}),
+        (Ended(t_end=2.1), {}),
+        (Ended(t_end=1.1), {"H": 3.9}),
+        (Ended(Status.LIMIT), {"H": 5.5}),
+        (Ended(), {"m_v": 40e3}),
+        (Ended(Status.LIMIT, changes=1.0), {"m_v": 40e3}),
+        (Ended(theta=np.radians(19.1)), {}),
+        (Ended(theta=np.radians(15.0), moved=2e-3), {}),
+        (Ended(Status.LIMIT, omega_b=0.05), {}),
+    ],
+)
+def test_what_is_doubtful(ended: Ended, changed: dict[str, float]) -> None:
+    assert errors(ended, **changed)[2]
+
+
+@pytest.mark.parametrize(
+    ("ended", "changed"),
+    [
+        (Ended(), {}),
+        (Ended(changes=float(ROCKING)), {}),
+        (Ended(t_end=1.1), {}),
+        (Ended(t_end=0.9), {"H": 3.9}),
+        (Ended(Status.LIMIT), {}),
+        (Ended(Status.LIMIT), {"m_v": 40e3}),
+        (Ended(theta=np.radians(18.9)), {}),
+    ],
+)
+def test_what_is_not(ended: Ended, changed: dict[str, float]) -> None:
+    assert not errors(ended, **changed)[2]
+
+
+def test_the_error_of_the_steps_is_of_fourth_order() -> None:
+    design = design_of(oracle.RWG)._replace(v_0=3.0)
+    hows = [control(h, 0.1)._replace(locate_yield=True) for h in (8e-3, 4e-3, 2e-3, 1e-3)]
+    moved = [bk.simulate_design(design, CORRECTED, how, bk.no_record()).moved for how in hows]
+    assert np.allclose(np.log2(np.divide(moved[:-1], moved[1:])), 4.0, atol=0.2)
+
+
+def test_doubtful_designs_alone_are_solved_twice() -> None:
+    """And are reported by the second solution, with its difference from the first as the error."""
+    table = table_of(random_designs(400, seed=171))
+    how = control(0.012, 1.0, LIMIT, stop_at_limit=True, error_estimate=True)._replace(refined=True)
+    first, doubtful = simulate_once(table, CORRECTED, how)
+    second, _ = simulate_once(table, CORRECTED, halved(how))
+    found = simulate_checked(table, CORRECTED, how, None)
+    assert 0 < doubtful.sum() < 40
+    for name in ("status", "theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max", "t_limit", "t_end", "step"):
+        expected = np.where(doubtful, getattr(second, name), getattr(first, name))
+        assert np.array_equal(getattr(found, name), expected, equal_nan=True), name
+    assert np.array_equal(found.x_error[~doubtful], first.x_error[~doubtful], equal_nan=True)
+    apart = np.abs(first.x_v_max - second.x_v_max)[doubtful]
+    assert (found.x_error[doubtful] >= np.maximum(SAFETY_CONFIRMED * apart, LEAST_CONFIRMED_M)).all()
+    assert (found.x_error[doubtful] >= second.x_error[doubtful]).all()
+    assert reported_step(how) == 0.004
+    assert reported_step(halved(how)) == 0.002
+
+
+def test_a_second_solution_that_cannot_be_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then a coarser one gives the error, and the first is reported."""
+    table = table_of([design_of(oracle.RWG)])
+    how = control(0.012, 1.0, LIMIT, stop_at_limit=True, error_estimate=True)._replace(refined=True)
+    first, _ = simulate_once(table, CORRECTED, how)
+
+    def failing(table: bk.DesignTable, readings: bk.Readings, how: bk.Control, springs: None) -> object:
+        out, _ = simulate_once(table, readings, how, springs)
+        if how.h < 0.012:
+            for column in out[1:]:
+                column[:] = np.nan
+        return out, np.ones(1, dtype=bool)
+
+    monkeypatch.setattr("boulder_kernels.table.simulate_once", failing)
+    found = simulate_checked(table, CORRECTED, how, None)
+    assert found.theta_max == first.theta_max
+    assert found.step == 0.004
+    assert 0.0 < found.x_error < 1e-3
+
+
+def test_where_all_designs_are_solved_twice() -> None:
+    how = control(0.012, 1.0, LIMIT, error_estimate=True)
+    assert not is_paired(CORRECTED, how, layered=False)
+    assert is_paired(CORRECTED, how, layered=True)
+    assert not is_paired(CORRECTED._replace(inertia_box=False), how, layered=False)
+    assert is_paired(CORRECTED._replace(restoring_gravity=False), how, layered=False)
+    assert is_paired(CORRECTED._replace(separation_released=False), how, layered=False)
+    for changed in ({"elements": 50}, {"unloading": bk.PLASTIC}, {"paired": True}, {"last_resort": True}):
+        assert is_paired(CORRECTED, how._replace(**changed), layered=False)
+
+
+def test_the_time_of_an_error() -> None:
+    assert error_time(0.012, False) == pytest.approx(0.1)
+    assert error_time(0.004, False) == pytest.approx(YIELD_PASSED / 0.004)
+    assert error_time(0.004, True) == YIELD_LOCATED
+    c = bk.constants_of(DESIGN, CORRECTED, 0)
+    assert error_arm(c) == max(c.d, c.c_y)
