@@ -172,7 +172,7 @@ def throughput(sizes: tuple[int, ...], folder: Path) -> Table:
         "sweep",
         "Whole sweeps, process start to finished table",
         f"{machine()}; {versions('numba', 'numpy', 'pyarrow', 'joblib')}; `sweep run --jobs 2`, corrected readings, "
-        "warm cache of compiled kernels; balanced: an error estimate on every row, fast: none",
+        "warm cache of compiled kernels; errors of the rows confirmed by balanced, not by fast",
         ["designs", "accuracy", "wall time", "designs/s", "CPU time per design", "not in kernels", "peak memory"],
     )
     for accuracy in ("balanced", "fast"):
@@ -191,7 +191,7 @@ def throughput(sizes: tuple[int, ...], folder: Path) -> Table:
             )
     table.notes = [
         "The grid includes designs that the truck passes over; they cost nothing in the kernels.",
-        "All figures include the start-up, about a second of imports and loading.",
+        "All figures include the start-up, half a second of imports and loading.",
     ]
     return table
 

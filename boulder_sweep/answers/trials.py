@@ -125,7 +125,8 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
     accuracy = accuracy_of(sweep)
     final = dataclasses.replace(evaluation_of(sweep, accuracy, proved=False), least_margin=least_margin)
     coarse = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False), proved=False)
-    coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin)
+    searched = coarse.limits._replace(guarded=False)
+    coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin, limits=searched)
     if compared and not plain(proof_is_possible)(final.readings):
         final, coarse = (
             dataclasses.replace(each, control=each.control._replace(longest_horizon=0.0)) for each in (final, coarse)

@@ -100,6 +100,8 @@ class Limits(NamedTuple):
     """Rotation beyond which a row is flagged [rad]."""
     proved: bool = True
     """Whether a pass must be proved also where the readings allow no proof; without, such rows pass and are flagged."""
+    guarded: bool = True
+    """Whether a row nearer to a limit than its error is undecided; not in a search whose results are judged again."""
 
     @property
     def penetration(self) -> float:
@@ -183,6 +185,9 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     sizes = np.stack([table.L, table.H, table.d, table.e_bumper, designs.bed_offset])
     rulings = np.empty((len(RULINGS), len(status)))
     known = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1 : len(OutcomeTable._fields)]))
+    if not limits.guarded:
+        unknown = np.full(len(status), np.nan)
+        known = known._replace(theta_error=unknown, x_error=unknown)
     held = VerdictLimits(limits.rotation, limits.penetration, limits.min_overlap, limits.proved)
     write_rulings(known, sizes, held, rulings)
     rule, overlap, penetration, margin = rulings[0].astype(np.intp), *rulings[1:]

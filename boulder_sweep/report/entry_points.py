@@ -28,10 +28,10 @@ from boulder_kernels.design import design_in
 from boulder_kernels.embedded import step_errors
 from boulder_kernels.impact import STEP_RATIO
 from boulder_kernels.layered import SoilLayers
-from boulder_kernels.outcomes import DOUBTFUL, STEP, THETA_MAX, write_outcome
+from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
 from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
-from boulder_kernels.table import SAFETY, SAFETY_PRINTED, confirm_error, estimate_error
+from boulder_kernels.table import SAFETY, SAFETY_CONFIRMED, SAFETY_PRINTED, confirm_error, estimate_error
 from boulder_kernels.verdict import VerdictLimits, write_rulings
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
@@ -42,8 +42,8 @@ SETTINGS = (*Readings._fields, *Control._fields)
 SETTINGS_COUNT = len(SETTINGS)
 PAIRED_AT = SETTINGS.index("paired")
 CHECKED, PAIRED, ONCE = range(3)
-"""What the setting ``paired`` may be in the page, where errors are estimated: doubtful designs have two solutions, or
-all have, or none has."""
+"""What the setting ``paired`` may be in the page, where errors are estimated: two solutions where they are needed, of
+all designs, or of none."""
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
 LIMITS = VerdictLimits._fields
@@ -119,8 +119,8 @@ def solve(
     readings: Readings,
     control: Control,
     record: Record,
-) -> bool:
-    """Simulate one design, write its outcome with the error of its steps, and return whether it is doubtful."""
+) -> int:
+    """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
     design, spring = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
     if layers.shape[1] == 0:
         outcome = simulate(Problem(design, None, spring), readings, control, record)
@@ -128,9 +128,9 @@ def solve(
         outcome = simulate(Problem(design, SoilProfile(layers[row], soil, None), spring), readings, control, record)
     out[:, row] = np.nan
     write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-    doubtful = out[DOUBTFUL, row] > 0.0
+    second = int(out[SECOND, row])
     out[STEP, row] = control.h / STEP_RATIO if control.refined else control.h
-    return doubtful
+    return second
 
 
 @array_kernel
@@ -167,20 +167,23 @@ def outcomes(
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     for row in range(n):
-        doubtful = solve(finer, row, designs, layers, soil, readings, control_from(s, estimated), record)
+        second = solve(finer, row, designs, layers, soil, readings, control_from(s, estimated), record)
         if not estimated or way == ONCE:
             continue
-        if way == CHECKED:
-            if not doubtful:
-                continue
+        if way == CHECKED and second == NONE_NEEDED:
+            continue
+        if way == CHECKED and second == FINER:
             solve(coarser, row, designs, layers, soil, readings, halved_control_from(s), record)
             if not np.isnan(coarser[THETA_MAX, row]):
-                confirm_error(fine, coarse, table, row)
+                confirm_error(fine, coarse, table, SAFETY_CONFIRMED, row)
                 for column in range(11):
                     finer[column, row] = coarser[column, row]
                 continue
         solve(coarser, row, designs, layers, soil, readings, control_from(s, False), record)
-        estimate_error(coarse, fine, table, safety, row)
+        if way == CHECKED and second == COARSER:
+            confirm_error(coarse, fine, table, safety, row)
+        else:
+            estimate_error(coarse, fine, table, safety, row)
         # The status of a simulation that continues beyond the limit does not say that it reached it.
         if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
             fine.theta_error[row] = fine.x_error[row] = np.inf

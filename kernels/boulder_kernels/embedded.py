@@ -6,15 +6,18 @@ the time for which it acts, `error_time`. This time is not derived but measured,
 error of 99.9 % of random designs, usual ones and families far from them.
 
 The sum cannot see that a motion took a wrong branch, as that of a rocking boulder may, or what the location of an event
-adds. Designs to which this may happen are *doubtful* and are solved a second time by half the step. The numbers below
-were chosen with one set of random designs and tested with others, see `docs/studies/wild.py`.
+adds. Designs to which this may happen are *doubtful* and are solved a second time by half the step. Where it may hardly
+happen but a verdict depends on it, near the limit, a coarser solution confirms the first. Beyond the horizon the
+difference of the two is the error: the sum would grow without end, and further solutions are compared there anyway,
+see `boulder_sweep.judge.refinement`. The numbers below were chosen with one set of random designs and tested with
+others, see `docs/studies/wild.py`.
 """
 
 from __future__ import annotations
 
 from ._jit import kernel
 from .design import Design
-from .outcomes import LEAST_ROTATION, Outcome, Status, StepErrors
+from .outcomes import COARSER, FINER, LEAST_ROTATION, NONE_NEEDED, PAIR, Outcome, Status, StepErrors
 
 YIELD_PASSED = 1.2e-3
 """Error time, times the length of the steps, where steps pass the instant at which the soil yields [s^2]."""
@@ -38,7 +41,8 @@ CHATTERING_THETA, CHATTERING_X, CHATTERING_T = 0.15, 0.05, 0.01
 """Least error of a boulder that may chatter, as a fraction of its rotation, its displacement, and of the way of the
 truck until the limit is reached."""
 NEAR_LIMIT, MANY_ERRORS = 0.017453292519943295, 100.0
-"""Distance from the limit of rotation below which a design is doubtful: one degree [rad], and so many errors."""
+"""Distance from the limit of rotation below which a design is confirmed: one degree [rad], by a coarser solution, and
+so many errors, by a finer one."""
 GRAZING = 0.01
 """Speed at an arm as long as the boulder is deep, over that of the impact, below which the limit is just reached."""
 
@@ -85,12 +89,18 @@ def step_errors(o: Outcome, design: Design, theta_limit: float, horizon: float) 
             x = max(x, CHATTERING_T * design.v_0 * t_end)
         else:
             theta = max(theta, CHATTERING_THETA * m.theta)
-    doubtful = o.rotation_changes > ROCKING or t_end > horizon
+    doubtful = o.rotation_changes > ROCKING
     doubtful = doubtful or ((stopped or long) and depth < VERY_SHALLOW) or (long and depth < SHALLOW)
     doubtful = doubtful or (pushing < VERY_SLOW and (changed or not stopped))
+    room = theta_limit - m.theta
     if stopped:
         doubtful = doubtful or abs(o.omega_b) * arm < GRAZING * design.v_0
     else:
-        room = theta_limit - m.theta
-        doubtful = doubtful or room < max(NEAR_LIMIT, MANY_ERRORS * theta)
-    return StepErrors(theta, x, doubtful)
+        doubtful = doubtful or room < MANY_ERRORS * theta
+    if t_end > horizon:
+        second = PAIR
+    elif doubtful:
+        second = FINER
+    else:
+        second = COARSER if not stopped and room < NEAR_LIMIT else NONE_NEEDED
+    return StepErrors(theta, x, second)

@@ -110,6 +110,11 @@ LEAST_ROTATION = 1e-4
 """Rotation that an error of the truck may stand for even where the boulder turns less [rad]."""
 
 
+NONE_NEEDED, FINER, COARSER, PAIR = range(4)
+"""Second solutions of a design: none; by half the step, which is reported; by three times the step, which confirms that
+the error is no larger; and the same where the error is that of the two solutions alone."""
+
+
 class StepErrors(NamedTuple):
     """What is known of the error of one solution."""
 
@@ -117,8 +122,8 @@ class StepErrors(NamedTuple):
     """Estimated error of the largest rotation [rad]; 0 where that is the limit."""
     x: float
     """The same of the displacements; at the limit, of the truck's way until the limit is reached, too [m]."""
-    doubtful: bool
-    """Whether a second solution should confirm it."""
+    second: int
+    """Which second solution is needed, `NONE_NEEDED` to `PAIR`."""
 
 
 class OutcomeTable(NamedTuple):
@@ -156,8 +161,8 @@ be wrong, by the numerical error and by the energy that is left at the end of th
 OUTCOME_FIELDS = OutcomeTable._fields
 ROWS = len(OUTCOME_FIELDS)
 STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END, THETA_ERROR, X_ERROR, STEP = range(ROWS)
-DOUBTFUL = STEP
-"""Row of the array of `empty_outcomes` in place of the step: 1.0 where a second solution should confirm the first."""
+SECOND = STEP
+"""Row of the array of `empty_outcomes` in place of the step, see `write_outcome`."""
 
 
 def empty_outcomes(n: int) -> np.ndarray:
@@ -178,7 +183,7 @@ def outcome_table(out: np.ndarray, step: float) -> OutcomeTable:
 def write_outcome(out: np.ndarray, row: int, o: Outcome, errors: StepErrors) -> None:
     """Write one outcome into an array whose rows are the columns of an `OutcomeTable`, but for its step.
 
-    In place of the step it has 1.0 where the outcome is doubtful, see `boulder_kernels.embedded`.
+    In place of the step it says which second solution is needed, see `StepErrors`.
     """
     out[STATUS, row] = o.status
     out[THETA_MAX, row] = o.maxima.theta
@@ -190,7 +195,7 @@ def write_outcome(out: np.ndarray, row: int, o: Outcome, errors: StepErrors) -> 
     out[T_END, row] = o.t_end
     out[THETA_ERROR, row] = errors.theta
     out[X_ERROR, row] = errors.x
-    out[DOUBTFUL, row] = 1.0 if errors.doubtful else 0.0
+    out[SECOND, row] = errors.second
 
 
 @kernel

@@ -25,8 +25,12 @@ from .lanes import simulate_lanes
 from .last_resort import simulate_last_resort
 from .layered import LayeredTable
 from .outcomes import (
-    DOUBTFUL,
+    COARSER,
+    FINER,
     LEAST_ROTATION,
+    NONE_NEEDED,
+    PAIR,
+    SECOND,
     SIMULATED,
     Outcome,
     OutcomesAtRest,
@@ -51,7 +55,7 @@ solution, and both then miss them alike."""
 SAFETY_CONFIRMED = 4.0
 """The same where a doubtful design is solved again by half the step."""
 LEAST_CONFIRMED_RAD, LEAST_CONFIRMED_M = 1e-8, 2e-7
-"""No error of a doubtful design is said to be less."""
+"""Least error of a design that has a second solution."""
 
 
 @array_kernel
@@ -216,12 +220,12 @@ def simulate_once(
     -------
     OutcomeTable
         With the errors of the steps of one solution.
-    ndarray of bool, shape (n,)
-        Which of them are doubtful, see `boulder_kernels.embedded`.
+    ndarray, shape (n,)
+        Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
     if control.unloading != ELASTIC:
         outcomes: OutcomeTable = simulate_plastic_rows(table, readings, control, springs)
-        return outcomes, np.zeros(len(table.L), dtype=bool)
+        return outcomes, np.full(len(table.L), NONE_NEEDED)
     designs = np.stack(table[: len(DesignTable._fields)])
     stacked = None if springs is None else np.stack(springs)
     if isinstance(table, LayeredTable):
@@ -234,7 +238,7 @@ def simulate_once(
         out = simulate_lanes(designs, readings, control)
     else:
         out = simulate_rows(designs, None, None, stacked, readings, control)
-    return outcome_table(out, reported_step(control)), out[DOUBTFUL] > 0.0
+    return outcome_table(out, reported_step(control)), out[SECOND]
 
 
 @kernel
@@ -288,29 +292,29 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
 
 
 @kernel
-def confirm_error(first: OutcomeTable, second: OutcomeTable, table: DesignTable, row: int) -> None:
-    """Estimate the numerical error of one doubtful design; see `confirm_errors`."""
-    if np.isnan(second.theta_max[row]):
+def confirm_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
+    """Estimate the numerical error of one design that needs two solutions; see `confirm_errors`."""
+    if np.isnan(fine.theta_max[row]):
         return
-    theta, x = second.theta_error[row], second.x_error[row]
-    estimate_error(first, second, table, SAFETY_CONFIRMED, row)
-    second.theta_error[row] = max(second.theta_error[row], theta, LEAST_CONFIRMED_RAD)
-    second.x_error[row] = max(second.x_error[row], x, LEAST_CONFIRMED_M)
+    theta, x = fine.theta_error[row], fine.x_error[row]
+    estimate_error(coarse, fine, table, safety, row)
+    fine.theta_error[row] = max(fine.theta_error[row], theta, LEAST_CONFIRMED_RAD)
+    fine.x_error[row] = max(fine.x_error[row], x, LEAST_CONFIRMED_M)
 
 
 @kernel
-def confirm_errors(first: OutcomeTable, second: OutcomeTable, table: DesignTable) -> None:
-    """Estimate the numerical errors of doubtful designs from their second solutions.
+def confirm_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float) -> None:
+    """Estimate the numerical errors of designs that need two solutions: that of the steps, or the difference if larger.
 
     Parameters
     ----------
-    first, second
-        Solutions by a step and by half of it, with the errors of their steps; the estimates go into the second.
-    table
-        The designs.
+    coarse, fine
+        The solutions, with the errors of their steps; the estimates go into the finer.
+    table, safety
+        As of `estimate_errors`.
     """
-    for row in range(second.status.size):
-        confirm_error(first, second, table, row)
+    for row in range(fine.status.size):
+        confirm_error(coarse, fine, table, safety, row)
 
 
 def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
@@ -350,33 +354,35 @@ def some_rows(table: Any, rows: np.ndarray) -> Any:
 def simulate_checked(
     table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None
 ) -> OutcomeTable:
-    """Simulate every design once and the doubtful ones a second time.
+    """Simulate every design once, and a second time those whose error needs to be confirmed.
 
     Parameters
     ----------
     table, readings, springs
         As of `simulate_table`.
     control
-        How they are simulated first. A doubtful design that cannot be simulated by the finer steps of `halved` is
-        simulated by the coarser ones of `is_paired` instead, and reported by its first solution.
+        How they are simulated first. A design that cannot be simulated by the finer steps of `halved` has a coarser
+        second solution instead.
     """
-    out, doubtful = simulate_once(table, readings, control, springs)
-    for again, finer in ((halved(control), True), (control._replace(refined=False), False)):
-        rows = np.flatnonzero(doubtful)
+    out, second = simulate_once(table, readings, control, springs)
+    coarser = control._replace(refined=False)
+    for kind, how in ((FINER, halved(control)), (COARSER, coarser), (PAIR, coarser)):
+        rows = np.flatnonzero(second == kind)
         if not len(rows):
-            break
+            continue
         some, theirs = some_rows(table, rows), None if springs is None else some_rows(springs, rows)
         designs = DesignTable(*some[: len(DesignTable._fields)])
-        first, (second, _) = some_rows(out, rows), simulate_once(some, readings, again, theirs)
-        if finer:
-            confirm_errors(first, second, designs)
+        first, (other, _) = some_rows(out, rows), simulate_once(some, readings, how, theirs)
+        if kind == FINER:
+            confirm_errors(first, other, designs, SAFETY_CONFIRMED)
+            failed = np.isnan(other.theta_max)
+            second[rows[failed]] = PAIR
+            rows, better = rows[~failed], some_rows(other, ~failed)
         else:
-            estimate_errors(second, first, designs, SAFETY)
-            second = first
-        there = ~np.isnan(second.theta_max)
-        doubtful[rows[there]] = False
-        for values, new in zip(out, second, strict=True):
-            values[rows[there]] = new[there]
+            (confirm_errors if kind == COARSER else estimate_errors)(other, first, designs, SAFETY)
+            better = first
+        for values, new in zip(out, better, strict=True):
+            values[rows] = new
     return out
 
 
@@ -393,9 +399,9 @@ def simulate_table(
         Which formulas are read as printed.
     control
         Step, horizon, limit, soil. Every outcome has the error of its steps, see `boulder_kernels.embedded`. With
-        ``error_estimate`` designs are simulated by a third of the step, and doubtful ones again by half of that, with
-        whose result they are reported. Where `is_paired` says so, every design is simulated with the step and with a
-        third of it instead, and the finer result is reported.
+        ``error_estimate`` designs are simulated by a third of the step, and some a second time: by half of that, and
+        are reported by it, or by the step itself. Where `is_paired` says so, every design is simulated with the step
+        and with a third of it, and the finer result is reported.
     springs
         Second springs of the vehicles, where they have any; such designs are simulated one by one.
 
