@@ -194,6 +194,7 @@ class Simulator {
     /** @type {Record<string, number>[]} */
     const finer = this.data.finer;
     const steps = finer.find((one) => this.step(one) === decided.step_s) ?? {};
+    /** @type {Record<string, number>} */
     const beyond = { ...steps, stop_at_limit: 0 };
     const halved = decided.step_s === exact(this.data.step_s / 2);
     if (halved) Object.assign(beyond, { h: this.data.settings[this.at("h")] / 2, locate_yield: 1 });
