@@ -47,13 +47,13 @@ _ATTEMPT = (
     '"""Advance every lane by its step, in one vectorised loop."""\n    align_stack()\n    for lane in range(LANES):\n'
 )
 _PROOF = "def barrier_energy(m: Maxima, c: Constants) -> float:\n"
-_ONCE = "    out = simulate_once(table, readings, control, springs)\n"
+_ONCE = "        out = simulate_lanes(designs, readings, control)\n"
 _SIMULATED = "        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)\n"
 _TRIES = '        reason = ""\n        for _ in range(tries):\n'
 _COMMITTED = "committer.start()\n"
 _STAGED = "    storage.put(staged_name(staged.name, token, staged.part.sha256), content)\n"
 _STEP_TWICE = (
-    "        y_end, k_end = step(y_end, k_end, "
+    "        y_end, k_end, _ = step(y_end, k_end, "
     "0.0 * field(ws, STEP, lane), load(ws, SWITCHES, lane), load(ws, CONSTANTS, lane))\n"
 )
 _DESIGN_TWICE = Sabotage("kernels/boulder_kernels/table.py", _ONCE, 2 * _ONCE, ("time",), trials=10)
