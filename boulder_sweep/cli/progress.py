@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
 COMPILED = {
-    "table": ("lanes.run_lanes", "", 15.0),
+    "table": ("lanes.run_lanes", "f81,boulder_kernels.lanes:Queue", 15.0),
     "design": ("impact.simulate", "", 20.0),
     "elements-table": ("table.run_rows", "f82,n,n,n", 20.0),
     "springs-table": ("table.run_rows", "f82,n,n,f82", 20.0),
     "springs-design": ("impact.simulate", "SecondSpring", 20.0),
-    "layers-table": ("table.run_rows", "f82,f83", 30.0),
+    "layers-table": ("lanes.run_lanes", "LayeredLanes", 20.0),
     "layers-design": ("impact.simulate", "SoilProfile", 30.0),
     "plastic-table": ("impact.simulate_motion", "Memory", 30.0),
     "plastic-design": ("impact.simulate_motion", "Memory", 30.0),

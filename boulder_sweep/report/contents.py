@@ -13,7 +13,7 @@ import numpy as np
 from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
-from boulder_kernels.layered import PRESSURE_SLOPE, SoilLayers
+from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES, VERDICTS
 from boulder_sweep.columns import REASONS as VERDICT_REASONS
@@ -172,7 +172,7 @@ def _layout() -> dict[str, Any]:
         "sizes": ["bed_offset_m" if name == "bed_offset" else SOURCES[name] for name in verdicts.SIZES],
         "rulings": verdicts.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
-        "layer_room": len(SoilLayers._fields),
+        "layer_room": entry_points.LAYER_ROOM,
         "columns": {**SOURCES, **dict(zip(SecondSpring._fields, OPTIONAL_COLUMNS, strict=True))},
     }
 

@@ -27,7 +27,7 @@ from boulder_kernels._jit import array_kernel, inlined, when_compiling
 from boulder_kernels.design import design_in
 from boulder_kernels.embedded import step_errors
 from boulder_kernels.impact import STEP_RATIO
-from boulder_kernels.layered import SoilLayers
+from boulder_kernels.layered import SoilLayers, SoilSums
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
 from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
@@ -103,10 +103,14 @@ def outcomes_from(t: np.ndarray) -> OutcomeTable:
     return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9], t[10])
 
 
+LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
+"""Numbers for each layer of the soil of a design: enough for the layers, and once for their sums."""
+
+
 @inlined
-def layers_from(t: np.ndarray) -> SoilLayers:
-    """Return the rows of an array as the layers of one design."""
-    return SoilLayers(t[0], t[1], t[2], t[3], t[4])
+def layers_from(t: np.ndarray, sums: np.ndarray) -> SoilLayers:
+    """Return the rows of an array, and the numbers of another, as the layers of one design."""
+    return SoilLayers(t[0], t[1], t[2], t[3], t[4], t[5], sums)
 
 
 @array_kernel
@@ -150,7 +154,7 @@ def outcomes(
     m
         Number of layers; 0 for a uniform soil.
     soil_at
-        Room for the layers of one design, shape (5, m).
+        Room for the layers of one design, shape (LAYER_ROOM, m).
     settings_at
         Settings, shape (len(SETTINGS),).
     fine_at
@@ -161,7 +165,10 @@ def outcomes(
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, estimated, way = readings_from(s), s[9] > 0.0, int(s[PAIRED_AT])
     designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (11, n)), carray(coarse_at, (11, n))
-    layers, soil = carray(layers_at, (n, m, 6)), layers_from(carray(soil_at, (5, m)))
+    layers, soil = (
+        carray(layers_at, (n, m, 6)),
+        layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]),
+    )
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
@@ -297,7 +304,10 @@ def history(
     record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
     out[:] = np.nan
     record.states[:] = np.nan
-    layers, soil = carray(layers_at, (1, m, 6))[0], layers_from(carray(soil_at, (5, m)))
+    layers, soil = (
+        carray(layers_at, (1, m, 6))[0],
+        layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]),
+    )
     centre = carray(centre_at, (2,))
     if m == 0:
         simulate(Problem(design, None, second), readings, control, record)

@@ -38,7 +38,7 @@ class Native(NamedTuple):
     call: Any
     """The function, of ctypes."""
     returns: Any
-    """What comes back: one of the letters above, or the name of a record and what its fields are."""
+    """What comes back: a letter of `boulder_kernels._arguments`, or the name of a record and what its fields are."""
     numbers: int
     """How many numbers that is."""
     library: Any

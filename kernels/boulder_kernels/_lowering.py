@@ -16,13 +16,35 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np import arrayobj
 
-from .design import Design, design_in
+from .design import Constants, Design, design_in
 from .flat import WIDTH, field, partial_sums, put
-from .workspace import KNOWN, LANES, RECORDS, align_stack, copy_lane, load, offsets_of, store
+from .layered import FewLayers, GivenLayer, Layer, LayeredConstants, SoilSums
+from .workspace import (
+    CONSTANTS,
+    KNOWN,
+    LANES,
+    RECORDS,
+    SOIL,
+    align_stack,
+    copy_lane,
+    given_place,
+    load,
+    load_given,
+    offsets_of,
+    part,
+    soil_size,
+    store,
+    store_given,
+)
 
 LINE = 64
 """Bytes of a line of the fast memory."""
 _NOT_REAL = {int: types.int64, bool: types.boolean}
+
+
+def _array(kind: Any) -> Any:
+    """Type of the array that a workspace is, or begins with."""
+    return kind if isinstance(kind, types.Array) else kind[0]
 
 
 def _pointer(context: Any, builder: Any, kinds: Any, values: Any, offset: int = 0) -> Any:
@@ -30,7 +52,8 @@ def _pointer(context: Any, builder: Any, kinds: Any, values: Any, offset: int = 
     first = context.get_constant(types.intp, offset)
     for kind, value in zip(kinds[1:], values[1:], strict=True):
         first = builder.add(first, context.cast(builder, value, kind, types.intp))
-    return builder.gep(context.make_array(kinds[0])(context, builder, values[0]).data, [first], inbounds=True)
+    array = values[0] if isinstance(kinds[0], types.Array) else builder.extract_value(values[0], 0)
+    return builder.gep(context.make_array(_array(kinds[0]))(context, builder, array).data, [first], inbounds=True)
 
 
 @type_callable(align_stack)
@@ -47,10 +70,10 @@ def _lower_align_stack(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @type_callable(field)
 def _type_field(context: Any) -> Callable[..., Any]:
-    return lambda ws, place, lane: ws.dtype
+    return lambda ws, place, lane: _array(ws).dtype
 
 
-@lower_builtin(field, types.Array, types.Any, types.Any)
+@lower_builtin(field, types.Any, types.Any, types.Any)
 def _lower_field(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.load(_pointer(context, builder, sig.args[:3], args[:3]))
 
@@ -60,9 +83,9 @@ def _type_put(context: Any) -> Callable[..., Any]:
     return lambda ws, place, lane, value: types.void
 
 
-@lower_builtin(put, types.Array, types.Any, types.Any, types.Any)
+@lower_builtin(put, types.Any, types.Any, types.Any, types.Any)
 def _lower_put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    value = context.cast(builder, args[3], sig.args[3], sig.args[0].dtype)
+    value = context.cast(builder, args[3], sig.args[3], _array(sig.args[0]).dtype)
     builder.store(value, _pointer(context, builder, sig.args[:3], args[:3]))
     return context.get_dummy_value()
 
@@ -84,31 +107,95 @@ def _lower_partial_sums(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return array._getvalue()
 
 
+@type_callable(part)
+def _type_part(context: Any) -> Callable[..., Any]:
+    return lambda ws, start: ws
+
+
+@lower_builtin(part, types.Any, types.Any)
+def _lower_part(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Move the beginning of the array; its length is not asked for, and nothing keeps the array."""
+    whole = args[0] if isinstance(sig.args[0], types.Array) else builder.extract_value(args[0], 0)
+    moved = context.make_array(_array(sig.args[0]))(context, builder, whole)
+    moved.data = _pointer(context, builder, sig.args, args)
+    value = moved._getvalue()
+    return value if isinstance(sig.args[0], types.Array) else builder.insert_value(args[0], value, 0)
+
+
+REAL = types.float64
+
+
+def _record(record: Any) -> Any:
+    """Type of a record of numbers that are kept, or known."""
+    return types.BaseTuple.from_types([_NOT_REAL.get(kind, REAL) for kind in get_type_hints(record).values()], record)
+
+
+def _soil(layers: int) -> Any:
+    """Type of the soil of a lane."""
+    return types.NamedTuple([_record(SoilSums), types.UniTuple(_record(Layer), layers)], FewLayers)
+
+
 @type_callable(load)
 def _type_load(context: Any) -> Callable[..., Any]:
     def result(ws: Any, place: Any, lane: Any) -> Any:
         """Return the type of the record, or None where the place is not yet known as a constant."""
         if not isinstance(place, types.IntegerLiteral):
             return None
-        record = RECORDS[place.literal_value]
-        kinds = [_NOT_REAL.get(kind, ws.dtype) for kind in get_type_hints(record).values()]
-        return types.BaseTuple.from_types(kinds, record)
+        kind = _record(RECORDS[place.literal_value])
+        if place.literal_value == CONSTANTS and not isinstance(ws, types.Array):
+            return types.NamedTuple([*kind.types, _soil(len(ws[1]))], LayeredConstants)
+        return kind
 
     return result
 
 
-@lower_builtin(load, types.Array, types.IntegerLiteral, types.Any)
+def _load_numbers(context: Any, builder: Any, sig: Any, args: Any, kind: Any, place: int) -> tuple[Any, int]:
+    """Load numbers one after another into records within records; return it and the place behind."""
+    if kind == REAL:
+        kinds, values = (sig.args[0], sig.args[-1]), (args[0], args[-1])
+        return builder.load(_pointer(context, builder, kinds, values, place)), place + LANES
+    fields = []
+    for each in kind.types:
+        value, place = _load_numbers(context, builder, sig, args, each, place)
+        fields.append(value)
+    return context.make_tuple(builder, kind, fields), place
+
+
+def _store_numbers(context: Any, builder: Any, ws: Any, lane: Any, record: Any, place: int) -> int:
+    """Store the numbers of records within records one after another, all as (type, value); return the place behind."""
+    kind, value = record
+    if kind == REAL:
+        builder.store(value, _pointer(context, builder, (ws[0], lane[0]), (ws[1], lane[1]), place))
+        return place + LANES
+    for i, each in enumerate(kind.types):
+        place = _store_numbers(context, builder, ws, lane, (each, builder.extract_value(value, i)), place)
+    return place
+
+
+@lower_builtin(load, types.Any, types.IntegerLiteral, types.Any)
 def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    record = sig.return_type.instance_class
+    record = RECORDS[sig.args[1].literal_value]
     offsets = offsets_of(record)
     values = []
-    for name, kind in zip(record._fields, sig.return_type.types, strict=True):
+    for name, kind in zip(record._fields, sig.return_type.types, strict=False):
         if name in offsets:
             number = builder.load(_pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
-            values.append(context.cast(builder, number, sig.args[0].dtype, kind))
+            values.append(context.cast(builder, number, REAL, kind))
         else:
             values.append(context.get_constant(kind, KNOWN[name]))
+    if len(values) < len(sig.return_type):
+        values.append(_load_numbers(context, builder, sig, args, sig.return_type.types[-1], SOIL)[0])
     return context.make_tuple(builder, sig.return_type, values)
+
+
+@type_callable(load_given)
+def _type_load_given(context: Any) -> Callable[..., Any]:
+    return lambda ws, lane: types.UniTuple(_record(GivenLayer), len(ws[1]))
+
+
+@lower_builtin(load_given, types.Any, types.Any)
+def _lower_load_given(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _load_numbers(context, builder, sig, args, sig.return_type, given_place(len(sig.return_type)))[0]
 
 
 @type_callable(store)
@@ -116,14 +203,36 @@ def _type_store(context: Any) -> Callable[..., Any]:
     return lambda ws, place, lane, record: types.void
 
 
-@lower_builtin(store, types.Array, types.Any, types.Any, types.BaseNamedTuple)
+@lower_builtin(store, types.Any, types.Any, types.Any, types.BaseNamedTuple)
 def _lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     record = sig.args[3]
-    offsets = offsets_of(record.instance_class)
+    layered = record.instance_class is LayeredConstants
+    offsets = offsets_of(Constants if layered else record.instance_class)
     for i, (name, kind) in enumerate(zip(record.fields, record.types, strict=True)):
         if name in offsets:
-            value = context.cast(builder, builder.extract_value(args[3], i), kind, sig.args[0].dtype)
+            value = context.cast(builder, builder.extract_value(args[3], i), kind, REAL)
             builder.store(value, _pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
+    if layered:
+        last = len(record.types) - 1
+        soil = record.types[last], builder.extract_value(args[3], last)
+        _store_numbers(context, builder, (sig.args[0], args[0]), (sig.args[2], args[2]), soil, SOIL)
+    return context.get_dummy_value()
+
+
+@type_callable(store_given)
+def _type_store_given(context: Any) -> Callable[..., Any]:
+    return lambda ws, lane, designs, row: types.void
+
+
+@lower_builtin(store_given, types.Any, types.Any, types.Array, types.Any)
+def _lower_store_given(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    if isinstance(sig.args[0], types.Array):
+        return context.get_dummy_value()
+    layers = len(sig.args[0][1])
+    numbers = _rows_of(context, builder, sig.args[2:], args[2:], len(Design._fields), 6 * layers)
+    for i, number in enumerate(numbers):
+        place = given_place(layers) + i * LANES
+        builder.store(number, _pointer(context, builder, sig.args[:2], args[:2], place))
     return context.get_dummy_value()
 
 
@@ -136,9 +245,12 @@ def _type_copy_lane(context: Any) -> Callable[..., Any]:
     return result
 
 
-@lower_builtin(copy_lane, types.Array, types.Any, types.Any, types.IntegerLiteral)
+@lower_builtin(copy_lane, types.Any, types.Any, types.Any, types.IntegerLiteral)
 def _lower_copy_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    for place in range(0, sig.args[3].literal_value, LANES):
+    places = [*range(0, sig.args[3].literal_value, LANES)]
+    if not isinstance(sig.args[0], types.Array):
+        places += range(SOIL, SOIL + soil_size(len(sig.args[0][1])), LANES)
+    for place in places:
         source, target = (
             _pointer(context, builder, (sig.args[0], sig.args[i]), (args[0], args[i]), place) for i in (1, 2)
         )
@@ -147,6 +259,19 @@ def _lower_copy_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 
 # Inside kernels it is one load for every field: an index that need not be checked lets a loop over rows be vectorised.
+
+
+def _rows_of(context: Any, builder: Any, kinds: Any, values: Any, first: int, count: int) -> list[Any]:
+    """Load the numbers of a column of an array from some of its rows."""
+    array = context.make_array(kinds[0])(context, builder, values[0])
+    columns = builder.extract_value(array.shape, 1)
+    place, numbers = context.cast(builder, values[1], kinds[1], types.intp), []
+    if first:
+        place = builder.add(place, builder.mul(columns, context.get_constant(types.intp, first)))
+    for _ in range(count):
+        numbers.append(builder.load(builder.gep(array.data, [place], inbounds=True)))
+        place = builder.add(place, columns)
+    return numbers
 
 
 @type_callable(design_in)
@@ -160,10 +285,5 @@ def _type_design_in(context: Any) -> Callable[..., Any]:
 
 @lower_builtin(design_in, types.Array, types.Any)
 def _lower_design_in(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    designs = context.make_array(sig.args[0])(context, builder, args[0])
-    columns = builder.extract_value(designs.shape, 1)
-    place, numbers = context.cast(builder, args[1], sig.args[1], types.intp), []
-    for _ in Design._fields:
-        numbers.append(builder.load(builder.gep(designs.data, [place], inbounds=True)))
-        place = builder.add(place, columns)
+    numbers = _rows_of(context, builder, sig.args, args, 0, len(Design._fields))
     return context.make_tuple(builder, sig.return_type, numbers)

@@ -104,8 +104,8 @@ def design_at(table: DesignTable, row: int) -> Design:
 
 
 def design_in(designs: np.ndarray, row: int) -> Design:
-    """Return one design of an array whose rows are the columns of a `DesignTable`."""
-    return Design(*designs[:, row])
+    """Return one design of an array whose first rows are the columns of a `DesignTable`."""
+    return Design(*designs[: len(Design._fields), row])
 
 
 class Constants(NamedTuple):

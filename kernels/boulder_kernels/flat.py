@@ -18,6 +18,8 @@ The loop over j is vectorised if its elements are read by `field`, whose index n
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ._jit import inlined
@@ -26,14 +28,14 @@ WIDTH = 32
 """Partial sums: with 8, a vector of the widest registers, the loop would be unrolled and not vectorised."""
 
 
-def field(values: np.ndarray, place: int, offset: int) -> float:
-    """Return the number at a place and an offset from it, neither of them negative."""
-    return values[place + offset]
+def field(values: Any, place: int, offset: int) -> float:
+    """Return the number at a place and an offset from it, neither negative, of an array or a record that begins so."""
+    return float(values[0][place + offset] if isinstance(values, tuple) else values[place + offset])
 
 
-def put(values: np.ndarray, place: int, offset: int, value: float) -> None:
-    """Write the number at a place and an offset from it, neither of them negative."""
-    values[place + offset] = value
+def put(values: Any, place: int, offset: int, value: float) -> None:
+    """Write the number at a place and an offset from it, see `field`."""
+    (values[0] if isinstance(values, tuple) else values)[place + offset] = value
 
 
 def partial_sums() -> np.ndarray:

@@ -7,7 +7,7 @@ does not depend on its neighbours.
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
 from ._jit import inlined, kernel
 from .after_step import RUNNING, Ending, Kept, at_limit, decide, enter_modes, is_finite, kept_up_to, rate_of
@@ -63,18 +63,19 @@ from .workspace import (
     WEIGHTS,
     align_stack,
     load,
+    part,
     store,
 )
 
 
 @inlined
-def motion_within(ws: np.ndarray, lane: int) -> DenseOutput:
+def motion_within(ws: Any, lane: int) -> DenseOutput:
     """Motion within the step of a lane."""
     return DenseOutput(field(ws, STEP, lane), load(ws, BOULDER, lane), load(ws, ROTATION, lane), load(ws, TRUCK, lane))
 
 
 @kernel
-def begin_searches(ws: np.ndarray, locate_yield: bool) -> None:
+def begin_searches(ws: Any, locate_yield: bool) -> None:
     """Work out the motion within every step, and begin the search for its first event."""
     align_stack()
     for lane in range(LANES):
@@ -96,7 +97,7 @@ def begin_searches(ws: np.ndarray, locate_yield: bool) -> None:
 
 
 @kernel
-def search_on(ws: np.ndarray) -> None:
+def search_on(ws: Any) -> None:
     """Narrow the bracket of every search that is open."""
     align_stack()
     for lane in range(LANES):
@@ -112,7 +113,7 @@ def search_on(ws: np.ndarray) -> None:
 
 
 @kernel
-def is_open(ws: np.ndarray, count: int) -> bool:
+def is_open(ws: Any, count: int) -> bool:
     """Whether a search is open in one of the first lanes."""
     searches = 0.0
     for lane in range(count):
@@ -121,7 +122,7 @@ def is_open(ws: np.ndarray, count: int) -> bool:
 
 
 @kernel
-def keep_steps(ws: np.ndarray) -> None:
+def keep_steps(ws: Any) -> None:
     """Keep every step up to its first event; the state kept takes the place of that at the end of the step."""
     align_stack()
     for lane in range(LANES):
@@ -148,7 +149,7 @@ def keep_steps(ws: np.ndarray) -> None:
 
 
 @inlined
-def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, locate_yield: bool) -> int:
+def conclude(ws: Any, lane: int, readings: Readings, ending: Ending, locate_yield: bool) -> int:
     """Decide what follows from the step of a lane, and go over into the modes that follow its event.
 
     Returns
@@ -156,7 +157,7 @@ def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, loca
     int
         RUNNING, or the status with which the simulation ended; time and maxima are left in the lane.
     """
-    mine = ws[lane:]
+    mine = part(ws, lane)
     y = load(mine, END_STATE, 0)
     if not is_finite(y):
         return Status.UNSTABLE.value
@@ -201,7 +202,7 @@ def conclude(ws: np.ndarray, lane: int, readings: Readings, ending: Ending, loca
 
 
 @kernel
-def start_steps(ws: np.ndarray) -> None:
+def start_steps(ws: Any) -> None:
     """Work out what every next step starts with: its acceleration, anew after an event, and its compression."""
     align_stack()
     for lane in range(LANES):
@@ -217,7 +218,7 @@ def start_steps(ws: np.ndarray) -> None:
 
 
 @kernel
-def work_out(ws: np.ndarray, count: int, locate_yield: bool) -> None:
+def work_out(ws: Any, count: int, locate_yield: bool) -> None:
     """Find what is kept of the steps in the first lanes of the group."""
     begin_searches(ws, locate_yield)
     for _ in range(ITERATIONS):

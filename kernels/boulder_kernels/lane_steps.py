@@ -6,11 +6,13 @@ looks at what came out (`take_over_steps`): most steps meet no event and set no 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ._jit import inlined, kernel
 from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
-from .design import Readings, constants_of, design_in, is_computable
+from .design import Readings, design_in, is_computable
 from .dormand_prince import step
 from .embedded import error_time, step_errors
 from .events import AT_END, TOLERANCE, initial_modes, needs_moment
@@ -53,13 +55,16 @@ from .workspace import (
     SWITCHES,
     TIME,
     align_stack,
+    constants_in_lane,
     load,
+    part,
     store,
+    store_given,
 )
 
 
 @kernel
-def attempt_steps(ws: np.ndarray) -> None:
+def attempt_steps(ws: Any) -> None:
     """Advance every lane by its step, in one vectorised loop."""
     align_stack()
     for lane in range(LANES):
@@ -76,7 +81,7 @@ def attempt_steps(ws: np.ndarray) -> None:
 
 
 @kernel
-def take_over_steps(ws: np.ndarray) -> int:
+def take_over_steps(ws: Any) -> int:
     """Accept the steps that meet no event, turn nowhere and do not reach the horizon; mark and count the others."""
     align_stack()
     waiting = 0
@@ -108,10 +113,10 @@ def take_over_steps(ws: np.ndarray) -> int:
 
 @kernel
 def write_lane(
-    ws: np.ndarray, lane: int, status: int, designs: np.ndarray, control: Control, out: np.ndarray, row: int
+    ws: Any, lane: int, status: int, designs: np.ndarray, control: Control, out: np.ndarray, row: int
 ) -> None:
     """Write the outcome of a lane into its row; a design that failed leaves its row NaN."""
-    mine = ws[lane:]
+    mine = part(ws, lane)
     t = field(mine, TIME, 0)
     if status == Status.UNSTABLE.value or status == Status.STEP_BUDGET.value:
         out[STATUS, row] = status
@@ -125,16 +130,17 @@ def write_lane(
 
 @kernel
 def compute_constants(
-    ws: np.ndarray, designs: np.ndarray, first: int, readings: Readings, control: Control, longest: float
+    ws: Any, designs: np.ndarray, first: int, readings: Readings, control: Control, longest: float
 ) -> None:
     """Work out constants and steps of designs, and whether they can be simulated; arguments: see `start_designs`."""
     align_stack()
     # Loads from another array would keep the loop from being vectorised.
     for lane in range(LANES):
         store(ws, DESIGN, lane, design_in(designs, first + lane))
+        store_given(ws, lane, designs, first + lane)
     for lane in range(LANES):
         design = load(ws, DESIGN, lane)
-        c = constants_of(design, readings, 0)
+        c = constants_in_lane(ws, lane, design, readings)
         h_full, status = first_step(control, control.theta_limit, c)
         status = RUNNING if status == ACCEPTED else status
         status = status if is_computable(c) else Status.INVALID.value
@@ -145,7 +151,7 @@ def compute_constants(
 
 
 @kernel
-def stand_still(ws: np.ndarray, readings: Readings, control: Control) -> None:
+def stand_still(ws: Any, readings: Readings, control: Control) -> None:
     """Put every lane at the instant of impact."""
     align_stack()
     for lane in range(LANES):
@@ -169,7 +175,7 @@ def stand_still(ws: np.ndarray, readings: Readings, control: Control) -> None:
 
 
 @kernel
-def take_over_first_steps(ws: np.ndarray, readings: Readings, control: Control) -> None:
+def take_over_first_steps(ws: Any, readings: Readings, control: Control) -> None:
     """Accept the steps that meet no event but that the boulder begins to turn at their end; leave the others undone."""
     align_stack()
     for lane in range(LANES):
@@ -201,7 +207,7 @@ def take_over_first_steps(ws: np.ndarray, readings: Readings, control: Control) 
 
 @inlined
 def start_designs(
-    ws: np.ndarray, designs: np.ndarray, first: int, readings: Readings, control: Control, longest: float
+    ws: Any, designs: np.ndarray, first: int, readings: Readings, control: Control, longest: float
 ) -> None:
     """Put as many designs as there are lanes into a group.
 

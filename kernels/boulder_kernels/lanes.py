@@ -10,17 +10,18 @@ does so.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ._jit import inlined, kernel
 from .after_step import RUNNING
-from .design import Readings
+from .design import Design, Readings
 from .flat import field, put
 from .impact import Control, ending_of
 from .lane_events import conclude, start_steps, work_out
 from .lane_steps import attempt_steps, start_designs, take_over_steps, write_lane
+from .layered import GivenLayer
 from .outcomes import STATUS, Status, empty_outcomes
 from .stability import MOST_STEPS, RETRY
 from .workspace import (
@@ -35,7 +36,9 @@ from .workspace import (
     STEP,
     STEP_FULL,
     WHOLE,
+    LayeredLanes,
     copy_lane,
+    part,
 )
 
 EMPTY = -1
@@ -53,7 +56,7 @@ been worked out there in all, and designs that have been started and wait for a 
 class Queue(NamedTuple):
     """Where the designs are: arrays of whole numbers."""
 
-    rows: np.ndarray
+    rows: Any
     """Row of the design at each place or EMPTY, and in the last place the first row not yet started."""
     ready: np.ndarray
     """Places of designs that may return into a lane."""
@@ -78,9 +81,7 @@ def lane_of(place: int) -> int:
 
 
 @kernel
-def start_more(
-    ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
-) -> None:
+def start_more(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
     """Start the next designs of the table, until there are some that need integration; write those that need none.
 
     Parameters
@@ -92,10 +93,10 @@ def start_more(
     """
     while q.counts[STARTED] == 0 and q.rows[-1] < out.shape[1]:
         first = min(q.rows[-1], designs.shape[1] - LANES)
-        start_designs(ws[STARTS:], designs, first, readings, control, control.h)
+        start_designs(part(ws, STARTS), designs, first, readings, control, control.h)
         for row in range(q.rows[-1], min(first + LANES, out.shape[1])):
             place = PLACES - LANES + row - first
-            status = int(field(ws[STARTS:], STATUS_OF_LANE, row - first))
+            status = int(field(part(ws, STARTS), STATUS_OF_LANE, row - first))
             if status == RUNNING:
                 q.rows[place] = row
                 q.started[q.counts[STARTED]] = place
@@ -106,7 +107,7 @@ def start_more(
 
 
 @inlined
-def let_return(ws: np.ndarray, q: Queue, other: int, place: int) -> None:
+def let_return(ws: Any, q: Queue, other: int, place: int) -> None:
     """Move a design from its place in another group into a lane."""
     copy_lane(ws, lane_of(other), lane_of(place), ATTENTION)
     q.rows[place] = q.rows[other]
@@ -114,7 +115,7 @@ def let_return(ws: np.ndarray, q: Queue, other: int, place: int) -> None:
 
 @inlined
 def next_design(
-    ws: np.ndarray,
+    ws: Any,
     q: Queue,
     place: int,
     designs: np.ndarray,
@@ -138,19 +139,19 @@ def next_design(
 
 @inlined
 def start_again(
-    ws: np.ndarray, lane: int, designs: np.ndarray, row: int, readings: Readings, control: Control, longest: float
+    ws: Any, lane: int, designs: np.ndarray, row: int, readings: Readings, control: Control, longest: float
 ) -> int:
     """Start a design in a lane of the workspace by steps no longer than given [s]; return its status."""
     first = min(row, designs.shape[1] - LANES)
     again = STARTS + EVENT_SIZE
-    start_designs(ws[again:], designs, first, readings, control, longest)
+    start_designs(part(ws, again), designs, first, readings, control, longest)
     copy_lane(ws, again + row - first, lane, ATTENTION)
-    return int(field(ws[again:], STATUS_OF_LANE, row - first))
+    return int(field(part(ws, again), STATUS_OF_LANE, row - first))
 
 
 @inlined
 def hand_over(
-    ws: np.ndarray,
+    ws: Any,
     q: Queue,
     place: int,
     designs: np.ndarray,
@@ -177,7 +178,7 @@ def hand_over(
 
 @kernel
 def handle(
-    ws: np.ndarray,
+    ws: Any,
     q: Queue,
     designs: np.ndarray,
     readings: Readings,
@@ -190,7 +191,7 @@ def handle(
     """
     counts = q.counts
     side, size = counts[SIDE], counts[PENDING]
-    events = ws[EVENTS + side * EVENT_SIZE :]
+    events = part(ws, EVENTS + side * EVENT_SIZE)
     work_out(events, size, control.locate_yield)
     for k in range(size):
         ending = ending_of(control, readings, field(events, STEP_FULL, k))
@@ -218,11 +219,11 @@ def handle(
 
 
 @kernel
-def step_groups(ws: np.ndarray, q: Queue) -> int:
+def step_groups(ws: Any, q: Queue) -> int:
     """Attempt a step in all lanes of all groups, accept those that need no more, and list and count the others."""
     count = 0
     for group in range(GROUPS):
-        lanes = ws[group * SIZE :]
+        lanes = part(ws, group * SIZE)
         attempt_steps(lanes)
         if take_over_steps(lanes) > 0:
             for lane in range(LANES):
@@ -233,7 +234,7 @@ def step_groups(ws: np.ndarray, q: Queue) -> int:
 
 
 @kernel
-def begin(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
+def begin(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
     """Put the first designs into the lanes of an empty workspace; arguments: see `start_more`."""
     for place in range(STEPPED):
         next_design(ws, q, place, designs, readings, control, out)
@@ -245,7 +246,7 @@ def begin(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, con
 
 
 @kernel
-def sweep(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> bool:
+def sweep(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> bool:
     """Step all lanes once; return whether any design is left. Arguments: see `start_more`."""
     for k in range(step_groups(ws, q)):
         hand_over(ws, q, q.waiting[k], designs, readings, control, out)
@@ -257,11 +258,18 @@ def sweep(ws: np.ndarray, q: Queue, designs: np.ndarray, readings: Readings, con
     return q.counts[BUSY] > 0 or q.counts[PENDING] > 0
 
 
-def empty_workspace() -> np.ndarray:
-    """Return the workspace before the first design has been started, its vectors on whole lines of the fast memory."""
-    ws = np.zeros(WHOLE + LANES)
+def empty_workspace(layers: int) -> Any:
+    """Return the workspace before the first design has been started, its vectors on whole lines of the fast memory.
+
+    Parameters
+    ----------
+    layers
+        Number of layers of soil; 0 for uniform soils.
+    """
+    ws = np.zeros((2 if layers else 1) * WHOLE + LANES)
     behind = ws.ctypes.data // ws.itemsize % LANES
-    return ws[LANES - behind :]
+    ws = ws[LANES - behind :]
+    return LayeredLanes(ws, (0,) * layers) if layers else ws
 
 
 def empty_queue() -> Queue:
@@ -283,9 +291,7 @@ def filled_up(designs: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def run_lanes(
-    designs: np.ndarray, readings: Readings, control: Control, ws: np.ndarray, q: Queue, out: np.ndarray
-) -> None:
+def run_lanes(designs: np.ndarray, readings: Readings, control: Control, ws: Any, q: Queue, out: np.ndarray) -> None:
     """Simulate every design of a table; arguments: see `simulate_lanes` and `start_more`."""
     begin(ws, q, designs, readings, control, out)
     while sweep(ws, q, designs, readings, control, out):
@@ -293,12 +299,13 @@ def run_lanes(
 
 
 def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
-    """Simulate every design of a table in lanes, by the closed form of the soil and stopping at the limit.
+    """Simulate every design of a table in lanes, by a closed form of the soil and stopping at the limit.
 
     Parameters
     ----------
     designs
-        Designs, SI, shape (15, n), in the order of `DesignTable`.
+        Designs, SI, shape (15 + 6 M, n): first the fields of `DesignTable`, then those of M layers of soil, one layer
+        after another, see `boulder_kernels.layered`; M must be one of its `COUNTS`, or 0 for uniform soils.
     readings
         Which formulas are read as printed.
     control
@@ -306,11 +313,12 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
 
     Returns
     -------
-    ndarray, shape (10, n)
+    ndarray, shape (11, n)
         Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
     """
     out = empty_outcomes(designs.shape[1])
     if designs.shape[1] == 0:
         return out
-    run_lanes(filled_up(designs), readings, control, empty_workspace(), empty_queue(), out)
+    layers = (len(designs) - len(Design._fields)) // len(GivenLayer._fields)
+    run_lanes(filled_up(designs), readings, control, empty_workspace(layers), empty_queue(), out)
     return out

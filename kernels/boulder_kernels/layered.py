@@ -7,22 +7,25 @@ p_1 is the paper's K_p^2 rho_s g (Eq 27).
 
 A displacement at which all of the soil yields does not exist then. The soil is either N elements with numbers of their
 own, or the layers themselves, for which `boulder_kernels.layered_soil` is exact: arrays beside the constants of the
-design, and `boulder_kernels.soil_laws` chooses by their type.
+design or, in lanes, numbers; `boulder_kernels.soil_laws` chooses by their type.
 """
 
 from __future__ import annotations
 
+import functools
 from collections import namedtuple
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_kernel
+from ._jit import exact_inlined, exact_kernel, function_of
 from .design import (
     Constants,
     Design,
     DesignTable,
     SoilMass,
+    constants_with,
     element_depth,
     element_mass,
     spring_per_depth,
@@ -53,6 +56,30 @@ class SoilElements(NamedTuple):
     """Drag over the velocity squared [kg/m] (Eq 36)."""
 
 
+class SoilSums(NamedTuple):
+    """What is integrated over all layers once for a design; zero before the first."""
+
+    S_1: float
+    S_2: float
+    S_3: float
+    """Integrals of K r^i over r = 0 ... 1, i = 1, 2, 3 [N/m]."""
+    L_1: float
+    L_2: float
+    L_3: float
+    """Sums of K low^(i + 1) over the layers, i = 1, 2, 3 [N/m]."""
+    U_0: float
+    U_1: float
+    """Sums of the integrals of P_0 + P_1 r, and of that times r, from r = 0 to the lower ends of the layers [N]."""
+    Z_0: float
+    Z_1: float
+    Z_2: float
+    Z_3: float
+    """Sums of R (low^i + high^i) over the layers, i = 1 ... 4 [kg/m]."""
+
+
+NO_SUMS = SoilSums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 class SoilLayers(NamedTuple):
     """M layers of soil per ratio r = alpha/d of the depth, each down to its lower boundary; arrays of shape (M,).
 
@@ -63,25 +90,74 @@ class SoilLayers(NamedTuple):
     """Lower boundary as a ratio of the depth, at most 1; 1 in the last layer [-]."""
     K: np.ndarray
     """Spring per ratio of the depth, squared [N/m] (Eqs 24, 25)."""
+    inverse_K: np.ndarray
+    """1/K [m/N]."""
     P_0: np.ndarray
     P_1: np.ndarray
     """Ultimate force per ratio of the depth [N] (Eqs 28, 105)."""
     R: np.ndarray
     """Drag over the velocity squared, per ratio of the depth [kg/m] (Eq 36)."""
+    sums: np.ndarray
+    """The fields of `SoilSums`, shape (12,)."""
+
+
+class Layer(NamedTuple):
+    """One layer of soil, with the fields of `SoilLayers`."""
+
+    low: float
+    """Upper boundary as a ratio of the depth [-]."""
+    to: float
+    K: float
+    inverse_K: float
+    P_0: float
+    P_1: float
+    R: float
+
+
+class FewLayers(NamedTuple):
+    """As many layers as its type says, number by number: the soil of a design in a lane."""
+
+    sums: SoilSums
+    layers: tuple[Layer, ...]
 
 
 _record: Any = namedtuple
 LayeredConstants = _record("LayeredConstants", (*Constants._fields, "soil"))
-"""The fields of `Constants`, and ``soil``, its `SoilElements` or `SoilLayers`. Of the soil as a whole they hold
-bounds: K_soil and R_soil are those of the stiffest and of the heaviest element all the way down, x_yield the last
+"""The fields of `Constants`, and ``soil``, its `SoilElements`, `SoilLayers` or `FewLayers`. Of the soil as a whole they
+hold bounds: K_soil and R_soil are those of the stiffest and of the heaviest element all the way down, x_yield the last
 displacement at which an element reaches its ultimate resistance."""
 LayeredTable = _record("LayeredTable", (*DesignTable._fields, "layers"))
 """Many designs in soils of layers: the fields of `DesignTable`, and ``layers`` of shape (n, M, 6)."""
 
 
-@exact_kernel
-def in_layer(design: Design, layer: np.ndarray) -> Design:
-    """Return a design in the soil of one layer, given as a row of its layers; K_epsilon is that of the design."""
+class Bounds(NamedTuple):
+    """Number of elements, and bounds of the soil as a whole, as of `LayeredConstants`."""
+
+    elements: int
+    K_soil: float
+    R_soil: float
+    x_yield: float
+
+
+class Lumped(NamedTuple):
+    """What follows from the soil of a design, or from its layers down to one of them."""
+
+    mass: SoilMass
+    """What the wedge of Eqs 1, 2 weighs."""
+    bounds: Bounds
+    sums: SoilSums
+    """Of layers; zero for elements."""
+
+
+@exact_inlined
+def nothing_lumped() -> Lumped:
+    """Return what follows from no layer."""
+    return Lumped(SoilMass(0.0, 0.0, 0.0), Bounds(0, 0.0, 0.0, 0.0), NO_SUMS)
+
+
+@exact_inlined
+def in_layer(design: Design, density: float, friction: float, subgrade: float) -> Design:
+    """Return a design in the soil of one layer; K_epsilon is that of the design."""
     p = design
     return Design(
         p.L,
@@ -90,9 +166,9 @@ def in_layer(design: Design, layer: np.ndarray) -> Design:
         p.rho_b,
         p.d,
         p.e,
-        layer[DENSITY],
-        layer[FRICTION],
-        layer[SUBGRADE],
+        density,
+        friction,
+        subgrade,
         p.K_epsilon,
         p.m_v,
         p.v_0,
@@ -103,8 +179,8 @@ def in_layer(design: Design, layer: np.ndarray) -> Design:
 
 
 @exact_kernel
-def fill_elements(design: Design, layers: np.ndarray, soil: SoilElements) -> SoilMass:
-    """Give N elements the values of the layers that their middles lie in (Eq 105), and return what they weigh.
+def fill_elements(design: Design, layers: np.ndarray, soil: SoilElements) -> Lumped:
+    """Give N elements the values of the layers that their middles lie in (Eq 105), and return what follows from them.
 
     Parameters
     ----------
@@ -117,13 +193,13 @@ def fill_elements(design: Design, layers: np.ndarray, soil: SoilElements) -> Soi
     """
     elements = soil.ratio.size
     h_e = design.d / elements
-    mass = first = second = 0.0
+    mass = first = second = K_soil = R_soil = x_yield = 0.0
     m = 0
     for n in range(1, elements + 1):
         alpha = element_depth(n, design.d, elements)
         while m < len(layers) - 1 and alpha >= layers[m, TO]:
             m += 1
-        local = in_layer(design, layers[m])
+        local = in_layer(design, layers[m, DENSITY], layers[m, FRICTION], layers[m, SUBGRADE])
         pressure = (layers[m, PRESSURE] + layers[m, PRESSURE_SLOPE] * alpha) * design.K_epsilon
         soil.ratio[n - 1] = alpha / design.d
         soil.stiffness[n - 1] = spring_per_depth(local) * alpha * h_e
@@ -133,12 +209,81 @@ def fill_elements(design: Design, layers: np.ndarray, soil: SoilElements) -> Soi
         mass += m_n
         first += m_n * height
         second += m_n * height * height
-    return SoilMass(mass, first, second)
+        K_soil = max(K_soil, soil.stiffness[n - 1] / soil.ratio[n - 1] * elements)
+        R_soil = max(R_soil, soil.drag[n - 1] * elements)
+        x_yield = max(x_yield, soil.ultimate[n - 1] / soil.stiffness[n - 1])
+    bounds = Bounds(elements, K_soil, R_soil, x_yield)
+    return Lumped(SoilMass(mass, first, second), bounds, nothing_lumped().sums)
+
+
+@exact_inlined
+def layer_of(
+    design: Design, low: float, to: float, density: float, friction: float, subgrade: float, p_0: float, p_1: float
+) -> Layer:
+    """Return one layer of the soil of a design (Eq 105).
+
+    Parameters
+    ----------
+    design
+        The design, SI.
+    low, to
+        Its boundaries as ratios of the depth.
+    density, friction, subgrade, p_0, p_1
+        A row of the layers of the design, see `PRESSURE_SLOPE`.
+    """
+    ultimate = design.K_epsilon * design.W * design.d
+    spring = spring_per_depth(in_layer(design, density, friction, subgrade))
+    drag = density * design.W * design.d
+    K = spring * design.d * design.d
+    return Layer(low, to, K, 1.0 / K, p_0 * ultimate, p_1 * design.d * ultimate, drag)
+
+
+@exact_inlined
+def lumped_with(so_far: Lumped, layer: Layer, density: float, friction: float, design: Design) -> Lumped:
+    """Add a layer of given density [kg/m^3] and friction angle [rad] to what follows from those above it."""
+    low, to, K, R = layer.low, layer.to, layer.K, layer.R
+    # The wedge at a height over the base is that height times tan(theta_w) long.
+    upper, lower = design.d * (1.0 - low), design.d * (1.0 - to)
+    u_2, l_2 = upper * upper, lower * lower
+    wedge = density * design.W * wedge_slope(friction)
+    mass = SoilMass(
+        so_far.mass.mass + wedge * (u_2 - l_2) / 2.0,
+        so_far.mass.first + wedge * (u_2 * upper - l_2 * lower) / 3.0,
+        so_far.mass.second + wedge * (u_2 * u_2 - l_2 * l_2) / 4.0,
+    )
+    low_2, to_2 = low * low, to * to
+    low_3, to_3, low_4, to_4 = low_2 * low, to_2 * to, low_2 * low_2, to_2 * to_2
+    s = so_far.sums
+    sums = SoilSums(
+        s.S_1 + K * (to_2 - low_2) / 2.0,
+        s.S_2 + K * (to_3 - low_3) / 3.0,
+        s.S_3 + K * (to_4 - low_4) / 4.0,
+        s.L_1 + K * low_2,
+        s.L_2 + K * low_3,
+        s.L_3 + K * low_4,
+        s.U_0 + (layer.P_0 * to + layer.P_1 * to_2 / 2.0),
+        s.U_1 + (layer.P_0 * to_2 / 2.0 + layer.P_1 * to_3 / 3.0),
+        s.Z_0 + R * (low + to),
+        s.Z_1 + R * (low_2 + to_2),
+        s.Z_2 + R * (low_3 + to_3),
+        s.Z_3 + R * (low_4 + to_4),
+    )
+    # (P_0 + P_1 r) / (K r) changes one way along a layer; where the soil line has strength, it never yields there.
+    first = (layer.P_0 / max(low, LEAST_RATIO) + layer.P_1) / K
+    last = (layer.P_0 / max(to, LEAST_RATIO) + layer.P_1) / K
+    within = low < to
+    bounds = Bounds(
+        0,
+        max(so_far.bounds.K_soil, K if within else 0.0),
+        max(so_far.bounds.R_soil, R if within else 0.0),
+        max(so_far.bounds.x_yield, max(first, last) if within else 0.0),
+    )
+    return Lumped(mass, bounds, sums)
 
 
 @exact_kernel
-def fill_layers(design: Design, layers: np.ndarray, soil: SoilLayers) -> SoilMass:
-    """Give M layers their values (Eq 105), and return what the wedge of Eqs 1, 2 weighs in them, N -> infinity.
+def fill_layers(design: Design, layers: np.ndarray, soil: SoilLayers) -> Lumped:
+    """Give M layers their values (Eq 105), and return what follows from them.
 
     Parameters
     ----------
@@ -149,62 +294,78 @@ def fill_layers(design: Design, layers: np.ndarray, soil: SoilLayers) -> SoilMas
     soil
         Layers to fill.
     """
-    d = design.d
-    mass = first = second = 0.0
-    upper = d
-    for m in range(len(layers)):
-        local = in_layer(design, layers[m])
-        ultimate = design.K_epsilon * design.W * d
-        soil.to[m] = min(layers[m, TO] / d, 1.0) if m < len(layers) - 1 else 1.0
-        soil.K[m] = spring_per_depth(local) * d * d
-        soil.P_0[m] = layers[m, PRESSURE] * ultimate
-        soil.P_1[m] = layers[m, PRESSURE_SLOPE] * d * ultimate
-        soil.R[m] = local.rho_s * design.W * d
-        # The wedge at a height over the base is that height times tan(theta_w) long.
-        lower = d * (1.0 - soil.to[m])
-        wedge = local.rho_s * design.W * wedge_slope(local.phi)
-        mass += wedge * (upper**2 - lower**2) / 2.0
-        first += wedge * (upper**3 - lower**3) / 3.0
-        second += wedge * (upper**4 - lower**4) / 4.0
-        upper = lower
-    return SoilMass(mass, first, second)
-
-
-class Bounds(NamedTuple):
-    """Number of elements, and bounds of the soil as a whole, as of `LayeredConstants`."""
-
-    elements: int
-    K_soil: float
-    R_soil: float
-    x_yield: float
-
-
-@exact_kernel
-def bounds_of_elements(soil: SoilElements) -> Bounds:
-    """Bounds of a soil of elements."""
-    K_soil = R_soil = x_yield = 0.0
-    elements = soil.ratio.size
-    for n in range(elements):
-        K_soil = max(K_soil, soil.stiffness[n] / soil.ratio[n] * elements)
-        R_soil = max(R_soil, soil.drag[n] * elements)
-        x_yield = max(x_yield, soil.ultimate[n] / soil.stiffness[n])
-    return Bounds(elements, K_soil, R_soil, x_yield)
-
-
-@exact_kernel
-def bounds_of_layers(soil: SoilLayers) -> Bounds:
-    """Bounds of a soil of layers; where the soil line has strength, it never yields there."""
-    K_soil = R_soil = x_yield = 0.0
+    so_far = nothing_lumped()
     low = 0.0
-    for m in range(soil.to.size):
-        high = soil.to[m]
-        if low < high:
-            K_soil, R_soil = max(K_soil, soil.K[m]), max(R_soil, soil.R[m])
-            # (P_0 + P_1 r) / (K r) changes one way along a layer.
-            for end in (max(low, LEAST_RATIO), high):
-                x_yield = max(x_yield, (soil.P_0[m] / end + soil.P_1[m]) / soil.K[m])
-        low = high
-    return Bounds(0, K_soil, R_soil, x_yield)
+    for m in range(len(layers)):
+        to = min(layers[m, TO] / design.d, 1.0) if m < len(layers) - 1 else 1.0
+        density, friction, subgrade = layers[m, DENSITY], layers[m, FRICTION], layers[m, SUBGRADE]
+        layer = layer_of(design, low, to, density, friction, subgrade, layers[m, PRESSURE], layers[m, PRESSURE_SLOPE])
+        soil.to[m], soil.K[m], soil.inverse_K[m], soil.R[m] = to, layer.K, layer.inverse_K, layer.R
+        soil.P_0[m], soil.P_1[m] = layer.P_0, layer.P_1
+        so_far = lumped_with(so_far, layer, density, friction, design)
+        low = to
+    s = so_far.sums
+    soil.sums[0], soil.sums[1], soil.sums[2] = s.S_1, s.S_2, s.S_3
+    soil.sums[3], soil.sums[4], soil.sums[5] = s.L_1, s.L_2, s.L_3
+    soil.sums[6], soil.sums[7] = s.U_0, s.U_1
+    soil.sums[8], soil.sums[9], soil.sums[10], soil.sums[11] = s.Z_0, s.Z_1, s.Z_2, s.Z_3
+    return so_far
+
+
+class GivenLayer(NamedTuple):
+    """One layer of the soil of a design, a row of its layers; see `PRESSURE_SLOPE`."""
+
+    to: float
+    density: float
+    friction: float
+    subgrade: float
+    p_0: float
+    p_1: float
+
+
+COUNTS = (1, 2, 4, 8)
+"""Numbers of layers for which lanes are compiled; another number is filled up by layers without height."""
+
+
+def lanes_count(layers: int) -> int:
+    """Return the number of layers that lanes are compiled for, at least as many as given; 0 if there are too many."""
+    return next((count for count in COUNTS if count >= layers), 0)
+
+
+def filled_layers(layers: np.ndarray, count: int) -> np.ndarray:
+    """Return layers of designs, shape (n, M, 6), as rows of a table for lanes, shape (6 count, n).
+
+    The last layer is repeated without height.
+    """
+    missing = count - layers.shape[1]
+    filled = np.concatenate([layers, np.repeat(layers[:, -1:], missing, axis=1)], axis=1)
+    return np.ascontiguousarray(filled.reshape(len(layers), -1).T)
+
+
+@functools.cache
+def constants_of_few(count: int) -> Callable[..., Any]:
+    """Return a function that gives the constants of a design in as many layers as given.
+
+    Its arguments are design, readings and a tuple of `GivenLayer`; what it does is written out layer by layer.
+    """
+    lines = ["def constants(design, readings, given):", "so_far = nothing_lumped()"]
+    for m in range(count):
+        low = f"layer_{m - 1}.to" if m else "0.0"
+        to = f"min(given[{m}].to / design.d, 1.0)" if m < count - 1 else "1.0"
+        inputs = ", ".join(f"given[{m}].{name}" for name in GivenLayer._fields[1:])
+        lines.append(f"layer_{m} = layer_of(design, {low}, {to}, {inputs})")
+        lines.append(f"so_far = lumped_with(so_far, layer_{m}, given[{m}].density, given[{m}].friction, design)")
+    fields = ", ".join(f"c.{name}" for name in Constants._fields)
+    lines += [
+        "b = so_far.bounds",
+        "c = constants_with(design, readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)",
+        f"return Record({fields}, FewLayers(so_far.sums, ({''.join(f'layer_{m}, ' for m in range(count))})))",
+    ]
+    known = (nothing_lumped, layer_of, lumped_with, constants_with, FewLayers)
+    names = {function.__name__: function for function in known}
+    function = function_of("\n ".join(lines), Record=LayeredConstants, **names)
+    function.__module__ = __name__
+    return exact_inlined(function)
 
 
 def uniform_layers(design: Design) -> np.ndarray:

@@ -1,24 +1,27 @@
 """Reaction of soils that are not the same at every depth: sums over elements, and their limit, exact layer by layer.
 
 Displacement and velocity are linear in the depth, as in `boulder_kernels.soil`, and so is the ultimate pressure of a
-layer. Its springs are then quadratic in the depth; they pass their ultimate force at no more than four depths, the
-drag turns at one, and between these nothing but polynomials is to be integrated.
+layer. Its springs are then quadratic in the depth. The boulder presses the soil one way above a depth, the pivot, and
+the other way below it. On either side the springs of a layer pass their ultimate force at no more than two depths, the
+roots of a polynomial; the drag turns at one; and between these nothing but polynomials is to be integrated.
+
+What is integrated over all of a layer is known before (`boulder_kernels.layered.SoilSums`), so that only what changes
+is worked out at a state: without a branch, and for few layers without a loop, as loops over lanes need it.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import function_of, inlined, kernel, overload
 from .flat import WIDTH, add, field, partial_sums, total
-from .layered import SoilElements, SoilLayers
+from .layered import FewLayers, Layer, SoilElements, SoilLayers, SoilSums
 from .soil import TINY, Kinematics, Potential, Reaction
-
-GAUSS = 1.0 / math.sqrt(3.0)
-"""Nodes of the two-point Gauss rule are plus and minus this, its weights 1."""
 
 
 @inlined
@@ -57,7 +60,7 @@ def potential_of_elements(A: float, slope_x: float, soil: SoilElements) -> Poten
         V += 0.5 * stiffness * (displacement * displacement - over * over)
         V_A += pressed
         V_X -= ratio * pressed
-    return Potential(V, V_A, V_X)
+    return Potential(V, V_A, V_X, V)
 
 
 @kernel
@@ -69,136 +72,325 @@ def power_of_elements(k: Kinematics, soil: SoilElements) -> float:
     return total
 
 
-class Breaks(NamedTuple):
-    """Where the springs of a layer change between elastic and ultimate, as ascending ratios of the depth."""
+class Line(NamedTuple):
+    """Displacement and velocity along the depth, and where they change their signs."""
 
-    r_1: float
-    r_2: float
-    r_3: float
-    r_4: float
+    S: float
+    """Decrease of displacement over the depth, made positive [m]."""
+    inverse_S: float
+    """1/S [1/m]."""
+    alpha: float
+    """Displacement at the soil line, turned with it [m]."""
+    pivot: float
+    """Ratio of the depth at which the boulder does not press: above it alpha - S r is positive, below it negative."""
+    turn: float
+    """Ratio of the depth at which the velocity changes its sign."""
 
 
 @inlined
-def roots_within(a: float, b: float, c: float, low: float, high: float) -> tuple[float, float]:
-    """Roots of a r^2 + b r + c, moved to the nearer end where they lie outside low ... high; low twice for none."""
-    squared = b * b - 4.0 * a * c
-    if not squared >= 0.0:
-        return low, low
-    q = -0.5 * (b + math.copysign(math.sqrt(squared), b))
-    q = math.copysign(max(abs(q), TINY), q)
-    a = math.copysign(max(abs(a), TINY), a)
-    return min(max(q / a, low), high), min(max(c / q, low), high)
+def line_of(A: float, slope_x: float, B: float, slope_v: float) -> Line:
+    """Return the lines of displacement and velocity, of `boulder_kernels.soil.Kinematics`."""
+    S, P = max(abs(slope_x), TINY), max(abs(slope_v), TINY)
+    inverse = 1.0 / (S * P)  # one division for both
+    inverse_S, alpha = inverse * P, (A if slope_x >= 0.0 else -A)
+    return Line(S, inverse_S, alpha, alpha * inverse_S, (B if slope_v >= 0.0 else -B) * (inverse * S))
 
 
-@kernel
-def layer_breaks(A: float, s: float, K: float, P_0: float, P_1: float, low: float, high: float) -> Breaks:
-    """Return where K r (A - s r) passes P_0 + P_1 r or its negative between two ratios of the depth (for Eq 108).
+@inlined
+def side_of(slope: float) -> float:
+    """Return the sign of a slope; that of zero is positive, whatever sign zero has."""
+    return 1.0 if slope >= 0.0 else -1.0
+
+
+class Walk(NamedTuple):
+    """What has been met on the way down through the layers; the sums are over the layers, i = 1, 2 ... 4."""
+
+    between: float
+    """Integral of the difference of K r |x| and the ultimate force over where it changes sign within the layers: less
+    above the pivot, more below [N]."""
+    between_r: float
+    """The same times r [N]."""
+    energy: float
+    """What the springs hold less than if the soil did not yield [J]."""
+    least_energy: float
+    """Lower bound of that, without a logarithm [J]."""
+    E_1: float
+    E_2: float
+    E_3: float
+    """Sums of K r^(i + 1) at the pivot, or at the end of a layer next to it."""
+    F_1: float
+    F_2: float
+    G_2: float
+    G_3: float
+    """Sums of P_0 r^i and of P_1 r^i there."""
+    D_0: float
+    D_1: float
+    D_2: float
+    D_3: float
+    """Sums of R r^i at where the velocity changes its sign, or at the end of a layer next to it."""
+    start: float
+    split: Layer
+    """The layer with the pivot inside, from there on; one without height as long as there is none."""
+
+
+class Released(NamedTuple):
+    """What the springs of a part of a layer hold less for its yielding [J], and a bound from below."""
+
+    energy: float
+    least: float
+
+
+@inlined
+def released(low: float, high: float, n: float, KS: float, eP: float, layer: Layer) -> Released:
+    """Half the integral of the square of the excess over K r, where the soil yields; arguments: see `add_part`.
+
+    The last term is that of P_0^2/r. Differences of powers at the two ends have their difference as a factor.
+    """
+    length, both, product = high - low, low + high, low * high
+    squares, cubes = both * both - product, both * (both * both - 2.0 * product)
+    powers = 0.25 * KS * KS * cubes - (2.0 / 3.0) * n * KS * squares + (0.5 * n * n + KS * eP) * both - 2.0 * n * eP
+    P_2, share = layer.P_0 * layer.P_0, 0.5 * layer.inverse_K
+    logarithm = math.log(max(high, TINY) / max(low, TINY))
+    least = share * length * (powers + P_2 * (2.0 / max(both, TINY)))
+    return Released(share * (length * powers + P_2 * logarithm), least)
+
+
+@inlined
+def add_part(w: Walk, line: Line, above: bool, low: float, high: float, layer: Layer) -> Walk:
+    """Add what a part of a layer presses less than its base (for Eq 108).
 
     Parameters
     ----------
-    A, s
-        Displacement at the soil line, and its decrease over the whole depth [m].
-    K, P_0, P_1
-        Spring [N/m] and ultimate force [N] of the layer, as of `SoilLayers`.
+    w
+        What has been met above it.
+    line
+        Displacement along the depth.
+    above
+        Whether the part lies above the pivot, or else below.
     low, high
-        Ends of the layer as ratios of the depth.
+        Its ends as ratios of the depth.
+    layer
+        The layer.
+
+    Notes
+    -----
+    With x = e (alpha - S r), e = 1 above the pivot and -1 below, the excess K r x - P_0 - P_1 r is -e times the
+    polynomial K S r^2 - n r + e P_0, where n = K alpha - e P_1. Above the pivot the base is what springs without a
+    limit would press, and the soil yields between the roots; below, the base is the ultimate force, and the soil is
+    elastic between the roots.
     """
-    a, b = roots_within(K * s, P_1 - K * A, P_0, low, high)
-    c, e = roots_within(K * s, -P_1 - K * A, -P_0, low, high)
-    a, b, c, e = min(a, b), max(a, b), min(c, e), max(c, e)
-    middle, other = max(a, c), min(b, e)
-    return Breaks(min(a, c), min(middle, other), max(middle, other), max(b, e))
+    K, KS = layer.K, layer.K * line.S
+    eP = layer.P_0 if above else -layer.P_0
+    n = K * line.alpha - (layer.P_1 if above else -layer.P_1)
+    half = 0.5 * n
+    squared = half * half - KS * eP
+    T = half + math.copysign(np.sqrt(max(squared, 0.0)) + TINY, n)
+    one, other = T * (layer.inverse_K * line.inverse_S), eP / T
+    a = min(max(min(one, other), low), high)
+    b = min(max(max(one, other), low), high)
+    b = b if squared >= 0.0 else a
+    both, product = a + b, a * b
+    square = both * both
+    third, fourth = (1.0 / 3.0) * (square - product), 0.25 * both * (square - 2.0 * product)
+    length = a - b if above else b - a
+    between = half * both - KS * third - eP
+    between_r = n * third - KS * fourth - eP * (0.5 * both)
+    first = released(a if above else low, b if above else a, n, KS, eP, layer)
+    last = released(b, b if above else high, n, KS, eP, layer)
+    return Walk(
+        w.between + length * between,
+        w.between_r + length * between_r,
+        w.energy + (first.energy + last.energy),
+        w.least_energy + (first.least + last.least),
+        w.E_1,
+        w.E_2,
+        w.E_3,
+        w.F_1,
+        w.F_2,
+        w.G_2,
+        w.G_3,
+        w.D_0,
+        w.D_1,
+        w.D_2,
+        w.D_3,
+        w.start,
+        w.split,
+    )
 
 
 @inlined
-def layer_pressed(r: float, A: float, s: float, K: float, P_0: float, P_1: float) -> float:
-    """Force of the springs at a ratio of the depth, per ratio [N] (Eqs 26, 28)."""
-    ultimate = P_0 + P_1 * r
-    return min(max(K * r * (A - s * r), -ultimate), ultimate)
+def start_walk() -> Walk:
+    """Return what has been met before the first layer."""
+    none = Layer(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+    return Walk(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, none)
 
 
-@kernel
-def reaction_of_layers(k: Kinematics, soil: SoilLayers) -> Reaction:
-    """Force and moment of layers, integrated over the depth exactly (Eq 108, the limit of Eqs 19, 20, 26, 28, 36).
+@inlined
+def pass_layer(w: Walk, line: Line, layer: Layer) -> Walk:
+    """Add a layer to what has been met; the part below the pivot of the layer that it lies in is left for the end."""
+    K, P_0, P_1, R = layer.K, layer.P_0, layer.P_1, layer.R
+    pivot = min(max(line.pivot, layer.low), layer.to)
+    above = line.alpha > line.S * layer.low  # known before the pivot is
+    split = above & (line.alpha < line.S * layer.to)
+    turn = min(max(line.turn, layer.low), layer.to)
+    pivot_2, turn_2 = pivot * pivot, turn * turn
+    pivot_3 = pivot_2 * pivot
+    rest = Layer(
+        0.0,
+        layer.to if split else w.split.to,
+        K if split else w.split.K,
+        layer.inverse_K if split else w.split.inverse_K,
+        P_0 if split else w.split.P_0,
+        P_1 if split else w.split.P_1,
+        0.0,
+    )
+    w = add_part(w, line, above, layer.low, pivot if above else layer.to, layer)
+    return Walk(
+        w.between,
+        w.between_r,
+        w.energy,
+        w.least_energy,
+        w.E_1 + K * pivot_2,
+        w.E_2 + K * pivot_3,
+        w.E_3 + K * (pivot_2 * pivot_2),
+        w.F_1 + P_0 * pivot,
+        w.F_2 + P_0 * pivot_2,
+        w.G_2 + P_1 * pivot_2,
+        w.G_3 + P_1 * pivot_3,
+        w.D_0 + R * turn,
+        w.D_1 + R * turn_2,
+        w.D_2 + R * (turn_2 * turn),
+        w.D_3 + R * (turn_2 * turn_2),
+        pivot if split else w.start,
+        rest,
+    )
 
-    Between two break points all integrands are polynomials of at most third order, for which two points of Gauss are
-    exact.
-    """
-    pressed = pressed_r = 0.0
-    p = math.copysign(max(abs(k.slope_v), TINY), k.slope_v)
+
+@inlined
+def end_walk(w: Walk, line: Line) -> Walk:
+    """Add what was left of the layer that the pivot lies in."""
+    return add_part(w, line, False, w.start, w.split.to, w.split)
+
+
+def walk_through(line: Line, soil: Any) -> Walk:
+    """Return what is met on the way down through all layers, `SoilLayers` or `FewLayers`."""
+    return (_walk_written_out(len(soil.layers)) if isinstance(soil, FewLayers) else _walk_by_arrays)(line, soil)
+
+
+@overload(walk_through)
+def _walk_through(line: Any, soil: Any) -> Callable[..., Walk]:
+    few = soil.instance_class is FewLayers
+    return _walk_written_out(len(soil[1])) if few else _walk_by_arrays
+
+
+def _walk_by_arrays(line: Line, soil: SoilLayers) -> Walk:
+    w = start_walk()
     low = 0.0
     for m in range(soil.to.size):
-        high, K, P_0, P_1, R = soil.to[m], soil.K[m], soil.P_0[m], soil.P_1[m], soil.R[m]
-        breaks = layer_breaks(k.A, k.slope_x, K, P_0, P_1, low, high)
-        start = low
-        for end in (breaks.r_1, breaks.r_2, breaks.r_3, breaks.r_4, high):
-            middle, half = 0.5 * (start + end), 0.5 * (end - start)
-            for side in (-GAUSS, GAUSS):
-                r = middle + side * half
-                spring = half * layer_pressed(r, k.A, k.slope_x, K, P_0, P_1)
-                pressed += spring
-                pressed_r += r * spring
-            start = end
-        start = low
-        for end in (min(max(k.B / p, low), high), high):
-            middle, half = 0.5 * (start + end), 0.5 * (end - start)
-            for side in (-GAUSS, GAUSS):
-                r = middle + side * half
-                v = k.B - k.slope_v * r
-                drag = half * R * v * abs(v)
-                pressed += drag
-                pressed_r += r * drag
-            start = end
-        low = high
+        layer = Layer(low, soil.to[m], soil.K[m], soil.inverse_K[m], soil.P_0[m], soil.P_1[m], soil.R[m])
+        w = pass_layer(w, line, layer)
+        low = soil.to[m]
+    return end_walk(w, line)
+
+
+@functools.cache
+def _walk_written_out(count: int) -> Callable[..., Walk]:
+    """Return the walk through a known number of layers: a loop would keep the one over lanes from being vectorised."""
+    through = "start_walk()"
+    for m in range(count):
+        through = f"pass_layer({through}, line, soil.layers[{m}])"
+    source = f"def walk(line, soil):\n return end_walk({through}, line)"
+    return function_of(source, start_walk=start_walk, pass_layer=pass_layer, end_walk=end_walk)
+
+
+def sums_of(soil: Any) -> SoilSums:
+    """Return the sums of layers."""
+    return soil.sums if isinstance(soil, FewLayers) else SoilSums(*soil.sums)
+
+
+@overload(sums_of)
+def _sums_of(soil: Any) -> Callable[..., SoilSums]:
+    if soil.instance_class is FewLayers:
+        return lambda soil: soil.sums
+    sums = ", ".join(f"soil.sums[{i}]" for i in range(len(SoilSums._fields)))
+    return function_of(f"def sums_of(soil):\n return SoilSums({sums})", SoilSums=SoilSums)
+
+
+class Turned(NamedTuple):
+    """Integrals of R r^i over the depth, i = 0 ... 3, whose sign changes with that of the velocity [kg/m]."""
+
+    N_0: float
+    N_1: float
+    N_2: float
+    N_3: float
+
+
+@inlined
+def turned(w: Walk, sums: SoilSums) -> Turned:
+    """Return the integrals with the sign that the velocity has at the soil line, if it changes it further down."""
+    return Turned(
+        2.0 * w.D_0 - sums.Z_0,
+        0.5 * (2.0 * w.D_1 - sums.Z_1),
+        (1.0 / 3.0) * (2.0 * w.D_2 - sums.Z_2),
+        0.25 * (2.0 * w.D_3 - sums.Z_3),
+    )
+
+
+class Pressed(NamedTuple):
+    """What the springs press [N], and the same times r [N]."""
+
+    force: float
+    moment: float
+
+
+@inlined
+def pressed_by(w: Walk, line: Line, sums: SoilSums, slope_x: float) -> Pressed:
+    """Put together what the springs press (Eq 108): above the pivot as if without limit, below it the ultimate force.
+
+    Both less what was met on the way.
+    """
+    E_1, E_2, E_3 = 0.5 * (w.E_1 - sums.L_1), (1.0 / 3.0) * (w.E_2 - sums.L_2), 0.25 * (w.E_3 - sums.L_3)
+    side = side_of(slope_x)
+    less_0 = w.F_1 + 0.5 * w.G_2 - sums.U_0
+    less_1 = 0.5 * w.F_2 + (1.0 / 3.0) * w.G_3 - sums.U_1
+    force = line.alpha * E_1 - line.S * E_2 + less_0 + w.between
+    moment = line.alpha * E_2 - line.S * E_3 + less_1 + w.between_r
+    return Pressed(side * force, side * moment)
+
+
+@inlined
+def reaction_of_layers(k: Kinematics, soil: Any) -> Reaction:
+    """Force and moment of layers, integrated over the depth exactly (Eq 108, the limit of Eqs 19, 20, 26, 28, 36).
+
+    The drag is v|v| integrated up to where v changes its sign, and from there on.
+    """
+    line, sums = line_of(k.A, k.slope_x, k.B, k.slope_v), sums_of(soil)
+    w = walk_through(line, soil)
+    springs = pressed_by(w, line, sums, k.slope_x)
+    n, B, p = turned(w, sums), k.B, k.slope_v
+    BB, Bp, pp = B * B, 2.0 * (B * p), p * p
+    drag = side_of(p)
+    pressed = springs.force + drag * (BB * n.N_0 - Bp * n.N_1 + pp * n.N_2)
+    pressed_r = springs.moment + drag * (BB * n.N_1 - Bp * n.N_2 + pp * n.N_3)
     return Reaction(-pressed, k.lever_d * pressed_r + k.q * pressed)
 
 
-@kernel
-def potential_of_layers(A: float, slope_x: float, soil: SoilLayers) -> Potential:
+@inlined
+def potential_of_layers(A: float, slope_x: float, soil: Any) -> Potential:
     """Elastic energy of layers and its slopes, exactly (Eq 108); see `boulder_kernels.soil.closed_potential`.
 
-    A slice that has reached its ultimate force P holds P |u| - P^2/(2 K r); the integral of the second term is that of
-    (P_0 + P_1 r)^2/r.
+    A slice that presses K r x - P too much, were it not limited, holds (K r x - P)^2/(2 K r) too much.
     """
-    V = V_A = V_X = 0.0
-    low = 0.0
-    for m in range(soil.to.size):
-        high, K, P_0, P_1 = soil.to[m], soil.K[m], soil.P_0[m], soil.P_1[m]
-        breaks = layer_breaks(A, slope_x, K, P_0, P_1, low, high)
-        start = low
-        for end in (breaks.r_1, breaks.r_2, breaks.r_3, breaks.r_4, high):
-            middle, half = 0.5 * (start + end), 0.5 * (end - start)
-            within = abs(K * middle * (A - slope_x * middle)) <= P_0 + P_1 * middle
-            for side in (-GAUSS, GAUSS):
-                r = middle + side * half
-                displacement = A - slope_x * r
-                spring = half * layer_pressed(r, A, slope_x, K, P_0, P_1)
-                V += (0.5 if within else 1.0) * spring * displacement
-                V_A += spring
-                V_X -= r * spring
-            if not within and end > start:
-                stored = P_1 * (2.0 * P_0 + P_1 * middle) * 2.0 * half
-                if P_0 != 0.0:
-                    stored += P_0 * P_0 * math.log(end / max(start, TINY))
-                V -= 0.5 / K * stored
-            start = end
-        low = high
-    return Potential(V, V_A, V_X)
+    line, sums = line_of(A, slope_x, 0.0, 0.0), sums_of(soil)
+    w = walk_through(line, soil)
+    springs = pressed_by(w, line, sums, slope_x)
+    V = 0.5 * (A * (A * sums.S_1 - slope_x * sums.S_2) - slope_x * (A * sums.S_2 - slope_x * sums.S_3))
+    return Potential(V - w.energy, springs.force, -springs.moment, V - w.least_energy)
 
 
-@kernel
-def power_of_layers(k: Kinematics, soil: SoilLayers) -> float:
+@inlined
+def power_of_layers(k: Kinematics, soil: Any) -> float:
     """Power that the drag of layers takes out of the motion [W], integrated exactly (Eqs 34-36)."""
-    total = 0.0
-    p = math.copysign(max(abs(k.slope_v), TINY), k.slope_v)
-    low = 0.0
-    for m in range(soil.to.size):
-        high = soil.to[m]
-        start = low
-        for end in (min(max(k.B / p, low), high), high):
-            middle, half = 0.5 * (start + end), 0.5 * (end - start)
-            for side in (-GAUSS, GAUSS):
-                total += half * soil.R[m] * abs(k.B - k.slope_v * (middle + side * half)) ** 3
-            start = end
-        low = high
-    return total
+    line, sums = line_of(k.A, k.slope_x, k.B, k.slope_v), sums_of(soil)
+    n, B, p = turned(walk_through(line, soil), sums), k.B, k.slope_v
+    return side_of(p) * (B**3 * n.N_0 - 3.0 * B * p * (B * n.N_1 - p * n.N_2) - p**3 * n.N_3)

@@ -167,7 +167,7 @@ def potential_of_plastic_elements(A: float, slope_x: float, soil: SoilElements, 
         V += 0.5 * stiffness * (pressed * pressed - over * over)
         V_A += force
         V_X -= ratio * force
-    return Potential(V, V_A, V_X)
+    return Potential(V, V_A, V_X, V)
 
 
 @kernel

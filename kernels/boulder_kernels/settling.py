@@ -299,4 +299,4 @@ def boulder_energy(y: State, c: Constants) -> float:
     u = max(spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c), 0.0)
     kinetic = 0.5 * (c.m_eff * y.v_b * y.v_b + c.J_eff * y.omega_b * y.omega_b)
     lift = c.C_cos * abs(sin) + c.C_sin * versin
-    return kinetic + lift + soil_potential(k.A, k.slope_x, c).V + 0.5 * c.k_v * u * u
+    return kinetic + lift + soil_potential(k.A, k.slope_x, c).highest + 0.5 * c.k_v * u * u

@@ -66,6 +66,8 @@ class Potential(NamedTuple):
     """Its derivative by the displacement at the soil line [N]."""
     V_X: float
     """Its derivative by the decrease of displacement over the depth [N]."""
+    highest: float
+    """Upper bound of V, nearly V itself, that loops over lanes can work out [J]."""
 
 
 @inlined
@@ -213,7 +215,8 @@ def closed_potential(A: float, slope_x: float, c: Constants) -> Potential:
     middle = 0.25 * A * A * (a_2 - a_1) - (1.0 / 3.0) * A * s * (b_2 - b_1) + 0.125 * s * s * (a_2 * a_2 - a_1 * a_1)
     before = y * (0.5 * A * a_1 - (1.0 / 3.0) * s * b_1) - 0.25 * y * y * a_1
     after = -y * (0.5 * A * (1.0 - a_2) - (1.0 / 3.0) * s * (1.0 - b_2)) - 0.25 * y * y * (1.0 - a_2)
-    return Potential(c.K_soil * (before + middle + after), c.K_soil * spring, -c.K_soil * spring_r)
+    V = c.K_soil * (before + middle + after)
+    return Potential(V, c.K_soil * spring, -c.K_soil * spring_r, V)
 
 
 @kernel
@@ -229,7 +232,7 @@ def summed_potential(A: float, slope_x: float, c: Constants) -> Potential:
         V_A += pressed
         V_X -= ratio * pressed
     share = c.K_soil / c.elements
-    return Potential(share * V, share * V_A, share * V_X)
+    return Potential(share * V, share * V_A, share * V_X, share * V)
 
 
 @inlined

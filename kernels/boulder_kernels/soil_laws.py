@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import exact_inlined, function_of, kernel, overload, unless_none
-from .design import Constants, Design, Readings, SoilMass, constants_of, constants_with
+from .design import Constants, Design, Readings, constants_of, constants_with
 from .layered import (
-    Bounds,
+    FewLayers,
     LayeredConstants,
+    Lumped,
     SoilElements,
     SoilLayers,
-    bounds_of_elements,
-    bounds_of_layers,
+    SoilSums,
     fill_elements,
     fill_layers,
     uniform_layers,
@@ -54,18 +54,15 @@ class SoilLaw(NamedTuple):
     """Elastic energy and its slopes, convex in the displacement at the soil line and its decrease over the depth."""
     drag_power: Callable[..., float]
     """Power that the drag takes out of the motion [W], of `Kinematics`."""
-    fill: Callable[[Design, np.ndarray, Any], SoilMass] | None = None
-    """Works out the record from the layers of a design, and returns the soil lumped on the boulder."""
-    bounds: Callable[[Any], Bounds] | None = None
-    """Bounds of the soil as a whole: stiffness, drag and displacement at which all of it has yielded."""
+    fill: Callable[[Design, np.ndarray, Any], Lumped] | None = None
+    """Works out the record from the layers of a design, and returns what follows from them."""
 
 
 UNIFORM = SoilLaw(uniform_reaction, uniform_potential, uniform_drag_power)
 LAWS: dict[type, SoilLaw] = {
-    SoilElements: SoilLaw(
-        reaction_of_elements, potential_of_elements, power_of_elements, fill_elements, bounds_of_elements
-    ),
-    SoilLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers, fill_layers, bounds_of_layers),
+    SoilElements: SoilLaw(reaction_of_elements, potential_of_elements, power_of_elements, fill_elements),
+    SoilLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers, fill_layers),
+    FewLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers),
     Memory: SoilLaw(reaction_of_plastic_elements, potential_of_plastic_elements, power_of_plastic_elements),
 }
 """The law of each record of a soil, the last of those that constants carry."""
@@ -126,9 +123,7 @@ soil_potential = by_law("potential", "A", "slope_x", "c")
 drag_power = by_law("drag_power", "k", "c")
 """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
 fill_soil = by_law("fill", "design", "layers", "soil")
-"""Work out a record from the layers of a design, shape (M, 6), and return the soil lumped on the boulder."""
-bounds_of = by_law("bounds", "soil")
-"""`Bounds` of a soil as a whole, by its record."""
+"""Work out a record from the layers of a design, shape (M, 6), and return what follows from them, `Lumped`."""
 
 
 @kernel
@@ -167,9 +162,9 @@ def _with_records(c: Any, soil: Any, memory: Any) -> Callable[..., Any]:
 @exact_inlined
 def constants_in_profile(design: Design, readings: Readings, elements: int, profile: SoilProfile) -> Any:
     """Constants of the motion of one design in layers of soil, or in plastic soil; see `constants_in`."""
-    mass = fill_soil(design, profile.layers, profile.soil)
-    b = bounds_of(profile.soil)
-    c = constants_with(design, readings, b.elements, mass, b.K_soil, b.R_soil, b.x_yield)
+    lumped = fill_soil(design, profile.layers, profile.soil)
+    b = lumped.bounds
+    c = constants_with(design, readings, b.elements, lumped.mass, b.K_soil, b.R_soil, b.x_yield)
     return with_records(c, profile.soil, profile.memory)
 
 
@@ -203,7 +198,8 @@ def empty_soil(layers: int, elements: int) -> SoilLayers | SoilElements:
     """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact."""
     if elements > 0:
         return SoilElements(*np.empty((4, elements)))
-    return SoilLayers(*np.empty((5, layers)))
+    to, K, inverse_K, P_0, P_1, R = np.empty((6, layers))
+    return SoilLayers(to, K, inverse_K, P_0, P_1, R, np.empty(len(SoilSums._fields)))
 
 
 def profile_of(

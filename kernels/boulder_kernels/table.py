@@ -23,7 +23,7 @@ from .impact import (
 )
 from .lanes import simulate_lanes
 from .last_resort import simulate_last_resort
-from .layered import LayeredTable
+from .layered import LayeredTable, filled_layers, lanes_count
 from .outcomes import (
     COARSER,
     FINER,
@@ -228,13 +228,18 @@ def simulate_once(
         return outcomes, np.full(len(table.L), NONE_NEEDED)
     designs = np.stack(table[: len(DesignTable._fields)])
     stacked = None if springs is None else np.stack(springs)
-    if isinstance(table, LayeredTable):
-        soil = empty_soil(table.layers.shape[1], control.elements)
-        out = simulate_rows(designs, table.layers, soil, stacked, readings, control)
+    layers: np.ndarray | None = getattr(table, "layers", None)
+    count = 0 if layers is None else lanes_count(layers.shape[1])
+    side_by_side = springs is None and control.elements == 0 and control.stop_at_limit
+    if layers is not None and count and side_by_side:
+        out = simulate_lanes(np.concatenate([designs, filled_layers(layers, count)]), readings, control)
+    elif layers is not None:
+        soil = empty_soil(layers.shape[1], control.elements)
+        out = simulate_rows(designs, layers, soil, stacked, readings, control)
     elif control.last_resort:
         out = empty_outcomes(designs.shape[1])
         run_last_resort(designs, stacked, readings, control, no_record(), out)
-    elif springs is None and control.elements == 0 and control.stop_at_limit:
+    elif side_by_side:
         out = simulate_lanes(designs, readings, control)
     else:
         out = simulate_rows(designs, None, None, stacked, readings, control)

@@ -11,14 +11,19 @@ constants, and no index need be checked for being negative, as one that counts f
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
+from ._jit import function_of, overload
 from .dense_output import Track
-from .design import Constants, Design
+from .design import Constants, Design, Readings, constants_of
 from .dynamics import Acceleration, State
+from .flat import field, put
 from .gaps import GapFactors, Gaps
+from .layered import COUNTS, FewLayers, GivenLayer, Layer, LayeredConstants, SoilSums, constants_of_few
 from .modes import Modes, Switches
 from .numerics import Bracket
 from .outcomes import Compression, Maxima
@@ -159,27 +164,105 @@ DESIGN = _place("design")
 RECORDS = {_place(name): record for name, record in _ALL.items()}
 
 
+SOIL = WHOLE
+"""Where the layers of the soil of a design lie, from its lane on: in a second half of the array, laid out as the first,
+which only `LayeredLanes` have."""
+
+
+class LayeredLanes(NamedTuple):
+    """A workspace for designs in soils of layers, whose constants are `LayeredConstants` with `FewLayers`."""
+
+    numbers: np.ndarray
+    """The array, of twice the length."""
+    layers: tuple[int, ...]
+    """As many zeros as there are layers: how many is known when kernels are compiled."""
+
+
+def soil_size(layers: int) -> int:
+    """Return how many numbers of a lane belong to its soil in layers, times LANES."""
+    return LANES * (len(SoilSums._fields) + len(Layer._fields) * layers)
+
+
+def given_place(layers: int) -> int:
+    """Return where the rows of the layers of a design that is being started lie, from its lane on."""
+    return SOIL + soil_size(layers)
+
+
+assert soil_size(COUNTS[-1]) <= SIZE, "the layers of a lane reach into those of the next group"
+assert soil_size(COUNTS[-1]) + LANES * len(GivenLayer._fields) * COUNTS[-1] <= EVENT_SIZE
+
+
+def part(ws: Any, start: int) -> Any:
+    """Return a workspace from one of its lanes on."""
+    if isinstance(ws, LayeredLanes):
+        return LayeredLanes(ws.numbers[start:], ws.layers)
+    return ws[start:]
+
+
 def offsets_of(record: Any) -> dict[str, int]:
     """Where the fields that are kept of a record lie, from its place on."""
     kept = (name for name in record._fields if name not in KNOWN)
     return {name: i * LANES for i, name in enumerate(kept)}
 
 
-def load(ws: np.ndarray, place: int, lane: int) -> Any:
+def load(ws: Any, place: int, lane: int) -> Any:
     """Return the record at a place, one of the constants above, for one lane."""
     record = RECORDS[place]
     offsets = offsets_of(record)
     numbers = [
-        kind(ws[place + offsets[name] + lane]) if name in offsets else KNOWN[name]
+        kind(field(ws, place + offsets[name], lane)) if name in offsets else KNOWN[name]
         for name, kind in get_type_hints(record).items()
     ]
+    if place == CONSTANTS and isinstance(ws, LayeredLanes):
+        return LayeredConstants(*numbers, load_soil(ws, lane))
     return record(*numbers)
 
 
-def store(ws: np.ndarray, place: int, lane: int, record: Any) -> None:
+def load_soil(ws: LayeredLanes, lane: int) -> FewLayers:
+    """Return the soil of one lane."""
+    count, width = len(SoilSums._fields), len(Layer._fields)
+    numbers = [field(ws, SOIL + i * LANES, lane) for i in range(count + width * len(ws.layers))]
+    layers = tuple(Layer(*numbers[first : first + width]) for first in range(count, len(numbers), width))
+    return FewLayers(SoilSums(*numbers[:count]), layers)
+
+
+def store(ws: Any, place: int, lane: int, record: Any) -> None:
     """Write a record at a place, one of the constants above, for one lane."""
-    for name, offset in offsets_of(type(record)).items():
-        ws[place + offset + lane] = getattr(record, name)
+    for name, offset in offsets_of(RECORDS[place]).items():
+        put(ws, place + offset, lane, getattr(record, name))
+    if isinstance(record, LayeredConstants):
+        for i, number in enumerate([*record.soil.sums, *itertools.chain(*record.soil.layers)]):
+            put(ws, SOIL + i * LANES, lane, number)
+
+
+def store_given(ws: Any, lane: int, designs: np.ndarray, row: int) -> None:
+    """Write the layers of a design that is being started, the rows of a table below those of `Design`."""
+    if isinstance(ws, LayeredLanes):
+        for i, number in enumerate(designs[len(Design._fields) :, row]):
+            put(ws, given_place(len(ws.layers)) + i * LANES, lane, number)
+
+
+def load_given(ws: LayeredLanes, lane: int) -> tuple[GivenLayer, ...]:
+    """Return the layers of a design that is being started."""
+    first, width = given_place(len(ws.layers)), len(GivenLayer._fields)
+    numbers = [field(ws, first + i * LANES, lane) for i in range(width * len(ws.layers))]
+    return tuple(GivenLayer(*numbers[m : m + width]) for m in range(0, len(numbers), width))
+
+
+def constants_in_lane(ws: Any, lane: int, design: Design, readings: Readings) -> Any:
+    """Return the constants of a design that is being started."""
+    if isinstance(ws, LayeredLanes):
+        return constants_of_few(len(ws.layers))(design, readings, load_given(ws, lane))
+    return constants_of(design, readings, 0)
+
+
+@overload(constants_in_lane)
+def _constants_in_lane(ws: Any, lane: Any, design: Any, readings: Any) -> Callable[..., Any]:
+    if not hasattr(ws, "instance_class"):
+        return lambda ws, lane, design, readings: constants_of(design, readings, 0)
+    constants = constants_of_few(len(ws[1]))
+    source = "def in_lane(ws, lane, design, readings):\n return constants(design, readings, load_given(ws, lane))"
+    return function_of(source, constants=constants, load_given=load_given)
 
 
 def align_stack() -> None:
@@ -190,6 +273,10 @@ def align_stack() -> None:
     """
 
 
-def copy_lane(ws: np.ndarray, lane: int, other: int, end: int) -> None:
-    """Copy the numbers of one lane to another, up to before a place."""
-    ws[other : other + end : LANES] = ws[lane : lane + end : LANES]
+def copy_lane(ws: Any, lane: int, other: int, end: int) -> None:
+    """Copy the numbers of one lane to another, up to before a place, and its soil in layers."""
+    numbers = ws
+    if isinstance(ws, LayeredLanes):
+        numbers, behind = ws.numbers, SOIL + soil_size(len(ws.layers))
+        numbers[other + SOIL : other + behind : LANES] = numbers[lane + SOIL : lane + behind : LANES]
+    numbers[other : other + end : LANES] = numbers[lane : lane + end : LANES]

@@ -63,7 +63,7 @@ def test_one_layer_is_the_uniform_soil(elements: int) -> None:
             np.testing.assert_allclose(soil_reaction(k, c), soil_reaction(k, uniform), rtol=1e-10)
             of_layers, of_uniform = soil_potential(k.A, k.slope_x, c), uniform_potential(k.A, k.slope_x, uniform)
             np.testing.assert_allclose(of_layers, of_uniform, rtol=1e-10)
-            assert soil_energy(k, c) == of_layers.V
+            assert soil_energy(k, c) == pytest.approx(of_layers.V, rel=1e-13)
             assert drag_power(k, c) == pytest.approx(uniform_drag_power(k, uniform), rel=1e-12)
 
 
@@ -109,10 +109,10 @@ def test_layers_are_the_limit_of_many_elements() -> None:
     errors = {n: [abs(c.m_eff / exact.m_eff - 1.0), abs(c.J_eff / exact.J_eff - 1.0)] for n, c in found.items()}
     for _ in range(40):
         k = lines(random_state(rng), exact)
-        values = [*soil_reaction(k, exact), *soil_potential(k.A, k.slope_x, exact), drag_power(k, exact)]
+        values = [*soil_reaction(k, exact), *soil_potential(k.A, k.slope_x, exact)[:3], drag_power(k, exact)]
         size = abs(values[0]) * design.d
         for n, c in found.items():
-            again = [*soil_reaction(k, c), *soil_potential(k.A, k.slope_x, c), drag_power(k, c)]
+            again = [*soil_reaction(k, c), *soil_potential(k.A, k.slope_x, c)[:3], drag_power(k, c)]
             errors[n] += [abs(a - b) / (abs(b) + size) for a, b in zip(again, values, strict=True)]
     assert np.max(errors[4000]) < 3e-6
     assert np.mean(errors[4000]) < 0.03 * np.mean(errors[400])
