@@ -21,12 +21,13 @@ from boulder_sweep.store.files import put_file
 
 CONFIG = Path(__file__).parents[1] / "configs" / "rwg.yaml"
 SPRINGS = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
-WET = "soil.water_table=0.5 m"
+WET, COHESIVE = "soil.water_table=0.5 m", "soil.cohesion=5 kPa"
 ELEMENTS = "model.soil={elements: 50}"
 VARIANTS: tuple[tuple[str, ...], ...] = (
     (),
     (SPRINGS,),
     (WET,),
+    (COHESIVE,),
     (ELEMENTS,),
     (WET, ELEMENTS),
     (ELEMENTS, "model.unloading=plastic_with_gap"),

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
@@ -166,7 +167,8 @@ def need(
     backend, scheduler
         Where to search: ``threading``, or ``dask`` and the address of a scheduler, as for `boulder_sweep.run`.
     progress
-        Called as the search progresses.
+        Called as the search progresses, with how many rows of how many are answered; with a probability asked for and
+        no cluster, with how many values of how many are tried, from the threads that try them.
 
     Returns
     -------
@@ -216,22 +218,61 @@ def need(
         _question(one, key, between, own, probability, seed, variants) for one, own in zip(sweeps, judges, strict=True)
     ]
     asked[0].judges.final.warm_up()
-    if progress is not None:
-        progress(0, asked[0].count)
+    done = _Progress(progress, asked, local=backend == THREADING)
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
-    tables, simulated, done = [], 0, 0
+    tables, simulated = [], 0
     with pool(jobs, backend, scheduler) as workers:
         for table, count in workers(call(_table_of, asked, start, stop) for start, stop in pieces):
             tables.append(table)
             simulated += count
-            done += len(table)
-            if progress is not None:
-                progress(done, asked[0].count)
+            done.answered(len(table))
     from boulder_sweep.answers.tables import joined_tables
 
     table = joined_tables(tables, _metadata(asked[0], least_margin))
     chance = None if probability is None else share(probability, "--probability")
     return Need(sweep, table, key, least_margin, simulated, chance)
+
+
+class _Progress:
+    """Reports how many rows have been answered, or, where every row takes long, how many values have been tried.
+
+    Parameters
+    ----------
+    report
+        Called with how many of how many are done, first with none; None for no reports.
+    asked
+        The questions.
+    local
+        Whether they are answered in this process.
+    """
+
+    def __init__(self, report: ProgressCallback | None, asked: Sequence[Question | LightestQuestion], *, local: bool):
+        self._report, self._rows = report, asked[0].count
+        self._done, self._rows_done, self._total = 0, 0, self._rows
+        self._lock = Lock()  # values are tried by several threads
+        if report is None:
+            return
+        slow = [question for question in asked if isinstance(question, Question) and question.values_to_try()]
+        if local and slow:
+            self._total = sum(question.values_to_try() for question in slow)
+            for question in slow:
+                question.tried = self._tried
+        report(0, self._total)
+
+    def answered(self, count: int) -> None:
+        """Report that some more rows have been answered."""
+        with self._lock:
+            self._rows_done += count
+            self._reach(self._rows_done * self._total // self._rows)
+
+    def _tried(self, count: int) -> None:
+        with self._lock:
+            self._reach(min(self._done + count, self._total))
+
+    def _reach(self, done: int) -> None:
+        if self._report is not None and done > self._done:
+            self._done = done
+            self._report(done, self._total)
 
 
 def _question(

@@ -9,10 +9,10 @@ import numpy as np
 from boulder_sweep.answers.chance import SCRAMBLINGS, Chance, Points, chance
 from boulder_sweep.answers.draws import Draws, threads
 from boulder_sweep.answers.keys import Ends, Key
-from boulder_sweep.answers.questions import Question, Trial
+from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import Judges, Rows, beyond_reach
+from boulder_sweep.answers.trials import Judges, Rows, beyond_reach, ranges
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -68,6 +68,12 @@ class ProbabilityQuestion(Question):
         """Return the object that tries values in some rows."""
         return ProbabilityTrial(self, rows)
 
+    def values_to_try(self) -> int:
+        """Return how many values are tried in all, if every row changes once from failing to passing."""
+        pieces = [self.lattice(self.open.rows(*ends)) for ends in ranges(self.count, CHECKED_AT_ONCE)]
+        widest = np.concatenate([np.abs(last - first) for first, last in pieces]) / self.cells
+        return int(np.sum(self.cells + 1 + np.ceil(np.log2(np.maximum(widest, 1.0)))))
+
 
 class ProbabilityTrial(Trial):
     """Tries values of the input in some rows: whether the designs sampled with them pass often enough.
@@ -102,5 +108,7 @@ class ProbabilityTrial(Trial):
         drawn = {self.key.name: np.repeat(values, DRAWN)}
         passes = self.draws.passes(np.repeat(index, DRAWN), z, **drawn)
         self.simulated += len(z)
+        if self.asked.tried is not None:
+            self.asked.tried(len(index))
         often = passes.reshape(-1, DRAWN).mean(axis=1) >= self.asked.probability
         return np.where(beyond_reach(block, judged), BEYOND, np.where(often, HOLDS, FAILS))

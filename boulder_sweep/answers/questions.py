@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -93,6 +94,8 @@ class Question:
     """Rows of a block; small enough that an interruption takes effect soon."""
     cells = CELLS
     """Number of cells into which the scan divides a range."""
+    tried: Callable[[int], None] | None = None
+    """Called with how many values have been tried, by the threads that try them; for questions with slow rows."""
 
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges) -> None:
         self.sweep, self.key, self.between, self.judges = sweep, key, between, judges
@@ -104,6 +107,10 @@ class Question:
     def count(self) -> int:
         """Number of combinations of the other inputs."""
         return self.open.count
+
+    def values_to_try(self) -> int:
+        """Return how many values are tried in all, for questions that report each; else 0."""
+        return 0
 
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""

@@ -78,7 +78,7 @@ def need(
     refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out, picture)
-    with working(quiet, kernels_for(sweep)) as progress:
+    with working(quiet, kernels_for(sweep), of="designs" if probability is None else "values") as progress:
         found = find(
             sweep,
             least,

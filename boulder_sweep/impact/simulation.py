@@ -40,7 +40,7 @@ from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, OVERTURNS, Judged
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.judge.refinement import finer_controls, reported_step_s
+from boulder_sweep.judge.refinement import finer_controls
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
@@ -200,7 +200,7 @@ def _changed(
 def _control(control: Control, how: Readings, step_s: float, *, layered: bool) -> Control:
     """How the time history is integrated: by the step that decided the row [s], and beyond the limit."""
     for finer in finer_controls(control):
-        if reported_step_s(finer) == step_s:
+        if reported_step(finer) == step_s:
             control = finer
     control = control._replace(stop_at_limit=False, refined=control.error_estimate)
     checked = control.error_estimate and not is_paired(how, control, layered=layered)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.table import finer_step
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -72,7 +72,7 @@ class Accuracy:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data, for the metadata of the table."""
-        reported_s = finer_step_s(self.steps.step_s) if self.error_estimate else self.steps.step_s
+        reported_s = finer_step(self.steps.step_s) if self.error_estimate else self.steps.step_s
         found: dict[str, Any] = {
             "asked": self.asked,
             "step_s": self.steps.step_s if self.paired else reported_s,
@@ -87,14 +87,6 @@ class Accuracy:
             found["estimated_error_p99_9_deg"] = self.achieved_deg
             found["met"] = self.met
         return found
-
-
-def finer_step_s(step_s: float) -> float:
-    """Return the step of the solution that is reported where errors are estimated [s].
-
-    Rounded to twelve digits: a third of 18 ms in binary numbers is not quite 6 ms.
-    """
-    return float(f"{step_s / STEP_RATIO:.12g}")
 
 
 def steps_of(sweep: Sweep) -> dict[str, Steps]:

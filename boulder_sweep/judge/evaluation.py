@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
+from boulder_kernels.table import some_rows
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
-from boulder_sweep.judge.refinement import RowStates, finer_controls, rows_of
+from boulder_sweep.judge.refinement import RowStates, finer_controls
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 from boulder_sweep.soils import with_soil
@@ -172,7 +173,7 @@ class Evaluation:
     def _doubted(self, judged: Judged, places: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> Judged:
         """Judge late rows, on which no two solutions agree, as of unknown error."""
         unknown = np.full(len(places), np.inf)
-        doubted = rows_of(outcomes, places)._replace(theta_error=unknown, x_error=unknown)
+        doubted = some_rows(outcomes, places)._replace(theta_error=unknown, x_error=unknown)
         return with_rows(judged, places, judge(doubted, designs.rows(places), self.limits, self.only))
 
     @property

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
-from boulder_kernels.layered import LayeredTable
 from boulder_kernels.table import is_paired
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, LADDER, Accuracy, Steps, steps_of
 from boulder_sweep.judge.evaluation import control_of, readings_of
@@ -171,8 +170,7 @@ def _sampled(sweep: Sweep, count: int) -> tuple[DesignBlock, np.ndarray]:
 
 def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate designs in pieces, so that an interruption takes effect soon."""
-    one_by_one = control.elements or designs.laws or isinstance(designs.table, LayeredTable)
-    size = AT_ONCE if one_by_one else AT_ONCE_CLOSED
+    size = AT_ONCE if control.elements or designs.laws else AT_ONCE_CLOSED
     rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
     pieces = [simulate_table(some.table, readings, control, *some.laws) for some in rows]
     return type(pieces[0])(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))

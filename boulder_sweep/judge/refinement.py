@@ -19,8 +19,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from boulder_kernels import ELASTIC, Control, OutcomeTable, Status
+from boulder_kernels.table import some_rows
 from boulder_sweep.columns import REASONS
-from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, finer_step_s
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, OVERTURNS, PASS, Judged, with_rows
 from boulder_sweep.judge.verdict import STEP_REASONS
@@ -66,11 +67,6 @@ def finer_controls(control: Control) -> Iterator[Control]:
             yield control._replace(h=h * FACTOR**finer, locate_yield=True, paired=True, last_resort=True)
 
 
-def reported_step_s(control: Control) -> float:
-    """Return the step of the solution that is reported [s]; of a doubtful design it is half of that."""
-    return finer_step_s(control.h) if control.error_estimate else control.h
-
-
 def is_open(judged: Judged, control: Control) -> np.ndarray:
     """Return which rows finer steps, those of a control, may decide (bool, shape (n,)).
 
@@ -108,11 +104,6 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: np.ndarray) -> np.ndarr
     in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= np.maximum(coarse.x_error, SAME_WAY)
     in_angle = np.abs(coarse.theta_max - fine.theta_max) <= np.maximum(coarse.theta_error, SAME_ANGLE)
     return alike & np.isfinite(fine.x_error) & np.where(limit, in_time, in_angle)
-
-
-def rows_of(outcomes: OutcomeTable, rows: np.ndarray) -> OutcomeTable:
-    """Return some rows of outcomes."""
-    return type(outcomes)(*(values[rows] for values in outcomes))
 
 
 class RowStates:
@@ -156,7 +147,7 @@ class RowStates:
         failed = judged.verdict == ERROR
         self._given_up[rows] = control.last_resort & failed
         confirmed = (self.unconfirmed[rows] > 0) & (judged.verdict == self.judged.verdict[rows])
-        confirmed &= agree(rows_of(self.outcomes, rows), outcomes, self._v_0[rows])
+        confirmed &= agree(some_rows(self.outcomes, rows), outcomes, self._v_0[rows])
         self.unconfirmed[rows[confirmed]] -= 1
         better = ~failed & ~confirmed
         self._compared_s[rows[better | confirmed]] = control.h

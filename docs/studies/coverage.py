@@ -11,7 +11,7 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps, finer_step_s
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps, finer_step
 from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.settings import load
 from docs.studies.random_designs import random_designs
@@ -22,7 +22,7 @@ HORIZON_S = 1.0
 REFERENCE_STEP_S = 5e-5
 ROUNDING_RAD, ROUNDING_M = 1e-11, 1e-11
 """Errors below these are rounding, of the reference as well."""
-NUMBERS = tuple(steps for steps in LADDER if finer_step_s(steps.step_s) in (0.006, 0.003, 0.0005, 0.000125))
+NUMBERS = tuple(steps for steps in LADDER if finer_step(steps.step_s) in (0.006, 0.003, 0.0005, 0.000125))
 """Some of those that an accuracy given as a number may come to."""
 
 
@@ -110,7 +110,7 @@ def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:
             named = STEPS if readings.restoring_gravity else STEPS_PRINTED
             for accuracy, steps in [*named.items(), *(("a number", steps) for steps in NUMBERS)]:
                 paired = accuracy == "a number" or not readings.restoring_gravity
-                finer_s = finer_step_s(steps.step_s)
+                finer_s = finer_step(steps.step_s)
                 steps_s = (steps.step_s, finer_s) if paired else (finer_s,)
                 if accuracy == "fast":
                     steps_s = (steps.step_s,)

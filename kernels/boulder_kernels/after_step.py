@@ -13,7 +13,17 @@ from ._jit import inlined, kernel
 from .dense_output import DenseOutput, state_at
 from .design import Constants, Readings
 from .dynamics import Acceleration, State, acceleration, signed_arm
-from .events import begin_search, first_event, gaps_within, go_on_searching, least_gap, tolerance_of, weights_of
+from .events import (
+    begin_search,
+    first_event,
+    gaps_within,
+    go_on_searching,
+    least_gap,
+    limit_before,
+    tolerance_of,
+    turns_beyond,
+    weights_of,
+)
 from .gaps import LIMIT, GapFactors, gap_factors, gaps_at, gaps_of
 from .modes import Modes, Switches, switches_of
 from .numerics import ITERATIONS, sine_versine
@@ -257,6 +267,8 @@ def keep_step(
         least, _ = least_gap(gaps_within(tau, dense, factors, switches, c), weights)
         b, tau, searching = go_on_searching(b, tau, least, tolerance)
     event, tau = first_event(b, tau, weights, end, dense, factors, switches, c)
+    if turns_beyond(tau, end, dense, factors):
+        event, tau = float(LIMIT), limit_before(dense, factors)
     return kept_up_to(event, tau, t, y_end, start, m, dense, switches, c)
 
 

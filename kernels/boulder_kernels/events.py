@@ -229,8 +229,17 @@ def refined(event: float, tau: float, b: Bracket, g: GapFactors, dense: DenseOut
 
 
 @inlined
-def limit_before(top: float, g: GapFactors, dense: DenseOutput) -> float:
-    """Fraction of a step at which a rotation that turns back beyond its limit, at top, reaches the limit."""
+def turns_beyond(tau: float, end: Gaps, dense: DenseOutput, g: GapFactors) -> bool:
+    """Whether the rotation turns back beyond its limit before the fraction tau of a step, at whose end it is within."""
+    top = turning_point(dense.rotation, 1.0)
+    # As printed the event is the turning point itself, found with another rounding.
+    return (abs(displacement_at(dense.rotation, top)) >= g.limit) & (end.limit >= 0.0) & (top < tau + 1e-9)
+
+
+@inlined
+def limit_before(dense: DenseOutput, g: GapFactors) -> float:
+    """Fraction of a step at which a rotation that turns back beyond its limit reaches it."""
+    top = turning_point(dense.rotation, 1.0)
     theta = displacement_at(dense.rotation, top)
     side = 1.0 if theta > 0.0 else -1.0
     beyond, bend = abs(theta) - g.limit, abs(curvature_at(dense.rotation, top))
@@ -251,7 +260,7 @@ def first_event(
     switches: Switches,
     c: Constants,
 ) -> tuple[float, float]:
-    """First event of a step, once its search has closed.
+    """First event of a step, once its search has closed; a limit from which it turns back is for `turns_beyond`.
 
     Parameters
     ----------
@@ -278,12 +287,7 @@ def first_event(
     kink = ((weights.top > 0.0) | (weights.base > 0.0)) & (tau > AT_ONCE) & (tau < LANDED)
     yields = (event < 0.0) & ((end.top < 0.0) | (end.base < 0.0))
     event = float(SHORTEN) if kink else (float(YIELD_TOP) if yields else event)
-    tau = min(BEYOND * tau, 1.0) if kink else tau
-    top = turning_point(dense.rotation, 1.0)
-    # As printed the event is the turning point itself, found with another rounding.
-    over = (abs(displacement_at(dense.rotation, top)) >= g.limit) & (end.limit >= 0.0) & (top < tau + 1e-9)
-    event, tau = float(LIMIT) if over else event, limit_before(top, g, dense) if over else tau
-    return event, tau
+    return event, min(BEYOND * tau, 1.0) if kink else tau
 
 
 @kernel

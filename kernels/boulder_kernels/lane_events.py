@@ -23,11 +23,13 @@ from .events import (
     gaps_within,
     go_on_searching,
     least_gap,
+    limit_before,
     tolerance_of,
+    turns_beyond,
     weights_of,
 )
 from .flat import field, put
-from .gaps import gaps_at
+from .gaps import LIMIT, gaps_at
 from .numerics import ITERATIONS
 from .outcomes import Status, compression_at
 from .workspace import (
@@ -114,11 +116,37 @@ def search_on(ws: Any) -> None:
 
 @kernel
 def is_open(ws: Any, count: int) -> bool:
-    """Whether a search is open in one of the first lanes."""
+    """Whether OPEN is set in one of the first lanes."""
     searches = 0.0
     for lane in range(count):
         searches += field(ws, OPEN, lane)
     return searches > 0.0
+
+
+@kernel
+def find_events(ws: Any) -> None:
+    """Find the first event of every step; OPEN now says whether the rotation turns back beyond its limit before."""
+    align_stack()
+    for lane in range(LANES):
+        c, s, g = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane), load(ws, FACTORS, lane)
+        dense, end = motion_within(ws, lane), load(ws, END_GAPS, lane)
+        b, weights = load(ws, BRACKET, lane), load(ws, WEIGHTS, lane)
+        event, tau = first_event(b, field(ws, TAU, lane), weights, end, dense, g, s, c)
+        put(ws, EVENT, lane, event)
+        put(ws, TAU, lane, tau)
+        put(ws, OPEN, lane, 1.0 if turns_beyond(tau, end, dense, g) else 0.0)
+
+
+@kernel
+def find_limits(ws: Any) -> None:
+    """Put the limit in place of the first event where the rotation turns back beyond it before."""
+    align_stack()
+    for lane in range(LANES):
+        g, dense = load(ws, FACTORS, lane), motion_within(ws, lane)
+        event, tau = field(ws, EVENT, lane), field(ws, TAU, lane)
+        over = field(ws, OPEN, lane) != 0.0
+        put(ws, EVENT, lane, float(LIMIT) if over else event)
+        put(ws, TAU, lane, limit_before(dense, g) if over else tau)
 
 
 @kernel
@@ -128,16 +156,7 @@ def keep_steps(ws: Any) -> None:
     for lane in range(LANES):
         c, s = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane)
         dense, start = motion_within(ws, lane), load(ws, COMPRESSION, lane)
-        event, tau = first_event(
-            load(ws, BRACKET, lane),
-            field(ws, TAU, lane),
-            load(ws, WEIGHTS, lane),
-            load(ws, END_GAPS, lane),
-            dense,
-            load(ws, FACTORS, lane),
-            s,
-            c,
-        )
+        event, tau = field(ws, EVENT, lane), field(ws, TAU, lane)
         y_end, m = load(ws, END_STATE, lane), load(ws, MAXIMA, lane)
         kept = kept_up_to(event, tau, field(ws, TIME, lane), y_end, start, m, dense, s, c)
         put(ws, EVENT, lane, kept.event)
@@ -225,4 +244,7 @@ def work_out(ws: Any, count: int, locate_yield: bool) -> None:
         if not is_open(ws, count):
             break
         search_on(ws)
+    find_events(ws)
+    if is_open(ws, count):
+        find_limits(ws)
     keep_steps(ws)

@@ -203,12 +203,17 @@ def simulate_plastic_rows(
     return OutcomesAtRest(*outcome_table(out, reported_step(control)), *rest)
 
 
-def reported_step(control: Control) -> float:
-    """Return the step that a solution is reported by [s], rounded to twelve digits.
+def finer_step(step: float) -> float:
+    """Return the step of the solution that is reported where errors are estimated [s].
 
-    A third of 18 ms in binary numbers is not quite 6 ms.
+    Rounded to twelve digits: a third of 18 ms in binary numbers is not quite 6 ms.
     """
-    return float(f"{control.h / (STEP_RATIO if control.refined else 1.0):.12g}")
+    return float(f"{step / STEP_RATIO:.12g}")
+
+
+def reported_step(control: Control) -> float:
+    """Return the step that a solution is reported by [s]."""
+    return finer_step(control.h) if control.refined else control.h
 
 
 def simulate_once(

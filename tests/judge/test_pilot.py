@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, finer_step_s
+from boulder_kernels.table import finer_step
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED
 from boulder_sweep.judge.evaluation import control_of
 from boulder_sweep.judge.pilot import accuracy_of, pilot, pilot_size, sampled_rows
 from boulder_sweep.runner.sweeper import run
@@ -31,7 +32,7 @@ def test_names_stand_for_steps(name: str) -> None:
 
 def test_reported_steps_are_round_numbers() -> None:
     """In the table, too: a third of 18 ms in binary numbers is 5.999999999999999 ms."""
-    shown = [finer_step_s(steps.step_s) for steps in LADDER]
+    shown = [finer_step(steps.step_s) for steps in LADDER]
     assert shown[:5] == [0.006, 0.004, 0.004, 0.003, 0.002]
     assert all(len(repr(step)) <= len("0.0001875") for step in shown)
 
