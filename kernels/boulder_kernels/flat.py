@@ -30,7 +30,9 @@ WIDTH = 32
 
 def field(values: Any, place: int, offset: int) -> float:
     """Return the number at a place and an offset from it, neither negative, of an array or a record that begins so."""
-    return float(values[0][place + offset] if isinstance(values, tuple) else values[place + offset])
+    # A number of NumPy's, so that lanes without a design divide by zero here as they do when compiled.
+    number: float = (values[0] if isinstance(values, tuple) else values)[place + offset]
+    return number
 
 
 def put(values: Any, place: int, offset: int, value: float) -> None:

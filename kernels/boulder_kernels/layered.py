@@ -339,7 +339,7 @@ def filled_layers(layers: np.ndarray, count: int) -> np.ndarray:
     """
     missing = count - layers.shape[1]
     filled = np.concatenate([layers, np.repeat(layers[:, -1:], missing, axis=1)], axis=1)
-    return np.ascontiguousarray(filled.reshape(len(layers), -1).T)
+    return np.ascontiguousarray(filled.reshape(len(layers), count * len(GivenLayer._fields)).T)
 
 
 @functools.cache

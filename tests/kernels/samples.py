@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 import boulder_kernels as bk
+from boulder_kernels.design import ultimate_pressure
 from boulder_kernels.dynamics import State, contact_displacement, spring_compression
+from boulder_kernels.layered import LayeredTable
 from boulder_kernels.plastic import Memory, empty_memory
 from boulder_kernels.soil_laws import constants_in, profile_of
 from boulder_kernels.table import Impact, simulate_impact
@@ -85,6 +87,25 @@ def random_designs(count: int, seed: int) -> list[bk.Design]:
         if design.H - design.d > design.e_bumper:
             found.append(design)
     return found
+
+
+def random_layers(designs: list[bk.Design], count: int, seed: int) -> LayeredTable:
+    """Put designs into soils of as many layers, some of them below the boulder, the uppermost one with cohesion.
+
+    The vertical stress is continuous, so that a layer lighter than what lies over it begins with more than its own.
+    """
+    rng = np.random.default_rng(seed)
+    rows = np.empty((len(designs), count, 6))
+    for layers, design in zip(rows, designs, strict=True):
+        bottoms = [*np.sort(rng.uniform(0.05, 1.2, count - 1)) * design.d, np.inf]
+        top = stress = 0.0
+        for m, bottom in enumerate(bottoms):
+            density, friction = rng.uniform(1500.0, 2200.0), radians(rng.uniform(28.0, 44.0))
+            slope = ultimate_pressure(1.0, friction, density, 1.0)
+            p_0 = slope / density * (stress - density * top) + (3e3 if m == 0 else 0.0)
+            layers[m] = bottom, density, friction, exp(rng.uniform(log(10.0), log(100.0))), p_0, slope
+            top, stress = bottom, stress + density * (bottom - top)
+    return LayeredTable(*table_of(designs), rows)
 
 
 def table_of(designs: list[bk.Design]) -> bk.DesignTable:

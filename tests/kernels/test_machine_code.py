@@ -11,7 +11,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import design_in
-from boulder_kernels.lane_events import begin_searches, keep_steps, search_on, start_steps
+from boulder_kernels.lane_events import begin_searches, find_events, find_limits, keep_steps, search_on, start_steps
 from boulder_kernels.lane_steps import (
     attempt_steps,
     compute_constants,
@@ -20,7 +20,7 @@ from boulder_kernels.lane_steps import (
     take_over_steps,
 )
 from boulder_kernels.lanes import run_lanes
-from boulder_kernels.workspace import LANES, SIZE, WHOLE
+from boulder_kernels.workspace import LANES, SIZE, WHOLE, LayeredLanes
 
 from .samples import control, random_designs, table_of
 
@@ -110,6 +110,8 @@ HOW = control(8e-3, 1.0, 0.3, stop_at_limit=True)
 OTHERS = {
     begin_searches: (False,),
     search_on: (),
+    find_events: (),
+    find_limits: (),
     keep_steps: (),
     start_steps: (),
     compute_constants: (np.stack(table_of(random_designs(LANES, seed=142))), 0, bk.corrected(), HOW, 8e-3),
@@ -122,6 +124,26 @@ OTHERS = {
 def test_events_and_starts_are_vectorised(kernel) -> None:
     """Searches for events, peaks, fresh accelerations, constants: whole registers, next to nothing a lane at a time."""
     code = assembly(kernel, np.zeros(WHOLE), *OTHERS[kernel])
+    assert not CALL.search(code)
+    found, register = widths(code), widest()
+    if register and register != "xmm":
+        packed = sum(count for name, count in found.items() if name.endswith(register))
+        assert packed > 100
+        assert len(SCALAR.findall(code)) < packed / 10
+
+
+IN_LAYERS = {
+    attempt_steps: (),
+    take_over_steps: (),
+    start_steps: (),
+    compute_constants: (np.zeros((15 + 12, LANES)), 0, bk.corrected(), HOW, 8e-3),
+}
+
+
+@pytest.mark.parametrize("kernel", IN_LAYERS, ids=lambda kernel: kernel.__name__)
+def test_layers_of_soil_are_vectorised(kernel) -> None:
+    """Written out layer by layer, so that neither a loop nor a branch nor a logarithm keeps the lanes apart."""
+    code = assembly(kernel, LayeredLanes(np.zeros(2 * WHOLE), (0, 0)), *IN_LAYERS[kernel])
     assert not CALL.search(code)
     found, register = widths(code), widest()
     if register and register != "xmm":
