@@ -7,12 +7,14 @@ nothing but multiply-adds that shows what the core can do at that moment.
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 import numpy as np
 
 import boulder_kernels as bk
 from boulder_kernels import lanes
 from boulder_kernels.design import design_at
+from boulder_kernels.layered import COUNTS, TO, filled_layers, uniform_layers
 from boulder_kernels.soil import Kinematics
 from boulder_kernels.workspace import LANES, SIZE
 
@@ -27,7 +29,7 @@ from .flops import (
 )
 from .peak import PeakLoop
 from .report import Table
-from .timing import interleaved, least_cpu_seconds, machine, median_ratio, versions
+from .timing import interleaved, machine, median_ratio, versions
 
 ATTEMPTS = 20_000
 ELEMENTS = 5000
@@ -36,6 +38,17 @@ CLOSED_FORMS = 400_000
 STEP_S = 0.014
 ROUNDS = 9
 ENDLESS = 10**9
+
+
+def same_soil(designs: bk.DesignTable, count: int) -> np.ndarray:
+    """Return the soil of designs cut into layers of equal height, as rows of a table for lanes, shape (6 count, n)."""
+    rows = []
+    for row in range(len(designs.L)):
+        design = design_at(designs, row)
+        layers = np.repeat(uniform_layers(design), count, axis=0)
+        layers[:-1, TO] = design.d * np.arange(1, count) / count
+        rows.append(layers)
+    return filled_layers(np.stack(rows), count)
 
 
 def measure(rounds: int = ROUNDS) -> Table:
@@ -78,7 +91,11 @@ def measure(rounds: int = ROUNDS) -> Table:
     mix = executed.flops / (2 * instructions)
 
     _, (attempts, in_use, attended) = loops.simulate_and_count(stacked, readings, control, ENDLESS)
-    whole = least_cpu_seconds(lambda: lanes.simulate_lanes(stacked, readings, control), 3)
+    tables = {0: stacked} | {count: np.concatenate([stacked, same_soil(designs, count)]) for count in COUNTS}
+    work = {count: partial(lanes.simulate_lanes, table, readings, control) for count, table in tables.items()}
+    of_layers = interleaved(work, 3)
+    whole = min(of_layers[0])
+    ratios = [f"{min(of_layers[count]) / whole:.1f}" for count in COUNTS]
     started = 1e9 * whole / DESIGNS - attempts / DESIGNS * (attempt_ns + look_ns)
     table = Table(
         "kernel",
@@ -107,6 +124,10 @@ def measure(rounds: int = ROUNDS) -> Table:
         ["steps handled in the group of events: events, peaks, the end", f"{attended / DESIGNS:.1f} per design"],
         ["cost of one of these, including the start of designs", f"{started * DESIGNS / attended:.0f} ns"],
         ["a whole design", f"{1e6 * whole / DESIGNS:.2f} us"],
+        [
+            f"the same in {', '.join(map(str, COUNTS[:-1]))} and {COUNTS[-1]} layers of soil",
+            f"{', '.join(ratios[:-1])} and {ratios[-1]} times as long",
+        ],
         ["element sums", f"{sum_ns:.2f} ns per element, {1e-3 * sum_ns * ELEMENTS:.1f} us for N = {ELEMENTS}"],
         ["closed form instead, one by one", f"{closed_ns:.0f} ns"],
     ]

@@ -16,7 +16,6 @@ from statistics import median
 from typing import TypeVar
 
 Result = TypeVar("Result")
-REPEATS = 5
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
@@ -35,12 +34,6 @@ def timed(work: Callable[[], Result], repeats: int) -> tuple[Result, float]:
         best = min(best, time.process_time() - begun)
     assert result is not None, "there must be one repeat at least"
     return result, best
-
-
-def least_cpu_seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Return the minimum CPU time of several repeats, after one that is not counted (it may compile) [s]."""
-    work()
-    return min(cpu_seconds(work) for _ in range(repeats))
 
 
 def interleaved(works: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:

@@ -201,6 +201,23 @@ def test_only_what_is_drawn_for_other_readings_ends_at_the_horizon(monkeypatch: 
     assert asked == [("corrected", 10.0), ("as_printed", 10.0), ("corrected", 10.0), ("as_printed", 0.0)]
 
 
+def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
+    """One row of many samples takes long: its progress moves, up to the end."""
+    seen: list[tuple[int, int]] = []
+    need(load_text(ONE_UNCERTAIN, Path("one.yaml")), probability=0.9, progress=lambda *now: seen.append(now))
+    done, totals = zip(*seen, strict=True)
+    assert len(set(totals)) == 1
+    assert totals[0] > 10
+    assert done[0] == 0
+    assert done[-1] == totals[0]
+    assert list(done) == sorted(set(done))
+    assert len(done) > 5
+    seen.clear()
+    rows = len(need(site(), progress=lambda *now: seen.append(now)))
+    assert seen[0] == (0, rows)
+    assert seen[-1] == (rows, rows)
+
+
 @pytest.mark.parametrize(
     ("question", "message"),
     [

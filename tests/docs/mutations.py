@@ -87,24 +87,18 @@ MUTATIONS = (
     Mutation((104,), _UPLIFT, "- (across + over) * omega**2", "+ (across + over) * omega**2"),
     Mutation((105,), _GROUND, "2e3 * cohesion * np.sqrt(K_p)", "1e3 * cohesion * np.sqrt(K_p)"),
     Mutation((105,), _GROUND, "K_p * (stress - weight * top)", "K_p * stress"),
-    Mutation(
-        (105,), _LAYERED, "soil.P_1[m] = layers[m, PRESSURE_SLOPE] * d", "soil.P_1[m] = layers[m, PRESSURE_SLOPE]"
-    ),
+    Mutation((105,), _LAYERED, "p_0 * ultimate, p_1 * design.d * ultimate", "p_0 * ultimate, p_1 * ultimate"),
     Mutation((105,), _LAYERED, "pressure * design.W * h_e", "pressure * h_e"),
     Mutation((106,), _GROUND, "if top >= water else", "if top > water else"),
     Mutation(
         (106,), _GROUND, "stress = stress + weight * (bottom - top)", "stress = stress + G * rho_s * (bottom - top)"
     ),
     Mutation((107,), _GROUND, "/ elementary.cos(slope))", ")"),
-    Mutation((108,), _LAYERS, "pressed_r += r * spring", "pressed_r += middle * spring"),
-    Mutation((108,), _LAYERS, "0.5 if within else 1.0", "0.5"),
-    Mutation((108,), _LAYERS, "stored += P_0 * P_0 * math.log", "stored -= P_0 * P_0 * math.log"),
-    Mutation(
-        (108,),
-        _LAYERS,
-        "roots_within(K * s, -P_1 - K * A, -P_0, low, high)",
-        "roots_within(K * s, P_1 - K * A, -P_0, low, high)",
-    ),
+    Mutation((108,), _LAYERS, "length = a - b if above else b - a", "length = b - a"),
+    Mutation((108,), _LAYERS, "(layer.P_1 if above else -layer.P_1)", "layer.P_1"),
+    Mutation((108,), _LAYERS, "length * powers + P_2 * logarithm", "length * powers - P_2 * logarithm"),
+    Mutation((108,), _LAYERS, "0.5 * w.F_2 + (1.0 / 3.0) * w.G_3", "0.5 * w.F_2 + 0.5 * w.G_3"),
+    Mutation((108,), _LAYERS, "0.5 * (2.0 * w.D_1 - sums.Z_1)", "0.5 * (w.D_1 - sums.Z_1)"),
     Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
     Mutation((111,), _SECOND, "k_m=c.k_m * (k_2 / c.k_v)", "k_m=c.k_m"),
     Mutation((111,), _DYNAMICS, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
