@@ -72,8 +72,13 @@ def measure(passes: int, threads: int = 2) -> Count:
         while sum(one.passes for one in found) < passes:
             found += pool.map(block, range(seed, seed + threads))
             seed += threads
-    *counts, largest = zip(*found, strict=True)
-    return Count(*map(sum, counts), max(largest))
+    return Count(
+        sum(one.designs for one in found),
+        sum(one.passes for one in found),
+        sum(one.overturned for one in found),
+        sum(one.refused for one in found),
+        max(one.largest_deg for one in found),
+    )
 
 
 def main() -> None:

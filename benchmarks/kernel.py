@@ -7,6 +7,7 @@ nothing but multiply-adds that shows what the core can do at that moment.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -92,10 +93,12 @@ def measure(rounds: int = ROUNDS) -> Table:
 
     _, (attempts, in_use, attended) = loops.simulate_and_count(stacked, readings, control, ENDLESS)
     tables = {0: stacked} | {count: np.concatenate([stacked, same_soil(designs, count)]) for count in COUNTS}
-    work = {count: partial(lanes.simulate_lanes, table, readings, control) for count, table in tables.items()}
-    of_layers = interleaved(work, 3)
-    whole = min(of_layers[0])
-    ratios = [f"{min(of_layers[count]) / whole:.1f}" for count in COUNTS]
+    work: dict[str, Callable[[], object]] = {
+        str(count): partial(lanes.simulate_lanes, table, readings, control) for count, table in tables.items()
+    }
+    of_layers = {name: min(seconds) for name, seconds in interleaved(work, 3).items()}
+    whole = of_layers.pop("0")
+    ratios = [f"{seconds / whole:.1f}" for seconds in of_layers.values()]
     started = 1e9 * whole / DESIGNS - attempts / DESIGNS * (attempt_ns + look_ns)
     table = Table(
         "kernel",
