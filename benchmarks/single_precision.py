@@ -48,7 +48,7 @@ CHANGES = {
         ("    if c.elements > 0:\n        return summed_potential(A, slope_x, c)\n", ""),
     ),
     "workspace": (("LANES = 8", "LANES = 16"),),
-    "lanes": (("np.zeros(WHOLE + LANES)", "np.zeros(WHOLE + LANES, np.float32)"),),
+    "lanes": (("WHOLE + LANES)", "WHOLE + LANES, np.float32)"),),
 }
 STEPS_MS = (16.0, 12.0, 8.0, 4.0, 2.0, 1.0)
 

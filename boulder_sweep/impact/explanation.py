@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, Readings
-from boulder_kernels.table import reported_step
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OutcomeColumn
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import Evaluation, known_control
+from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
@@ -129,7 +129,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     try:
         control, readings = known_control(there["control"]), Readings(**there["readings"])
         settings = completed(there["settings"])
-        sweep = _one_design(settings, inputs, control, values["step_s"] or reported_step(control))
+        sweep = _one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
         stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     except (LookupError, TypeError, ValueError) as unfamiliar:
         why = f"its settings are not those of this version: {type(unfamiliar).__name__}: {unfamiliar}"

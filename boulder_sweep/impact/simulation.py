@@ -31,8 +31,8 @@ from boulder_kernels.table import (
     halved,
     is_paired,
     problem_at,
-    reported_step,
     simulate_impact,
+    step_of_solution,
 )
 from boulder_sweep.columns import AT_REST, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
@@ -40,7 +40,7 @@ from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, OVERTURNS, Judged
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.judge.refinement import finer_controls
+from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
@@ -200,11 +200,11 @@ def _changed(
 def _control(control: Control, how: Readings, step_s: float, *, layered: bool) -> Control:
     """How the time history is integrated: by the step that decided the row [s], and beyond the limit."""
     for finer in finer_controls(control):
-        if reported_step(finer) == step_s:
+        if reported_step_s(finer) == step_s:
             control = finer
     control = control._replace(stop_at_limit=False, refined=control.error_estimate)
     checked = control.error_estimate and not is_paired(how, control, layered=layered)
-    return halved(control) if checked and reported_step(control) != step_s else control
+    return halved(control) if checked and step_of_solution(control) != step_s else control
 
 
 def _as_decided(judged: Judged, decided: Judged) -> Judged:
@@ -240,7 +240,7 @@ def _outcome_row(outcome: Outcome, design: Design, control: Control) -> OutcomeT
     """Return one outcome as a table of one row, with the error of its steps."""
     row = empty_outcomes(1)
     write_outcome(row, 0, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-    return outcome_table(row, reported_step(control))
+    return outcome_table(row, step_of_solution(control))
 
 
 def _estimate(row: OutcomeTable, coarser: OutcomeTable, table: DesignTable, how: Readings) -> None:

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import ELASTIC, DesignTable, Readings, as_printed, corrected
-from boulder_kernels.table import reported_step
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, plain_designs, sampled_designs, simulated
+from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.soils import with_soil
@@ -148,7 +148,7 @@ def other_law(law: str) -> str:
 def _numerical_errors(designs: Designs, readings: Readings, control: Control) -> dict[str, float | None]:
     """Estimated errors not exceeded by most of the designs that did not overturn."""
     error_deg = error_m = None
-    share = min(1.0, reported_step(control) / SHORTEST_STEP_S)
+    share = min(1.0, reported_step_s(control) / SHORTEST_STEP_S)
     some = designs.rows(slice(None, None, max(1, round(1.0 / share))))
     outcomes = simulated(some, readings, control._replace(longest_horizon=0.0))
     counts = np.isfinite(outcomes.theta_error) & (outcomes.theta_error > 0.0)

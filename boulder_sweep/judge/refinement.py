@@ -19,7 +19,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from boulder_kernels import ELASTIC, Control, OutcomeTable, Status
-from boulder_kernels.table import some_rows
+from boulder_kernels.table import finer_step, some_rows
 from boulder_sweep.columns import REASONS
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
 from boulder_sweep.judge.inputs import Designs
@@ -65,6 +65,11 @@ def finer_controls(control: Control) -> Iterator[Control]:
         h = min(control.h, control.horizon / LAST_RESORT_STEPS)
         for finer in range(1 + AGREEING if control.error_estimate else 1):
             yield control._replace(h=h * FACTOR**finer, locate_yield=True, paired=True, last_resort=True)
+
+
+def reported_step_s(control: Control) -> float:
+    """Return the step of the solution that is reported [s]; of a doubtful design it is half of that."""
+    return finer_step(control.h) if control.error_estimate else control.h
 
 
 def is_open(judged: Judged, control: Control) -> np.ndarray:

@@ -14,12 +14,12 @@ from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
-from boulder_kernels.table import is_paired, reported_step
+from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES, VERDICTS
 from boulder_sweep.columns import REASONS as VERDICT_REASONS
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
-from boulder_sweep.judge.refinement import finer_controls
+from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.uplift import WALL_FRICTION
 from boulder_sweep.judge.validity import (
     FLAGS,
@@ -92,13 +92,13 @@ def page_data(
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": REASONS,
         "words": REASON_WORDS,
-        "step_s": reported_step(control),
+        "step_s": reported_step_s(control),
         "finer": [
             {
                 "h": finer.h,
                 "locate_yield": float(finer.locate_yield),
                 "paired": float(finer.paired),
-                "step_s": reported_step(finer),
+                "step_s": reported_step_s(finer),
             }
             for finer in finer_controls(closed)
             if not finer.last_resort

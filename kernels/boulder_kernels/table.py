@@ -200,7 +200,7 @@ def simulate_plastic_rows(
         errors = step_errors(impact.outcome, problem.design, control.theta_limit, control.horizon)
         write_outcome(out, row, impact.outcome, errors)
         rest[:, row] = impact.theta_rest, impact.swing_back, impact.doubt
-    return OutcomesAtRest(*outcome_table(out, reported_step(control)), *rest)
+    return OutcomesAtRest(*outcome_table(out, step_of_solution(control)), *rest)
 
 
 def finer_step(step: float) -> float:
@@ -211,8 +211,8 @@ def finer_step(step: float) -> float:
     return float(f"{step / STEP_RATIO:.12g}")
 
 
-def reported_step(control: Control) -> float:
-    """Return the step that a solution is reported by [s]."""
+def step_of_solution(control: Control) -> float:
+    """Return the step of a solution [s]: of the finer of two, or of the only one."""
     return finer_step(control.h) if control.refined else control.h
 
 
@@ -248,7 +248,7 @@ def simulate_once(
         out = simulate_lanes(designs, readings, control)
     else:
         out = simulate_rows(designs, None, None, stacked, readings, control)
-    return outcome_table(out, reported_step(control)), out[SECOND]
+    return outcome_table(out, step_of_solution(control)), out[SECOND]
 
 
 @kernel

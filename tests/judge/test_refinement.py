@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from boulder_kernels import Control, OutcomeTable, Status, corrected
-from boulder_kernels.table import reported_step
 from boulder_sweep.columns import OUTCOME_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.evaluation import Evaluation, by_kernels
@@ -19,6 +18,7 @@ from boulder_sweep.judge.refinement import (
     LAST_RESORT_STEPS,
     MOST_STEPS,
     finer_controls,
+    reported_step_s,
 )
 from boulder_sweep.judge.verdict import Limits
 from tests.judge.plain import plain_designs
@@ -55,12 +55,12 @@ def test_a_design_that_is_too_stiff_for_its_steps_is_decided_by_finer_ones() -> 
     assert once.status[0] == Status.STIFF_SOIL
     row = evaluation().judged(stiff).row(0)
     assert row["verdict"] in ("pass", "fail")
-    assert row["step_s"] < reported_step(CONTROL)
+    assert row["step_s"] < reported_step_s(CONTROL)
 
 
 def test_a_row_says_by_which_step_it_was_decided() -> None:
     row = evaluation().judged(plain_designs()).row(0)
-    assert row["step_s"] == reported_step(CONTROL) == 0.004
+    assert row["step_s"] == reported_step_s(CONTROL) == 0.004
     unconfirmed = CONTROL._replace(error_estimate=False)
     assert evaluation(unconfirmed).judged(plain_designs()).row(0)["step_s"] == 0.012
     assert evaluation().judged(plain_designs(H=1.5)).row(0)["step_s"] is None  # no contact: nothing was simulated
@@ -74,7 +74,7 @@ def test_a_limit_within_the_error_of_the_peak_is_decided_by_finer_steps() -> Non
     control = CONTROL._replace(theta_limit=limit)
     row = evaluation(control, Limits(limit, "P1")).judged(standing).row(0)
     assert row["verdict"] == "pass"
-    assert row["step_s"] < reported_step(CONTROL)
+    assert row["step_s"] < reported_step_s(CONTROL)
 
 
 def test_an_unconfirmed_row_within_its_error_of_a_limit_stays_undecided() -> None:

@@ -33,9 +33,9 @@ from boulder_kernels.table import (
     SAFETY_CONFIRMED,
     halved,
     is_paired,
-    reported_step,
     simulate_checked,
     simulate_once,
+    step_of_solution,
 )
 from tests import oracle
 
@@ -172,8 +172,8 @@ def test_some_designs_are_solved_twice() -> None:
         apart = np.abs(one.x_v_max - other.x_v_max)[rows]
         assert (found.x_error[rows] >= np.maximum(safety * apart, LEAST_CONFIRMED_M)).all()
         assert (found.x_error[rows] >= other.x_error[rows]).all()
-    assert reported_step(how) == 0.004
-    assert reported_step(halved(how)) == 0.002
+    assert step_of_solution(how) == 0.004
+    assert step_of_solution(halved(how)) == 0.002
 
 
 def test_a_second_solution_that_cannot_be_computed(monkeypatch: pytest.MonkeyPatch) -> None:
