@@ -119,7 +119,7 @@ def _translated(name: str) -> types.ModuleType:
     with np.errstate(over="ignore"):  # 1e300 means never, and so does infinity
         exec(compile(ast.fix_missing_locations(tree), str(file), "exec"), module.__dict__)
     if name == "dormand_prince":  # the tableau checks itself by exact fractions; what comes out of it is rounded
-        module.C = tuple(np.float32(value) for value in module.C)
+        module.C, module.ERROR = (tuple(np.float32(value) for value in row) for row in (module.C, module.ERROR))
         module.A, module.AA = (tuple(tuple(np.float32(v) for v in row) for row in m) for m in (module.A, module.AA))
     return module
 

@@ -118,21 +118,20 @@ def _lower_part(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     whole = args[0] if isinstance(sig.args[0], types.Array) else builder.extract_value(args[0], 0)
     moved = context.make_array(_array(sig.args[0]))(context, builder, whole)
     moved.data = _pointer(context, builder, sig.args, args)
+    moved.meminfo = cgutils.get_null_value(moved.meminfo.type)  # or Numba would give the memory back with the part
     value = moved._getvalue()
     return value if isinstance(sig.args[0], types.Array) else builder.insert_value(args[0], value, 0)
 
 
-REAL = types.float64
+def _record(ws: Any, record: Any) -> Any:
+    """Type of a record of numbers that are kept, or known, of a workspace of a type."""
+    real = _array(ws).dtype
+    return types.BaseTuple.from_types([_NOT_REAL.get(kind, real) for kind in get_type_hints(record).values()], record)
 
 
-def _record(record: Any) -> Any:
-    """Type of a record of numbers that are kept, or known."""
-    return types.BaseTuple.from_types([_NOT_REAL.get(kind, REAL) for kind in get_type_hints(record).values()], record)
-
-
-def _soil(layers: int) -> Any:
+def _soil(ws: Any) -> Any:
     """Type of the soil of a lane."""
-    return types.NamedTuple([_record(SoilSums), types.UniTuple(_record(Layer), layers)], FewLayers)
+    return types.NamedTuple([_record(ws, SoilSums), types.UniTuple(_record(ws, Layer), len(ws[1]))], FewLayers)
 
 
 @type_callable(load)
@@ -141,9 +140,9 @@ def _type_load(context: Any) -> Callable[..., Any]:
         """Return the type of the record, or None where the place is not yet known as a constant."""
         if not isinstance(place, types.IntegerLiteral):
             return None
-        kind = _record(RECORDS[place.literal_value])
+        kind = _record(ws, RECORDS[place.literal_value])
         if place.literal_value == CONSTANTS and not isinstance(ws, types.Array):
-            return types.NamedTuple([*kind.types, _soil(len(ws[1]))], LayeredConstants)
+            return types.NamedTuple([*kind.types, _soil(ws)], LayeredConstants)
         return kind
 
     return result
@@ -151,7 +150,7 @@ def _type_load(context: Any) -> Callable[..., Any]:
 
 def _load_numbers(context: Any, builder: Any, sig: Any, args: Any, kind: Any, place: int) -> tuple[Any, int]:
     """Load numbers one after another into records within records; return it and the place behind."""
-    if kind == REAL:
+    if isinstance(kind, types.Float):
         kinds, values = (sig.args[0], sig.args[-1]), (args[0], args[-1])
         return builder.load(_pointer(context, builder, kinds, values, place)), place + LANES
     fields = []
@@ -164,7 +163,7 @@ def _load_numbers(context: Any, builder: Any, sig: Any, args: Any, kind: Any, pl
 def _store_numbers(context: Any, builder: Any, ws: Any, lane: Any, record: Any, place: int) -> int:
     """Store the numbers of records within records one after another, all as (type, value); return the place behind."""
     kind, value = record
-    if kind == REAL:
+    if isinstance(kind, types.Float):
         builder.store(value, _pointer(context, builder, (ws[0], lane[0]), (ws[1], lane[1]), place))
         return place + LANES
     for i, each in enumerate(kind.types):
@@ -180,7 +179,7 @@ def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     for name, kind in zip(record._fields, sig.return_type.types, strict=False):
         if name in offsets:
             number = builder.load(_pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
-            values.append(context.cast(builder, number, REAL, kind))
+            values.append(context.cast(builder, number, _array(sig.args[0]).dtype, kind))
         else:
             values.append(context.get_constant(kind, KNOWN[name]))
     if len(values) < len(sig.return_type):
@@ -190,7 +189,7 @@ def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @type_callable(load_given)
 def _type_load_given(context: Any) -> Callable[..., Any]:
-    return lambda ws, lane: types.UniTuple(_record(GivenLayer), len(ws[1]))
+    return lambda ws, lane: types.UniTuple(_record(ws, GivenLayer), len(ws[1]))
 
 
 @lower_builtin(load_given, types.Any, types.Any)
@@ -210,7 +209,7 @@ def _lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     offsets = offsets_of(Constants if layered else record.instance_class)
     for i, (name, kind) in enumerate(zip(record.fields, record.types, strict=True)):
         if name in offsets:
-            value = context.cast(builder, builder.extract_value(args[3], i), kind, REAL)
+            value = context.cast(builder, builder.extract_value(args[3], i), kind, _array(sig.args[0]).dtype)
             builder.store(value, _pointer(context, builder, sig.args[:3], args[:3], offsets[name]))
     if layered:
         last = len(record.types) - 1
