@@ -47,6 +47,7 @@ CHANGES = {
         ("    if c.elements > 0:\n        return element_sums(k, c)\n", ""),
         ("    if c.elements > 0:\n        return summed_potential(A, slope_x, c)\n", ""),
     ),
+    "dormand_prince": (("error_arm(c) *", "c.d - min(c.z_0, 0.0) *"),),  # its 0.5 is a double
     "workspace": (("LANES = 8", "LANES = 16"),),
     "lanes": (("WHOLE + LANES)", "WHOLE + LANES, np.float32)"),),
 }
