@@ -1,0 +1,418 @@
+"""Second opinions: impacts with heave and friction, from the first touch to a verdict that is proved.
+
+Nothing jumps in this motion, but forces bend where the truck comes off, where a strip of the foot touches or leaves and
+where a slip turns. So the step follows the embedded error of Dormand and Prince's method; where the truck comes off or
+touches again, and where the rotation reaches its limit, the step is cut at that instant.
+
+Once the truck no longer drives forward, the energy of boulder, soil, base and crush can only fall. If it is below the
+least potential energy at the limit of rotation, forward and back, the boulder never gets there, and the motion ends.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ._jit import inlined, kernel
+from .dense_output import Track, displacement_at, slope_at, track, turning_point
+from .design import Constants, constants_of, corrected, design_in, error_arm, is_computable
+from .dormand_prince import AA, ERROR, STAGES, A, C
+from .dynamics import contact_displacement, spring_compression
+from .flat import field, put
+from .heave import (
+    ROOM,
+    SETS,
+    PIECES,
+    Base,
+    Form,
+    Forces,
+    HeaveConstants,
+    accelerations,
+    forces,
+    heave_constants,
+    kinetic_energy,
+    potential_energy,
+    prepare,
+    strip_depth,
+)
+from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
+from .outcomes import Status
+
+READINGS = corrected()
+"""The only readings that there are second opinions of."""
+AXES = 4
+"""Displacements: x_b, theta_b, y_b, x_v."""
+START, TRIAL, RATES = ROOM, ROOM + 2 * AXES, ROOM + 4 * AXES
+"""Places in the workspace: displacements and velocities at the start of a step and within it; rates of all stages."""
+WORKSPACE = RATES + STAGES * AXES
+"""Numbers in the workspace of one impact."""
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 2e-4, 8e-3, 1e-9
+"""Lengths of steps [s]."""
+MOST_ATTEMPTS = 50_000
+CAUTION = 0.99
+"""The energy must be below the barrier by the errors of the integrator and of the search for the least, and more."""
+TURNS = 3
+"""How often the least energy is looked for along x_b and along y_b in turn."""
+HALVINGS = 40
+"""Halvings of an interval in which it is looked for."""
+
+
+class HeaveControl(NamedTuple):
+    """How an impact is simulated."""
+
+    theta_limit: float
+    """Limit of rotation [rad]."""
+    longest: float
+    """Longest simulated time [s]; a motion that is not proved to stay below the limit by then is not decided."""
+    tolerance: float = 1e-6
+    """Error of one step [m]: of velocities times its length, that of the rotation at `error_arm`."""
+    stop: bool = True
+    """Whether the simulation ends at the limit, and where it is proved that it is not reached."""
+
+
+class HeaveRecord(NamedTuple):
+    """Where a simulation writes its time history; empty arrays for none."""
+
+    times: np.ndarray
+    """Times asked for [s], ascending, shape (n,)."""
+    states: np.ndarray
+    """Displacements and velocities of x_b, theta_b, y_b and x_v, shape (n, 8)."""
+    energy: np.ndarray
+    """Energy of truck, boulder, soil and base [J], shape (n,)."""
+
+
+class HeaveOutcome(NamedTuple):
+    """Result of one simulation; NaN where not computed."""
+
+    status: int
+    """LIMIT, BELOW_LIMIT, HORIZON, or why there is no result, see `Status`."""
+    theta_max: float
+    """Largest |theta_b| up to the end [rad]."""
+    x_b_max: float
+    """Largest x_b [m]."""
+    y_b_max: float
+    """Largest rise of the common centre of mass [m]."""
+    x_v_max: float
+    """Largest displacement of the truck [m]."""
+    t_limit: float
+    """Time at which the rotation reached its limit [s]."""
+    t_end: float
+    """Simulated time [s]."""
+    attempts: float
+    """Steps tried."""
+
+
+def no_heave_record() -> HeaveRecord:
+    """Return a record that keeps nothing."""
+    return HeaveRecord(np.empty(0), np.empty((0, 2 * AXES)), np.empty(0))
+
+
+@kernel
+def write_rate(work: np.ndarray, at: int, stage: int, touching: bool, f: HeaveConstants) -> float:
+    """Write the accelerations at a state as those of a stage, and return the compression of the vehicle's spring."""
+    x, theta, y, x_v = field(work, at, 0), field(work, at, 1), field(work, at, 2), field(work, at, 3)
+    v, omega, w, v_v = field(work, at, 4), field(work, at, 5), field(work, at, 6), field(work, at, 7)
+    Q = forces(x, v, theta, omega, y, w, x_v, v_v, touching, work, f)
+    a = accelerations(theta, omega, Q, touching, f)
+    for axis in range(AXES):
+        put(work, RATES + AXES * stage, axis, a[axis])
+    return Q.u
+
+
+@kernel
+def attempt(work: np.ndarray, h: float, touching: bool, f: HeaveConstants) -> tuple[float, float]:
+    """Try a step of length h [s] into `TRIAL`; return its error [m] and the compression at its end [m]."""
+    u = 0.0
+    for stage in range(1, STAGES):
+        for axis in range(AXES):
+            x, v = field(work, START, axis), field(work, START, AXES + axis)
+            moved, gained = C[stage] * v, 0.0
+            for j in range(stage):
+                a = field(work, RATES + AXES * j, axis)
+                moved += h * AA[stage][j] * a
+                gained += A[stage][j] * a
+            put(work, TRIAL, axis, x + h * moved)
+            put(work, TRIAL, AXES + axis, v + h * gained)
+        u = write_rate(work, TRIAL, stage, touching, f)
+    error = 0.0
+    for axis in range(AXES):
+        off = 0.0
+        for j in range(STAGES):
+            off += ERROR[j] * field(work, RATES + AXES * j, axis)
+        error += abs(off) * (error_arm(f.c) if axis == 1 else 1.0)
+    return h * h * error, u
+
+
+@inlined
+def track_of(work: np.ndarray, axis: int, h: float) -> Track:
+    """Motion along one axis within the step that was tried last."""
+    return track(
+        h,
+        field(work, START, axis),
+        field(work, START, AXES + axis),
+        field(work, RATES, axis),
+        field(work, TRIAL, axis),
+        field(work, TRIAL, AXES + axis),
+        field(work, RATES + AXES * (STAGES - 1), axis),
+    )
+
+
+class Tracks(NamedTuple):
+    """The motion within a step."""
+
+    x_b: Track
+    theta_b: Track
+    y_b: Track
+    x_v: Track
+
+
+@inlined
+def compression_in(q: Tracks, tau: float, h: float, c: Constants) -> float:
+    """Compression of the vehicle's spring at the fraction tau of a step [m]."""
+    sin, versin = sine_versine(displacement_at(q.theta_b, tau))
+    x_c = contact_displacement(displacement_at(q.x_b, tau), sin, versin, c)
+    return spring_compression(displacement_at(q.x_v, tau), slope_at(q.x_v, tau) / h, x_c, c)
+
+
+@kernel
+def contact_change(q: Tracks, u: float, u_end: float, h: float, c: Constants) -> float:
+    """Fraction of a step at which the compression changes its sign."""
+    b = Bracket(0.0, u, 1.0, u_end, 0.0)
+    for _ in range(ITERATIONS):
+        tau = next_guess(b)
+        u_tau = compression_in(q, tau, h, c)
+        if abs(u_tau) < 1e-12 or b.high - b.low < 1e-12:
+            return tau
+        b = narrowed(b, tau, u_tau)
+    return 0.5 * (b.low + b.high)
+
+
+@kernel
+def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
+    """Fraction of a step at which the rotation reaches a limit that it has passed at tau_end [rad]."""
+    low, high = 0.0, tau_end
+    for _ in range(ITERATIONS):
+        middle = 0.5 * (low + high)
+        beyond = abs(displacement_at(q, middle)) >= limit
+        low, high = (low, middle) if beyond else (middle, high)
+    return high
+
+
+@kernel
+def keep(work: np.ndarray, q: Tracks, tau: float, h: float) -> None:
+    """Go on from the fraction tau of the step that was tried last."""
+    for axis in range(AXES):
+        if tau >= 1.0:
+            x, v = field(work, TRIAL, axis), field(work, TRIAL, AXES + axis)
+        else:
+            x, v = displacement_at(q[axis], tau), slope_at(q[axis], tau) / h
+        put(work, START, axis, x)
+        put(work, START, AXES + axis, v)
+
+
+@kernel
+def press_in(work: np.ndarray, f: HeaveConstants) -> bool:
+    """Keep what a strip of the foot is pressed in beyond its bearing capacity as its set; whether any was."""
+    sin, versin = sine_versine(field(work, START, 1))
+    any_pressed = False
+    for j in range(PIECES):
+        over = strip_depth(work, j, field(work, START, 2), sin, versin, f) - f.q_strip / f.k_strip
+        if over > 0.0 and f.heave > 0.0:
+            put(work, SETS, j, field(work, SETS, j) + over)
+            any_pressed = True
+    return any_pressed
+
+
+@kernel
+def energy_at(work: np.ndarray, at: int, f: HeaveConstants) -> float:
+    """Energy of boulder, lumped soil, soil and base at a state [J]."""
+    x, theta, y = field(work, at, 0), field(work, at, 1), field(work, at, 2)
+    v, omega, w = field(work, at, 4), field(work, at, 5), field(work, at, 6)
+    return kinetic_energy(v, theta, omega, w, f) + potential_energy(x, theta, y, work, f).u
+
+
+@kernel
+def crush_energy(u: float, c: Constants) -> float:
+    """Energy in the vehicle's spring [J]."""
+    return 0.5 * c.k_v * max(u, 0.0) ** 2
+
+
+@kernel
+def least_energy(theta: float, x_start: float, work: np.ndarray, f: HeaveConstants) -> float:
+    """Least potential energy at a rotation, wherever the boulder stands [J] (Eq 137).
+
+    Notes
+    -----
+    Along x_b alone, and along y_b alone, the energy is convex: the least is found by halving, along either in turn.
+    """
+    x, y = x_start, 0.0
+    V = 0.0
+    for turn in range(TURNS):
+        low, high = x - 2.0 * f.c.d, x + 2.0 * f.c.d
+        for _ in range(HALVINGS):
+            x = 0.5 * (low + high)
+            low, high = (x, high) if potential_energy(x, theta, y, work, f).Q_x > 0.0 else (low, x)
+        if f.heave > 0.0:
+            low, high = -0.5 * f.c.d, f.L
+            for _ in range(HALVINGS):
+                y = 0.5 * (low + high)
+                low, high = (y, high) if potential_energy(x, theta, y, work, f).Q_y > 0.0 else (low, y)
+        V = potential_energy(x, theta, y, work, f).u
+    return V
+
+
+@kernel
+def simulate_heave(
+    f: HeaveConstants, m_v: float, control: HeaveControl, work: np.ndarray, record: HeaveRecord
+) -> HeaveOutcome:
+    """Simulate one impact with heave and friction.
+
+    Parameters
+    ----------
+    f
+        Constants of the design.
+    m_v
+        Mass of the truck [kg], for the energy that is recorded.
+    control
+        Limit, horizon and tolerance.
+    work
+        Workspace, shape (WORKSPACE,).
+    record
+        Filled with the time history at the times it names.
+    """
+    c = f.c
+    prepare(work, f)
+    for axis in range(2 * AXES):
+        put(work, START, axis, 0.0)
+    put(work, START, 7, c.v_0)
+    t, h, touching = 0.0, FIRST_STEP, True
+    u = write_rate(work, START, 0, touching, f)
+    theta_max = x_b_max = y_b_max = x_v_max = 0.0
+    t_limit, barrier = np.nan, np.nan
+    written, attempts = 0, 0
+    status = Status.STEP_BUDGET.value
+    while attempts < MOST_ATTEMPTS:
+        attempts += 1
+        h = min(h, control.longest - t)
+        error, u_end = attempt(work, h, touching, f)
+        if not error <= control.tolerance:
+            if not h > SHORTEST_STEP:
+                status = Status.UNSTABLE.value
+                break
+            h *= max(0.9 * (control.tolerance / error) ** 0.2, 0.2) if error < np.inf else 0.2
+            continue
+        q = Tracks(track_of(work, 0, h), track_of(work, 1, h), track_of(work, 2, h), track_of(work, 3, h))
+        tau, changes = 1.0, False
+        if u_end < 0.0 < u if touching else u_end > 0.0 >= u:
+            tau, changes = contact_change(q, u, u_end, h, c), True
+        turned = turning_point(q.theta_b, tau)
+        theta = abs(displacement_at(q.theta_b, turned))
+        theta_end = abs(displacement_at(q.theta_b, tau))
+        at_limit = max(theta, theta_end) >= control.theta_limit
+        if at_limit and np.isnan(t_limit):
+            until = time_of_limit(q.theta_b, control.theta_limit, turned if theta >= control.theta_limit else tau)
+            t_limit = t + until * h
+            tau = until if control.stop else tau
+        theta_max = max(theta_max, max(theta, theta_end))
+        x_b_max = max(x_b_max, displacement_at(q.x_b, turning_point(q.x_b, tau)))
+        y_b_max = max(y_b_max, displacement_at(q.y_b, turning_point(q.y_b, tau)))
+        x_v_max = max(x_v_max, displacement_at(q.x_v, turning_point(q.x_v, tau)))
+        keep(work, q, tau, h)
+        while written < record.times.size and record.times[written] <= t + tau * h:
+            at = (record.times[written] - t) / h
+            for axis in range(AXES):
+                record.states[written, axis] = displacement_at(q[axis], at)
+                record.states[written, AXES + axis] = slope_at(q[axis], at) / h
+                put(work, TRIAL, axis, record.states[written, axis])
+                put(work, TRIAL, AXES + axis, record.states[written, AXES + axis])
+            stored = crush_energy(compression_in(q, at, h, c), c) if touching else 0.0
+            record.energy[written] = energy_at(work, TRIAL, f) + stored + 0.5 * m_v * record.states[written, 7] ** 2
+            written += 1
+        t += tau * h
+        if at_limit and control.stop:
+            status, theta_max = Status.LIMIT.value, control.theta_limit
+            break
+        if press_in(work, f):
+            barrier = np.nan
+        if changes:
+            touching = not touching
+            u = 0.0
+        else:
+            u = u_end
+        if tau < 1.0:
+            write_rate(work, START, 0, touching, f)
+        else:
+            for axis in range(AXES):
+                put(work, RATES, axis, field(work, RATES + AXES * (STAGES - 1), axis))
+        h = min(h * min(0.9 * (control.tolerance / max(error, 1e-30)) ** 0.2, 4.0), LONGEST_STEP)
+        if control.stop and field(work, START, 7) <= 0.0:
+            if np.isnan(barrier):
+                x = field(work, START, 0)
+                forward = least_energy(control.theta_limit, x, work, f)
+                barrier = CAUTION * min(forward, least_energy(-control.theta_limit, x, work, f))
+            if energy_at(work, START, f) + (crush_energy(u, c) if touching else 0.0) < barrier:
+                status = Status.BELOW_LIMIT.value
+                break
+        if t >= control.longest:
+            status = Status.HORIZON.value
+            break
+    if status in (Status.STEP_BUDGET.value, Status.UNSTABLE.value):
+        return HeaveOutcome(status, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, float(attempts))
+    return HeaveOutcome(status, theta_max, x_b_max, y_b_max, x_v_max, t_limit, t, float(attempts))
+
+
+@kernel
+def run_second_opinions(
+    designs: np.ndarray,
+    form: Form,
+    base: Base,
+    control: HeaveControl,
+    work: np.ndarray,
+    record: HeaveRecord,
+    out: np.ndarray,
+) -> None:
+    """Simulate designs one by one; see `second_opinions`."""
+    for row in range(designs.shape[1]):
+        design = design_in(designs, row)
+        c = constants_of(design, READINGS, 0)
+        outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
+        if is_computable(c):
+            f = heave_constants(design, c, form, base)
+            outcome = simulate_heave(f, design.m_v, control, work, record)
+        o = outcome
+        out[0, row], out[1, row], out[2, row], out[3, row] = o.status, o.theta_max, o.x_b_max, o.y_b_max
+        out[4, row], out[5, row], out[6, row], out[7, row] = o.x_v_max, o.t_limit, o.t_end, o.attempts
+
+
+def second_opinions(
+    table: Any,
+    control: HeaveControl,
+    form: Form = Form(True, True),
+    base: Base = Base(),
+    record: HeaveRecord | None = None,
+) -> HeaveOutcome:
+    """Simulate every design of a table with heave and friction.
+
+    Parameters
+    ----------
+    table
+        `boulder_kernels.DesignTable` of n designs that the truck hits.
+    control
+        Limit, horizon and tolerance.
+    form
+        What is added to the planar motion.
+    base
+        The ground under the foot.
+    record
+        Filled with the time history of the last design; none by default.
+
+    Returns
+    -------
+    HeaveOutcome
+        Arrays of shape (n,).
+    """
+    designs = np.stack(table)
+    out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
+    run_second_opinions(designs, form, base, control, np.empty(WORKSPACE), record or no_heave_record(), out)
+    return HeaveOutcome(out[0].astype(np.int8), *out[1:])  # type: ignore[arg-type]
