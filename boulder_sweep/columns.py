@@ -15,11 +15,15 @@ from typing import Any, Literal
 import numpy as np
 
 ColumnType = Literal["int64", "float64", "dictionary"]
-Rows = Literal["all", "judged", "computed", "free", "rated", "overturned"]
+Rows = Literal["all", "judged", "computed", "free", "rated", "overturned", "passing"]
 
 VERDICTS = ("pass", "fail", "undecided", "error")
 REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override")
 """The reasons of every verdict but ``error``, which has reasons of its own."""
+GRADES = ("robust", "sensitive", "open")
+"""What is known of a pass under other forms of the model."""
+STANDINGS = ("paper", "paper;broms", "paper;width_capped", "paper;broms;width_capped")
+"""Models that a pass stands under: the paper's motion, and second opinions by other laws of the soil."""
 RATINGS = ("P1", "P2", "P3")
 """Penetration ratings of ASTM F2656, the best first."""
 
@@ -55,10 +59,10 @@ class OutcomeColumn(ColumnSpec):
     value : callable
         From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
         (n,): numbers in `unit`, or codes.
-    rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned'}
+    rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned', 'passing'}
         Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* those simulated, *free* those
         of them that were not stopped at the limit of the rotation, *rated* those whose penetration counts: neither
-        overturned nor left undecided by anything but the numerical error.
+        overturned nor left undecided by anything but the numerical error. *Passing* are those of verdict pass.
     words : tuple of str
         What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
     """
@@ -237,6 +241,26 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         lambda facts: facts.validity,
         rows="judged",
         words=("",),
+    ),
+    OutcomeColumn(
+        "robustness",
+        "dictionary",
+        "",
+        "of a pass: robust where it stands with friction and vertical motion under other laws of the soil, too, "
+        "sensitive where it does not under one of them, open where that was not asked; null for no pass",
+        lambda facts: facts.robustness,
+        rows="passing",
+        words=GRADES,
+    ),
+    OutcomeColumn(
+        "stands_under",
+        "dictionary",
+        "",
+        "of a pass: the models it stands under, joined by ; (paper, broms, width_capped); "
+        "null where no second opinion was asked for",
+        lambda facts: facts.stands_under,
+        rows="passing",
+        words=STANDINGS,
     ),
     OutcomeColumn(
         "step_s",

@@ -21,6 +21,7 @@ from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import RowStates, finer_controls
+from boulder_sweep.judge.robustness import is_planar_default, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
 from boulder_sweep.soils import with_soil
@@ -72,6 +73,8 @@ class Evaluation:
         Layers, water, cohesion and slope of the soil.
     least_margin
         Margin that a question asks for, from 0 to less than 1; see `judged`.
+    second_opinion
+        Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
     """
 
     readings: Readings
@@ -83,6 +86,7 @@ class Evaluation:
     second_spring: bool = False
     ground: Ground = field(default_factory=Ground)
     least_margin: float = 0.0
+    second_opinion: tuple[str, ...] = ()
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -146,7 +150,12 @@ class Evaluation:
             doubted = np.flatnonzero(rows.unconfirmed)
             judged = self._doubted(judged, doubted, designs, rows.outcomes)
         judged = joined([judged])
-        return self._margins_proved(judged, designs) if self.least_margin > 0.0 else judged
+        if self.least_margin > 0.0:
+            judged = self._margins_proved(judged, designs)
+        if not self.second_opinion or (self.only and "robustness" not in self.only):
+            return judged
+        longest = self.control.longest_horizon
+        return with_second_opinions(judged, designs, self.second_opinion, self.resistance, self.limits, longest)
 
     def _margins_proved(self, judged: Judged, designs: Designs) -> Judged:
         """Put margins that are not proved to last just below the one asked for; see `judged`."""
@@ -160,6 +169,7 @@ class Evaluation:
             limits=self.limits._replace(rotation=left * self.limits.rotation),
             only=("verdict", "reason"),
             least_margin=0.0,
+            second_opinion=(),
         )
         margin = judged["margin"].copy()
         margin[there[reduced.judged(designs.rows(there)).verdict != PASS]] = np.nextafter(self.least_margin, 0.0)
@@ -238,6 +248,7 @@ def evaluation_of(
         resistance=sweep.model.resistance,
         second_spring=SECOND_SPRING in sweep.plan.columns,
         ground=sweep.model.ground,
+        second_opinion=sweep.model.second_opinion if is_planar_default(sweep) else (),
     )
 
 

@@ -47,6 +47,7 @@ from boulder_sweep.judge.judged import (
     UNDECIDED,
     Judged,
 )
+from boulder_sweep.judge.robustness import grades_without_asking, is_studied
 from boulder_sweep.judge.validity import TESTED_ROTATION_DEG, flagged
 from boulder_sweep.settings.model import Criterion, Model
 
@@ -100,6 +101,8 @@ class Limits(NamedTuple):
     """Rotation beyond which a row is flagged [rad]."""
     proved: bool = True
     """Whether a pass must be proved also where the readings allow no proof; without, such rows pass and are flagged."""
+    studied: bool = False
+    """Whether the study of second opinions speaks for the model, see `boulder_sweep.judge.robustness`."""
     guarded: bool = True
     """Whether a row nearer to a limit than its error is undecided; not in a search whose results are judged again."""
 
@@ -133,6 +136,10 @@ class Facts(NamedTuple):
     """Codes of the ratings; -1 where there is none."""
     validity: np.ndarray
     """Codes of the flags."""
+    robustness: np.ndarray
+    """Codes of `GRADES`, of passes that no second opinion was asked of."""
+    stands_under: np.ndarray
+    """Codes of `STANDINGS`; -1 before a second opinion was asked for."""
     words: dict[str, tuple[str, ...]]
     """What the codes of a column stand for, where that depends on the rows."""
 
@@ -168,6 +175,8 @@ def judge(
             continue
         if spec.name == "validity":
             facts = _with_flags(facts)
+        if spec.name == "robustness":
+            facts = facts._replace(robustness=grades_without_asking(facts))
         values = spec.value(facts)
         if spec.type == "dictionary":
             words[spec.name] = facts.words.get(spec.name, spec.words)
@@ -210,6 +219,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
             "free": computed & ~(overturned & (status == Status.LIMIT)),
             "rated": rated,
             "overturned": overturned,
+            "passing": verdict == PASS,
         },
         overlap=overlap,
         penetration=penetration,
@@ -218,6 +228,8 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
         reason=reason,
         rating=_ratings(penetration),
         validity=reason,
+        robustness=reason,
+        stands_under=np.full(len(status), -1, dtype=np.int32),
         words={"reason": reasons},
     )
 
@@ -239,6 +251,7 @@ def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
         min_overlap=criterion.min_overlap_m,
         calibrated_crush=sweep.model.calibrated_crush_m,
         tested_rotation=math.radians(tested),
+        studied=is_studied(sweep),
         proved=proved,
     )
 

@@ -12,6 +12,8 @@ from boulder_sweep.settings.model import (
     CLOSED_FORM,
     PRESETS,
     PRINTED,
+    RESISTANCES,
+    SECOND_OPINIONS,
     SWITCHES,
     Layer,
     ReadingChoice,
@@ -21,6 +23,7 @@ from boulder_sweep.settings.problems import did_you_mean, shorten
 from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 
 MOST_LAYERS = 100
+NO_OPINION = "none"
 LAYER_FIELDS = {
     field.key: field
     for field in (
@@ -171,10 +174,34 @@ def _read_accuracy(node: Node) -> str | float:
     return read_single(node, field)
 
 
+def _read_second_opinion(node: Node) -> tuple[str, ...]:
+    """Read one law or a list of laws, in the order of the register; ``none`` for no second opinion."""
+    if isinstance(node, Scalar) and node.text.strip().lower() == NO_OPINION:
+        return ()
+    items = node.items if isinstance(node, Sequence) else [node]
+    asked, mistakes = set(), []
+    for item in items:
+        if isinstance(item, Scalar) and item.text.strip().lower() == RESISTANCES[0]:
+            message = (
+                f"{RESISTANCES[0]} is no second opinion: with friction and vertical motion it would pass many designs "
+                f"that fail, and no test speaks for that; choose {' or '.join(SECOND_OPINIONS)}"
+            )
+            mistakes.append(Mistake(item.position, message))
+            continue
+        try:
+            asked.add(_one_of(item, SECOND_OPINIONS, BY_NAME["second_opinion"].kind))
+        except LeafError as error:
+            mistakes.extend(error.mistakes)
+    if mistakes:
+        raise LeafError(mistakes)
+    return tuple(law for law in SECOND_OPINIONS if law in asked)
+
+
 _READERS: dict[str, Callable[[Node], Any]] = {
     "readings": _read_readings,
     "soil_elements": _read_soil,
     "layers": read_layers,
     "accuracy": _read_accuracy,
+    "second_opinion": _read_second_opinion,
 }
 """Readers by name; an entry without one is a single number within its admitted range."""

@@ -28,6 +28,8 @@ WATER_KG_M3 = 1000.0
 """Density of water."""
 RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
+SECOND_OPINIONS = RESISTANCES[1:]
+"""Laws that a second opinion may take."""
 
 
 UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
@@ -287,6 +289,13 @@ class Model:
         RESISTANCES[0],
         choices=RESISTANCES,
         kind="a law of the soil's resistance",
+    )
+    second_opinion: tuple[str, ...] = setting(
+        "model.second_opinion",
+        "",
+        "laws of the soil's resistance under which every pass is simulated again, with friction and vertical motion",
+        (),
+        kind="a law for a second opinion",
     )
     unloading: str = setting(
         "model.unloading",

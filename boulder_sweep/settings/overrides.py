@@ -17,7 +17,7 @@ _ALTERNATIVES = {
 }
 """Setting one removes the other from the file, which holds only one of them; two options contradict each other."""
 
-OPTIONS = {"--accuracy": "solver.accuracy"}
+OPTIONS = {"--accuracy": "solver.accuracy", "--second-opinion": "model.second_opinion"}
 """Options that set an entry: a mistake is reported for the option, not for ``--set``."""
 
 MAX_OVERRIDE = 20_000

@@ -213,6 +213,7 @@ class Sweep:
                 "resistance": self.model.resistance,
                 "unloading": self.model.unloading,
                 **({} if ground.is_usual else {"ground": ground.as_dict()}),
+                **({"second_opinion": list(opinions)} if (opinions := self.model.second_opinion) else {}),
             },
             "solver": {
                 "accuracy": accuracy if isinstance(accuracy, str) else None,

@@ -32,7 +32,7 @@ PIECES = WIDTH
 SIDE_ROWS, SIDE_COLUMNS = 8, 4
 """Points of the sides over the depth and over the length."""
 SETS, FOOT, SIDE_A, SIDE_B, SIDE_DEPTH, SUMS = (PIECES * n for n in range(6))
-"""Places in the workspace: set of every strip and its place along the foot; points of the sides; sums of six numbers."""
+"""Places in the workspace: sets of the strips and where they lie along the foot; points of the sides; six sums."""
 ROOM = SUMS + 6 * PIECES
 """Numbers in the workspace."""
 FULL_DRAG = 0.5
@@ -426,7 +426,6 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
         Minus the slopes by x_b and y_b as ``Q_x`` and ``Q_y``, zero as ``Q_theta``, and the energy [J] as ``u``.
     """
     sin, versin = sine_versine(theta_b)
-    cos = 1.0 - versin
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
     for j in range(PIECES):
         e = soil_element(j, y_b, sin, versin, k, f)

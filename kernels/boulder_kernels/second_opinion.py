@@ -21,12 +21,11 @@ from .dormand_prince import AA, ERROR, STAGES, A, C
 from .dynamics import contact_displacement, spring_compression
 from .flat import field, put
 from .heave import (
+    PIECES,
     ROOM,
     SETS,
-    PIECES,
     Base,
     Form,
-    Forces,
     HeaveConstants,
     accelerations,
     forces,
@@ -41,6 +40,8 @@ from .outcomes import Status
 
 READINGS = corrected()
 """The only readings that there are second opinions of."""
+WHOLE, USUAL_BASE = Form(heave=True, friction=True), Base()
+"""The second opinion itself; other forms and bases are for comparison."""
 AXES = 4
 """Displacements: x_b, theta_b, y_b, x_v."""
 START, TRIAL, RATES = ROOM, ROOM + 2 * AXES, ROOM + 4 * AXES
@@ -248,14 +249,14 @@ def least_energy(theta: float, x_start: float, work: np.ndarray, f: HeaveConstan
     """
     x, y = x_start, 0.0
     V = 0.0
-    for turn in range(TURNS):
+    for _ in range(TURNS):
         low, high = x - 2.0 * f.c.d, x + 2.0 * f.c.d
-        for _ in range(HALVINGS):
+        for _halving in range(HALVINGS):
             x = 0.5 * (low + high)
             low, high = (x, high) if potential_energy(x, theta, y, work, f).Q_x > 0.0 else (low, x)
         if f.heave > 0.0:
             low, high = -0.5 * f.c.d, f.L
-            for _ in range(HALVINGS):
+            for _halving in range(HALVINGS):
                 y = 0.5 * (low + high)
                 low, high = (y, high) if potential_energy(x, theta, y, work, f).Q_y > 0.0 else (low, y)
         V = potential_energy(x, theta, y, work, f).u
@@ -388,8 +389,8 @@ def run_second_opinions(
 def second_opinions(
     table: Any,
     control: HeaveControl,
-    form: Form = Form(True, True),
-    base: Base = Base(),
+    form: Form = WHOLE,
+    base: Base = USUAL_BASE,
     record: HeaveRecord | None = None,
 ) -> HeaveOutcome:
     """Simulate every design of a table with heave and friction.

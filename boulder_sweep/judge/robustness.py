@@ -1,0 +1,152 @@
+"""Robust or sensitive: what a pass is worth when the model has another form.
+
+A second opinion is the same impact with friction and vertical motion, under a law of the soil that resists less
+(`boulder_kernels.second_opinion`). A pass that stands under both laws is *robust*, one that does not under one of them
+*sensitive*. Where no second opinion was asked for, a pass is robust if it lies where the study of the documentation has
+found none that is not (`FREE`), and otherwise *open*.
+
+A sensitive pass is not a fail: the crash test that passed stands, and one of its second opinions turns it nearly to the
+limit. It needs a better test of the soil, a deeper bed, or a crash test.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_kernels import Status
+from boulder_kernels.second_opinion import HeaveControl, second_opinions
+from boulder_kernels.table import some_rows
+from boulder_sweep.columns import GRADES
+from boulder_sweep.designs import SECOND_SPRING
+from boulder_sweep.judge.judged import PASS, Judged
+from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS
+from boulder_sweep.settings.notes import family_bounds
+from boulder_sweep.soils import with_law
+
+if TYPE_CHECKING:
+    from boulder_kernels import DesignTable
+    from boulder_sweep.judge.inputs import Designs
+    from boulder_sweep.judge.verdict import Limits
+    from boulder_sweep.settings import Sweep
+
+ROBUST, SENSITIVE, OPEN = range(len(GRADES))
+IN_WORDS = (
+    "stands with friction and vertical motion under three laws; not tested: soil on one side only, rounded stones"
+)
+"""What ``robust`` means, in words."""
+FREE_ROTATION_DEG = 6.0
+"""Largest rotation up to which a pass is robust without being asked,"""
+FREE = {
+    "L": (0.6, 2.0),
+    "W": (0.8, 2.5),
+    "H": (1.5, 4.0),
+    "rho_b": (2400.0, 3074.0),
+    "e": (0.5, 1.0),
+    "rho_s": (1520.0, 2240.0),
+    "phi": (math.radians(30.0), math.radians(49.0)),
+    "K_epsilon": (1.0, 1.2),
+    "m_v": (5000.0, 9000.0),
+    "v_0": (11.0, 18.0),
+    "k_v": (0.75 * 3103.3e3, 1.25 * 3103.3e3),
+    "c_v": (0.75 * 138.91e3, 1.25 * 138.91e3),
+}
+"""in these ranges of the inputs, from which the study draws (SI, `boulder_kernels.DesignTable`),"""
+FREE_EMBEDMENT = (0.35, 0.75)
+"""of embedment depth over height, and with a subgrade reaction that belongs to the friction angle."""
+FREE_LIMIT_DEG = 20.0
+"""The limit of rotation that the study asks about; a higher one is no easier to stay below for a second opinion."""
+ROUNDING = 1e-9
+"""Ends of ranges are met by values that were rounded."""
+AT_ONCE = 400
+"""Designs simulated per call: an interruption waits for the current call."""
+
+
+def is_planar_default(sweep: Sweep) -> bool:
+    """Return whether the designs of a sweep are such as second opinions know: one spring, plain dry soil, corrected."""
+    model = sweep.model
+    plain = model.ground.is_usual and model.unloading == UNLOADINGS[0]
+    return plain and model.preset == "corrected" and SECOND_SPRING not in sweep.plan.columns
+
+
+def grades_without_asking(facts: Any) -> np.ndarray:
+    """Return the codes of `GRADES` that passes have without a second opinion, shape (n,).
+
+    Parameters
+    ----------
+    facts
+        What is known of n rows (`boulder_sweep.judge.verdict.Facts`).
+    """
+    found = np.full(len(facts.verdict), OPEN, dtype=np.int32)
+    limits, outcomes = facts.limits, facts.outcomes
+    if limits.studied and limits.rotation >= math.radians(FREE_LIMIT_DEG) * (1.0 - ROUNDING):
+        near = facts.rows["passing"] & (outcomes.theta_max + outcomes.theta_error <= math.radians(FREE_ROTATION_DEG))
+        rows = np.flatnonzero(near)
+        found[rows[is_free(some_rows(facts.designs.table, rows))]] = ROBUST
+    return found
+
+
+def is_free(table: DesignTable) -> np.ndarray:
+    """Return which of n designs lie in the ranges that the study draws from, bool, shape (n,)."""
+    ranges = [(getattr(table, name), *ends) for name, ends in FREE.items()]
+    ranges.append((table.d / table.H, *FREE_EMBEDMENT))
+    ranges.append((table.beta, *family_bounds(np.degrees(table.phi))))
+    inside = [(values >= low * (1.0 - ROUNDING)) & (values <= high * (1.0 + ROUNDING)) for values, low, high in ranges]
+    return np.logical_and.reduce(inside)
+
+
+def stands(designs: Designs, law: str, present: str, limits: Limits, longest_s: float) -> np.ndarray:
+    """Return which of n designs pass by a second opinion, bool, shape (n,).
+
+    Parameters
+    ----------
+    designs
+        The designs, all of which the vehicle hits.
+    law
+        Law of the soil's resistance of the second opinion, one of `SECOND_OPINIONS`.
+    present
+        That of the designs.
+    limits
+        Limits of the criterion.
+    longest_s
+        Longest simulated time; what is not proved to stand by then does not.
+    """
+    table = with_law(designs.table, law, present)
+    control = HeaveControl(limits.rotation, longest_s)
+    found = np.empty(designs.size, dtype=bool)
+    for at in range(0, designs.size, AT_ONCE):
+        some = slice(at, at + AT_ONCE)
+        outcome = second_opinions(some_rows(table, some), control)
+        penetration = outcome.x_v_max - designs.bed_offset[some] - table.L[some]
+        found[some] = (outcome.status == Status.BELOW_LIMIT.value) & (penetration <= limits.penetration)
+    return found
+
+
+def with_second_opinions(
+    judged: Judged, designs: Designs, laws: tuple[str, ...], present: str, limits: Limits, longest_s: float
+) -> Judged:
+    """Return judged rows with every pass simulated again; the other arguments as of `stands`.
+
+    Where all of `SECOND_OPINIONS` are asked and a pass stands, it is robust; where one overturns it, it is sensitive.
+    """
+    passing = np.flatnonzero(judged.verdict == PASS)
+    grade, standing = judged["robustness"].copy(), judged["stands_under"].copy()
+    some = designs.rows(passing)
+    standing[passing] = 0
+    turned = np.zeros(len(passing), dtype=bool)
+    for law in laws:
+        there = stands(some, law, present, limits, longest_s)
+        standing[passing[there]] += 1 << SECOND_OPINIONS.index(law)
+        turned |= ~there
+    grade[passing[turned]] = SENSITIVE
+    if laws == SECOND_OPINIONS:
+        grade[passing[~turned]] = ROBUST
+    columns: dict[str, Any] = judged.columns | {"robustness": grade, "stands_under": standing}
+    return Judged(columns, judged.words)
+
+
+def is_studied(sweep: Sweep) -> bool:
+    """Return whether the study's model is that of a sweep: the paper's law, and what second opinions know."""
+    return sweep.model.resistance == RESISTANCES[0] and is_planar_default(sweep)
