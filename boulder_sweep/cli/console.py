@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS
+from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
     lines += verdict_lines(summary.reasons, summary.rows)
     lines += [
         "",
+        *robustness_lines(summary.reasons),
         *firmness_lines(summary.firmness),
         *accuracy_lines(summary.accuracy),
         f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
@@ -72,33 +74,44 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
     return lines
 
 
-OTHER_LAW = {"broms": "3 K_p for K_p^2", "kp_squared": "K_p^2 for this law"}
-"""Law of the soil's resistance that the verdicts are compared with, in words."""
+def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
+    """Return what ``robust`` means, and how to ask where that is open; nothing where nothing passes."""
+    from boulder_sweep.judge.robustness import IN_WORDS  # only where there is a result: the kernels are heavy
+    from boulder_sweep.judge.validity import NOT_A_RATING
+
+    if not any(key.startswith("pass/") for key in reasons):
+        return []
+    lines = [f"pass   is {NOT_A_RATING}", *_wrapped(f"robust: {IN_WORDS}", "       ")]
+    if "pass/open" in reasons:
+        lines.append("       open: not asked; --second-opinion asks")
+    return lines
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent=indent)
 
 
 def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
-    """Return how firm the verdicts are, from a sample of the designs; nothing if it was not found out."""
-    if not firmness:
+    """Return how firm the passes are, from a sample of the designs; nothing if it was not found out."""
+    if not firmness or "lost" not in firmness:
         return []
-    from boulder_sweep.judge.validity import NOT_A_RATING  # only where there is a result: the kernels are heavy
-
-    changed, flags = firmness["changed"], firmness["flags"]
-    error = firmness["numerical_error_deg"]
-    sample = counted(firmness["designs"], "design")
+    error, lost = firmness["numerical_error_deg"], firmness["lost"]
     exact = "no numerical error estimated" if error is None else f"numerical error at most {error:g} deg (99.9 %)"
-    lines = [
-        f"pass   is {NOT_A_RATING}",
-        f"firm?  sample of {sample}: {exact}",
-        f"       verdicts changed by the other reading of the paper {changed['reading']:.1%},",
-        f"       by 1 deg of friction angle {changed['friction_angle']:.1%}, 5 % of speed {changed['speed']:.1%},",
-        f"       {OTHER_LAW[firmness.get('other_resistance', 'broms')]} {changed['resistance']:.1%}",
-    ]
-    if firmness["passes"]:
-        shares = {name: count / firmness["passes"] for name, count in flags.items()}
-        named = ", ".join(f"{name} {share:.0%}" for name, share in shares.items() if name)
-        lines.append(f"flags  {shares['']:.0%} of the passes are inside what the model was tested on")
-        lines += textwrap.wrap(named, 80, initial_indent=7 * " ", subsequent_indent=7 * " ")
-    return lines
+    lines = [f"firm?  {exact}, sample of {counted(firmness['designs'], 'design')}"]
+    if not lost:
+        return lines
+    laws = ", ".join(f"{law} {share:.0%}" for law, share in lost.items() if law in RESISTANCES)
+    shares = ", ".join(
+        (
+            f"the other reading of the paper {lost['reading']:.0%}",
+            f"1 deg less friction angle {lost['friction_angle']:.0%}",
+            f"5 % more speed {lost['speed']:.0%}",
+            f"another law of the soil without friction: {laws}",
+        )
+    )
+    lines += _wrapped(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")
+    shares = ", ".join(f"{name} {count / firmness['passes']:.0%}" for name, count in firmness["flags"].items() if name)
+    return [*lines, *_wrapped(f"flags: {shares}", "       ")] if shares else lines
 
 
 def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:

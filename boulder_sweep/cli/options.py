@@ -120,6 +120,15 @@ def json_option(function: Command) -> Command:
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")(function)
 
 
+def second_opinion_option(function: Command) -> Command:
+    """Add ``--second-opinion``."""
+    return click.option(
+        "--second-opinion",
+        is_flag=True,
+        help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive?",
+    )(function)
+
+
 def units_option(function: Command) -> Command:
     """Add ``--units``."""
     return click.option(
@@ -177,6 +186,7 @@ def run_options(function: Command) -> Command:
             click.option("--force", is_flag=True, help="Run even if disk or memory seem too small."),
             click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing."),
             click.option("--accuracy", metavar="NAME", help="fast, balanced, fine, or '0.01 deg'."),
+            second_opinion_option,
         )
     ):
         function = option(function)

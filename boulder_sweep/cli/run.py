@@ -15,6 +15,7 @@ from boulder_sweep.cli.options import RUN_EXAMPLES, cluster_options, json_option
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.locations import Location, location_of
+from boulder_sweep.settings.overrides import ALL_OPINIONS
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def run(
     out: str | None,
     overrides: tuple[str, ...],
     accuracy: str | None,
+    second_opinion: bool,
     dry_run: bool,
     as_json: bool,
     quiet: bool,
@@ -47,7 +49,9 @@ def run(
         raise click.UsageError("--resume and --overwrite cannot be used together")
     if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
         raise click.UsageError("--dashboard needs --backend dask, without --scheduler, which has its own dashboard")
-    sweep = load_sweep(grid, (*overrides, *([] if accuracy is None else [f"--accuracy={accuracy}"])), quiet)
+    chosen = [] if accuracy is None else [f"--accuracy={accuracy}"]
+    chosen += [ALL_OPINIONS] if second_opinion else []
+    sweep = load_sweep(grid, (*overrides, *chosen), quiet)
     target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
         return _dry_run(sweep, target, options, as_json)
@@ -67,7 +71,7 @@ def run(
                 target,
                 progress=shown,
                 command=shlex.join(["sweep", *sys.argv[1:]]),
-                resume_command=_resume_command(grid, target, overrides, accuracy, options),
+                resume_command=_resume_command(grid, target, overrides, accuracy, second_opinion, options),
                 **options,
             )
         except Interrupted as stop:
@@ -98,7 +102,12 @@ def _dry_run(sweep: Sweep, out: Location, options: dict[str, Any], as_json: bool
 
 
 def _resume_command(
-    grid: str, out: Location, overrides: Sequence[str], accuracy: str | None, options: dict[str, Any]
+    grid: str,
+    out: Location,
+    overrides: Sequence[str],
+    accuracy: str | None,
+    second_opinion: bool,
+    options: dict[str, Any],
 ) -> str:
     """Return the command that resumes this run."""
     words = ["sweep", "run", grid, "-o", str(out)]
@@ -106,6 +115,7 @@ def _resume_command(
         if options[name] is not None and options[name] != "threading":
             words += [f"--{name}", str(options[name])]
     words += ["--accuracy", accuracy] if accuracy else []
+    words += ["--second-opinion"] if second_opinion else []
     for override in overrides:
         words += ["--set", override]
     return shlex.join([*words, "--resume"])

@@ -165,7 +165,8 @@ def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], contr
             control.elements,
             model["calibrated_crush_m"],
             model["resistance"],
-            UNLOADINGS[control.unloading],
+            unloading=UNLOADINGS[control.unloading],
+            second_opinion=tuple(model.get("second_opinion", ())),
             **ground.fields(),
         ),
         solver=SolverSettings(

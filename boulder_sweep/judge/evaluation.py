@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
+from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
@@ -202,6 +203,8 @@ class Evaluation:
         table = with_soil(PLAIN_DESIGN.table, self.resistance, self.ground)
         plain = PLAIN_DESIGN._replace(table=table, springs=springs)
         self.simulate(plain.table, self.readings, self.control._replace(horizon=self.control.h), *plain.laws)
+        if self.second_opinion:
+            second_opinions(PLAIN_DESIGN.table, HeaveControl(self.limits.rotation, self.control.h))
         _warm_ups_s.append(time.monotonic() - begun)
 
 

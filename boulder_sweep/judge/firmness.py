@@ -1,4 +1,4 @@
-"""How firm a table is: how many verdicts small changes of the inputs, or another reading, would change.
+"""How firm a table is: how many passes small changes of the inputs, another reading or another law would take away.
 
 A sample of the designs is simulated again with each change. It depends on the settings alone, and so do its results:
 they stand in the metadata of every file of the table.
@@ -21,6 +21,7 @@ from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, plain_designs, samp
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.judge.verdict import judge
+from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
@@ -42,11 +43,11 @@ SPEED = 0.05
 LEAST_ANGLE_DEG = 1.0
 CHANGES = {
     "reading": "the other reading of the paper",
-    "friction_angle": f"{ANGLE_DEG:g} deg of friction angle either way",
-    "speed": f"{SPEED:.0%} of speed either way",
-    "resistance": "3 K_p in place of K_p^2, or the reverse where another law is chosen",
+    "friction_angle": f"{ANGLE_DEG:g} deg less friction angle",
+    "speed": f"{SPEED:.0%} more speed",
+    **{law: f"the resistance {law}" for law in RESISTANCES},
 }
-"""What is changed, by its name in the result."""
+"""What is changed, by its name in the result; the law of the designs itself is left out."""
 
 
 @dataclass(frozen=True)
@@ -57,25 +58,22 @@ class Firmness:
     ----------
     designs : int
         Designs of the sample; those that cannot be computed are left out.
-    changed : dict of str to float
-        Fraction of them whose verdict each of `CHANGES` turns from pass to fail or back.
+    lost : dict of str to float
+        Fraction of the passes of the sample that no longer pass after each of `CHANGES`; empty where none passes.
     numerical_error_deg, numerical_error_m : float or None
         Estimated error not exceeded by 99.9 % of those that did not overturn; None if none is estimated.
     passes : int
         Passes of the sample.
     flags : dict of str to int
         Passes of the sample with each flag of `boulder_sweep.judge.validity`; under ``""`` those without any.
-    other_resistance : str
-        Law of the soil's resistance that ``resistance`` stands for.
     """
 
     designs: int
-    changed: dict[str, float]
+    lost: dict[str, float]
     numerical_error_deg: float | None
     numerical_error_m: float | None
     passes: int
     flags: dict[str, int] = field(default_factory=dict)
-    other_resistance: str = "broms"
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -115,34 +113,23 @@ def firmness_of(sweep: Sweep) -> Firmness:
     found = verdicts(table, readings)
     passes = found.verdict == PASS
     variants = {
-        "reading": [(table, other)],
-        "friction_angle": [
-            (by(law, -math.radians(ANGLE_DEG)), readings),
-            (by(law, math.radians(ANGLE_DEG)), readings),
-        ],
-        "speed": [(table._replace(v_0=table.v_0 * factor), readings) for factor in (1.0 - SPEED, 1.0 + SPEED)],
-        "resistance": [(by(other_law(law)), readings)],
+        "reading": (table, other),
+        "friction_angle": (by(law, -math.radians(ANGLE_DEG)), readings),
+        "speed": (table._replace(v_0=table.v_0 * (1.0 + SPEED)), readings),
+        **{another: (by(another), readings) for another in RESISTANCES if another != law},
     }
-    changed = {}
-    for name, tables in variants.items():
-        turned = np.zeros(designs.size, dtype=bool)
-        for variant, read in tables:
-            turned |= (verdicts(variant, read).verdict == PASS) != passes
-        changed[name] = float(turned.mean()) if designs.size else 0.0
+    lost = {}
+    if passes.any():
+        for name, (variant, read) in variants.items():
+            lost[name] = float((verdicts(variant, read).verdict[passes] != PASS).mean())
     words = Counter(found.words["validity"][code] for code in found["validity"][passes].tolist())
     return Firmness(
         designs=designs.size,
-        changed=changed,
+        lost=lost,
         **_numerical_errors(designs, readings, control),
         passes=int(passes.sum()),
         flags=flag_counts(words.items()),
-        other_resistance=other_law(law),
     )
-
-
-def other_law(law: str) -> str:
-    """Return the law of the soil's resistance that a table is compared with."""
-    return "broms" if law == "kp_squared" else "kp_squared"
 
 
 def _numerical_errors(designs: Designs, readings: Readings, control: Control) -> dict[str, float | None]:

@@ -117,7 +117,7 @@ def stands(designs: Designs, law: str, present: str, limits: Limits, longest_s: 
     control = HeaveControl(limits.rotation, longest_s)
     found = np.empty(designs.size, dtype=bool)
     for at in range(0, designs.size, AT_ONCE):
-        some = slice(at, at + AT_ONCE)
+        some = np.arange(at, min(at + AT_ONCE, designs.size))
         outcome = second_opinions(some_rows(table, some), control)
         penetration = outcome.x_v_max - designs.bed_offset[some] - table.L[some]
         found[some] = (outcome.status == Status.BELOW_LIMIT.value) & (penetration <= limits.penetration)

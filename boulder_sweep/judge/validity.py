@@ -14,24 +14,16 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Status
-from boulder_sweep.judge.uplift import blow_lift, run_by_run
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.notes import FAMILY_FACTOR, family_bounds
 
-TESTED_WIDTH_OVER_DEPTH = 0.85
-"""Width over embedment depth of the boulders tested: 0.847 and 0.828."""
 TESTED_OVERLAP_M = 0.49
 """Overlap of bumper and boulder in the tests: 0.492 m and 0.91 m."""
 TESTED_ROTATION_DEG = {"corrected": 13.8, "as_printed": 7.7}
 """Rotation of the boulder that passed its test, by the model itself [deg]; the measured one is not in the text."""
-TESTED_LIFT = 2.07
-"""Lift of the blow (`boulder_sweep.judge.uplift.blow_lift`) on the boulder that held: 1.96 with corrected readings,
-2.06 as printed. On the one that was thrown out of the ground: 6.4 and 5.8."""
 SEPARATOR = ";"
 NOT_A_RATING = "a simulation, not a rating by test"
 """Stands beside every pass and every rating."""
-FLAGGED = "pass/flagged"
-"""Key under which passes with a flag are counted."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +70,10 @@ FLAGS = (
     Flag(
         "crush",
         "more crush than the vehicle's front is calibrated for",
-        "vehicle driven on by more than `vehicle.calibrated_crush` (1 m) further than the boulder moved",
-        "After about 1 m of displacement the chassis stiffens, as the paper says, and the model parts from the test on "
-        "the unsafe side. The larger boulder of the paper is at 1.04 m itself (0.77 m as printed). A second spring "
-        "does not move the limit: the file says how far both are calibrated.",
-        lambda facts: facts.outcomes.x_v_max - facts.outcomes.x_b_max > facts.limits.calibrated_crush,
+        "`vehicle_crush_m` above `vehicle.calibrated_crush` (1 m)",
+        "After about 1 m of crush the chassis stiffens, as the paper says, and the model parts from the test on the "
+        "unsafe side. A second spring does not move the limit: the file says how far both are calibrated.",
+        lambda facts: facts.outcomes.crush_max > facts.limits.calibrated_crush,
     ),
     Flag(
         "rotation",
@@ -92,14 +83,6 @@ FLAGS = (
         "The larger boulder of the paper passed its test; the model turns it by so much. Between that and the limit "
         "no test supports the model.",
         lambda facts: facts.outcomes.theta_max > facts.limits.tested_rotation,
-    ),
-    Flag(
-        "width",
-        "a wider boulder for its depth than tested",
-        f"width over embedment depth above {TESTED_WIDTH_OVER_DEPTH:g}",
-        "The ultimate resistance K_p² σ′ (Eq 27) comes from slender piles. A wide body mobilises less: Broms has "
-        "3 K_p σ′. The boulders tested have 0.83 and 0.85.",
-        lambda facts: TESTED_WIDTH_OVER_DEPTH * facts.designs.table.d < facts.designs.table.W,
     ),
     Flag(
         "size",
@@ -144,14 +127,6 @@ FLAGS = (
         lambda facts: facts.overlap < TESTED_OVERLAP_M,
     ),
     Flag(
-        "uplift",
-        "a blow that lifts the boulder more than in the test that passed",
-        f"force that lifts the centre over weight and side friction above {TESTED_LIFT:g}",
-        "The planar model keeps the boulder on the ground. The boulder that passed its test has 1.96; the other one, "
-        "with 6.4, was thrown out of the ground. See [uplift](uplift.md).",
-        lambda facts: blow_lift(facts.outcomes.F_v_max, facts.designs.table) > TESTED_LIFT,
-    ),
-    Flag(
         "unproved",
         "no proof that the rotation stays below its limit",
         "restoring moment or separation read as printed, not overturned up to the longest horizon",
@@ -162,6 +137,23 @@ FLAGS = (
 )
 """In the order in which they stand in the column."""
 BY_FLAG = {flag.name: flag for flag in FLAGS}
+
+
+def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray) -> np.ndarray:
+    """Return a function of n values, computed once for neighbours that are equal.
+
+    Parameters
+    ----------
+    function
+        Takes values and returns numbers for each, along the last axis.
+    column
+        Values of shape (n,), such as those of a soil: from one design of a grid to the next they seldom change.
+    """
+    starts = np.flatnonzero(column[1:] != column[:-1]) + 1
+    if 4 * len(starts) >= len(column):
+        return function(column)
+    starts = np.concatenate([[0], starts])
+    return np.repeat(function(column[starts]), np.diff(starts, append=len(column)), axis=-1)
 
 
 def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -12,7 +12,6 @@ import numpy as np
 
 from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
-from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES, VERDICTS
@@ -20,13 +19,10 @@ from boulder_sweep.columns import REASONS as VERDICT_REASONS
 from boulder_sweep.designs import REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
-from boulder_sweep.judge.uplift import WALL_FRICTION
 from boulder_sweep.judge.validity import (
     FLAGS,
-    TESTED_LIFT,
     TESTED_OVERLAP_M,
     TESTED_ROTATION_DEG,
-    TESTED_WIDTH_OVER_DEPTH,
     usual_range,
 )
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, RULES, STATUS_REASONS, STEP_REASONS
@@ -200,11 +196,7 @@ def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "rotation": math.radians(rotation),
         "crush": model["calibrated_crush_m"],
-        "width": TESTED_WIDTH_OVER_DEPTH,
         "overlap": TESTED_OVERLAP_M,
-        "lift": TESTED_LIFT,
-        "wall_friction": WALL_FRICTION,
-        "gravity": G,
         "usual": {name: usual_range(name) for name in (*SIZES, "embedment_ratio")},
         "soil": {
             "angle": ANGLES.tolist(),

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.columns import OUTCOMES, VERDICTS, OutcomeColumn
+from boulder_sweep.columns import GRADES, OUTCOMES, STANDINGS, VERDICTS, OutcomeColumn
 from boulder_sweep.errors import ComputationError
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed
-from boulder_sweep.judge.validity import FLAGGED
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
@@ -117,7 +116,7 @@ def failed_rows(count: int, reason: str) -> Judged:
 def verdict_counts(judged: Judged) -> dict[str, int]:
     """Count the rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` without one.
 
-    Passes with a flag of `boulder_sweep.judge.validity` are counted under ``pass/flagged``.
+    Passes are counted by their robustness, sensitive ones by what they stand under, too.
     """
     width = len(judged.reasons)
     counts = np.bincount(judged.verdict.astype(np.int64) * width + judged.reason)
@@ -125,10 +124,14 @@ def verdict_counts(judged: Judged) -> dict[str, int]:
     for code in np.flatnonzero(counts):
         verdict, reason = VERDICTS[code // width], judged.reasons[code % width]
         found[f"{verdict}/{reason}" if reason else verdict] = int(counts[code])
-    flagged = int(np.count_nonzero((judged.verdict == PASS) & (judged["validity"] > 0)))
-    if flagged:
-        found[FLAGGED] = flagged
-        found["pass"] -= flagged
+    passing = judged.verdict == PASS
+    grade, standing = judged["robustness"][passing], judged["stands_under"][passing]
+    found.pop("pass", None)
+    for place, word in enumerate(GRADES):
+        for under in set(standing[grade == place].tolist()):
+            laws = STANDINGS[under].split(";")[1:] if word == "sensitive" and under >= 0 else []
+            key = f"pass/{word}" + (f", stands under {' and '.join(laws)}" if laws else "")
+            found[key] = found.get(key, 0) + int(np.count_nonzero((grade == place) & (standing == under)))
     return dict(sorted((key, count) for key, count in found.items() if count))
 
 

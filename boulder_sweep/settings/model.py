@@ -276,8 +276,7 @@ class Model:
     calibrated_crush_m: float = setting(
         "vehicle.calibrated_crush",
         "m",
-        "crush up to which spring and damper describe the vehicle's front; a row is flagged where the vehicle drives "
-        "on by more, counted from the boulder",
+        "crush up to which spring and damper describe the vehicle's front; a row with more is flagged",
         1.0,
         admitted=Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
         also=("crush", "max_crush"),

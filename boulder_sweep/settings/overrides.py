@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
 from boulder_sweep.settings.tree import Sequence as List
@@ -19,6 +20,9 @@ _ALTERNATIVES = {
 
 OPTIONS = {"--accuracy": "solver.accuracy", "--second-opinion": "model.second_opinion"}
 """Options that set an entry: a mistake is reported for the option, not for ``--set``."""
+
+ALL_OPINIONS = f"--second-opinion=[{', '.join(SECOND_OPINIONS)}]"
+"""Asks for every second opinion."""
 
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""

@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import against_tests, answers, energy, moves, scale, soil, unloading, uplift
+from docs.studies import against_tests, answers, energy, moves, scale, soil, unloading
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -189,14 +189,6 @@ def _post_speeds(_: Path) -> str:
     return against_tests.post_table().markdown()
 
 
-def _uplift_tests(_: Path) -> str:
-    return uplift.tests_table().markdown()
-
-
-def _uplift_grid(root: Path) -> str:
-    return uplift.grid_words(root / GRID).replace(f"{root}/", "")
-
-
 def _crush_words(root: Path) -> str:
     return crush_words(root / GRID)
 
@@ -244,8 +236,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "pushover": _pushover,
     "openpile": _openpile,
     "post-speeds": _post_speeds,
-    "uplift-tests": _uplift_tests,
-    "uplift-grid": _uplift_grid,
     "crush-words": _crush_words,
     "front-face": _front_face,
     "wild-families": _wild_families,

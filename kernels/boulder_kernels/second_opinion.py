@@ -416,4 +416,4 @@ def second_opinions(
     designs = np.stack(table)
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
     run_second_opinions(designs, form, base, control, np.empty(WORKSPACE), record or no_heave_record(), out)
-    return HeaveOutcome(out[0].astype(np.int8), *out[1:])  # type: ignore[arg-type]
+    return HeaveOutcome(out[0].astype(np.int8), *out[1:])

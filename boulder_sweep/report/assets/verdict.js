@@ -20,11 +20,7 @@
  * @typedef {object} Tested
  * @property {number} rotation [rad]
  * @property {number} crush [m]
- * @property {number} width over embedment depth
  * @property {number} overlap [m]
- * @property {number} lift of a blow over weight and side friction
- * @property {number} wall_friction friction angle between boulder and soil over that of the soil
- * @property {number} gravity [m/s^2]
  * @property {Record<string, [number, number]>} usual range of sizes, embedment ratio and density of rock
  * @property {{angle: number[], least: number[], most: number[]}} soil subgrade reaction [MN/m^3] over friction angle [deg]
  * @property {Record<string, string>} meanings of every flag, in their order
@@ -99,33 +95,16 @@ function flagsOf(outcomes, row, inputs, overlap, rules) {
   const reaction = inputs.subgrade_reaction_MN_m3;
   /** @type {Record<string, boolean>} */
   const raised = {
-    crush: outcomes.x_v_max[row] - outcomes.x_b_max[row] > tested.crush,
+    crush: outcomes.crush_max[row] > tested.crush,
     rotation: outcomes.theta_max[row] > tested.rotation,
-    width: tested.width * depth < inputs.boulder_width_m,
     size: ["boulder_length_m", "boulder_width_m", "boulder_height_m"].some((name) => outside(name, inputs[name])),
     embedment: outside("embedment_ratio", depth / inputs.boulder_height_m),
     rock_density: outside("boulder_density_kg_m3", inputs.boulder_density_kg_m3),
     soil_pair: reaction > along(tested.soil.most) || reaction < along(tested.soil.least),
     overlap: overlap < tested.overlap,
-    uplift: blowLift(outcomes.F_v_max[row], inputs, tested) > tested.lift,
     unproved: outcomes.status[row] === rules.status.UNPROVABLE,
   };
   return Object.keys(tested.meanings).filter((name) => raised[name]);
-}
-
-/**
- * How strongly a blow lifts a boulder: `boulder_sweep.judge.uplift.blow_lift`.
- * @param {number} force its peak [N]
- * @param {Record<string, number>} inputs
- * @param {Tested} tested
- */
-function blowLift(force, inputs, tested) {
-  const [L, W, H] = [inputs.boulder_length_m, inputs.boulder_width_m, inputs.boulder_height_m];
-  const [d, phi] = [inputs.embedment_depth_m, inputs.friction_angle_deg / DEGREES];
-  const g = tested.gravity;
-  const weight = inputs.boulder_density_kg_m3 * L * W * H * g;
-  const friction = (1 - Math.sin(phi)) * Math.tan(tested.wall_friction * phi) * inputs.soil_density_kg_m3 * g * d ** 2 * L;
-  return (force * (inputs.impact_height_m + d) * 1.5 * L) / ((L ** 2 + H ** 2) * (weight + friction));
 }
 
 /**
