@@ -120,7 +120,8 @@ class LightestQuestion:
         }
         block = replace(taken(rows, np.arange(n), **columns), labels=self.open.labels(start, stop))
         simulated = sum(trial.simulated for trial in trials) + n
-        return Answers(block, kind, fails, passes, self.judges.final(block), [None] * n, simulated)
+        judged = self.judges.final.graded(self.judges.final(block), block)
+        return Answers(block, kind, fails, passes, judged, [None] * n, simulated)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_
 from boulder_sweep.columns import OPTIONAL_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.robustness import is_planar_default
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import call, pool
@@ -132,6 +133,7 @@ def need(
     open_readings: bool = False,
     between: Ends = None,
     tolerance: str | float | None = None,
+    robust: bool = False,
     both_readings: bool = True,
     jobs: int | None = None,
     backend: str = THREADING,
@@ -160,6 +162,9 @@ def need(
         Search range, instead of the axis or the usual range.
     tolerance
         Spacing of the values tried; 1 mm for lengths.
+    robust
+        Whether only a pass counts that is robust, see `boulder_sweep.judge.robustness`. The readings as printed have
+        none.
     both_readings
         Whether to answer for the other preset of readings as well.
     jobs
@@ -205,15 +210,21 @@ def need(
             f"the vehicle of {sweep.name} has no second spring; give it both vehicle.second_spring and "
             f"vehicle.second_spring_from, of which {key.field.path} is then searched"
         )
-    least_margin = margin_asked(margin)
+    least_margin, drawn = margin_asked(margin), probability is not None
     if open_readings and probability is None:
         raise QuestionError("--open-readings needs --probability")
     variants: tuple[Judges, ...] = ()
     if open_readings:
         variants = tuple(judges_of(one, least_margin, compared=True) for one in every_reading(sweep))
-    sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings else [sweep]
-    drawn = probability is not None
-    judges = [judges_of(one, least_margin, compared=drawn and one is not sweep) for one in sweeps]
+    if robust and not is_planar_default(sweep):
+        raise QuestionError(
+            "--robust: second opinions know elastic, dry, level, uniform soil without cohesion, one spring of the "
+            "vehicle and corrected readings only"
+        )
+    if robust and drawn:
+        raise QuestionError("--robust and --probability cannot be used together")
+    sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings and not robust else [sweep]
+    judges = [judges_of(one, least_margin, compared=drawn and one is not sweep, robust=robust) for one in sweeps]
     asked = [
         _question(one, key, between, own, probability, seed, variants) for one, own in zip(sweeps, judges, strict=True)
     ]

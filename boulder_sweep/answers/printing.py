@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +91,21 @@ def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES, units: st
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
     occurring = {row[name] for row in rows for name in row if name.startswith("found")}
     lines += [note for word, note in NOTES.items() if word in occurring]
-    return lines
+    return lines + grade_lines(row["robustness"] for row in rows if row["passes_at"])
+
+
+def grade_lines(grades: Iterable[str | None]) -> list[str]:
+    """Return what the grades mean that occur."""
+    from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS
+
+    meanings = {"robust": IN_WORDS, "sensitive": SENSITIVE_IN_WORDS}
+    occurring = set(grades)
+    return [
+        line
+        for word, meaning in meanings.items()
+        if word in occurring
+        for line in textwrap.wrap(f"{word}: {meaning}", WIDTH, subsequent_indent=" " * (len(word) + 2))
+    ]
 
 
 def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
@@ -151,7 +166,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, u
     count = len(found)
     rows = _shown_rows(found.arrow, most, units)
     columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
-    columns.append((("verdict", ""), lambda row: str(row["verdict"])))
+    columns += [(("verdict", ""), lambda row: str(row["verdict"])), _GRADE]
     for reserve, decimals in zip(RESERVES, (2, 0, 2), strict=True):
         field = key_of(reserve.input).field
         size = 1.0 if units == "si" else shown_unit(field.unit, units).size
@@ -232,17 +247,21 @@ def need_columns(need: Need, units: str = "si") -> list[Column]:
     if key.name == BOULDER_MASS.name:
         columns.append((("mass", unit), _answer(key, "", size)))
         columns += [(_head(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]
-        columns.append((("margin", ""), _margin))
+        columns += [(("margin", ""), _margin), _GRADE_FOUND]
         return columns + [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
     columns.append((_head(key.name, units), _answer(key, "", size)))
     if key.name == "embedment_depth_m":
         columns.append((("ratio", "d/H"), _ratio))
         columns.append((("above", unit), _above_ground))
-    columns += [_mass(units), (("margin", ""), _margin)]
+    columns += [_mass(units), (("margin", ""), _margin), _GRADE_FOUND]
     if "p_pass" in need.arrow.column_names:
-        columns[-1] = (("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}")
+        columns[-2] = (("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}")
     columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
     return columns
+
+
+_GRADE: Column = (("second", "opinion"), lambda row: row["robustness"] or "-")
+_GRADE_FOUND: Column = (("second", "opinion"), lambda row: (row["passes_at"] and row["robustness"]) or "-")
 
 
 def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> list[str]:

@@ -132,7 +132,7 @@ class Question:
             self.kinds(rows, found),
             np.where(found.has_fails, self.key.values(found.fails), np.nan),
             np.where(found.has_holds, self.key.values(found.holds), np.nan),
-            judged,
+            self.judges.final.graded(judged, block),
             [_stretches(self.key, found.changes.get(row), first[row], last[row]) for row in range(stop - start)],
             trial.simulated,
             trial.chances(found.shown),

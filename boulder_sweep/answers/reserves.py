@@ -214,7 +214,7 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     rows = sweep.plan.given_rows(start, stop)
     block = block_of(rows)
     judged = judges.final(block)
-    passes = judges.holds(judged)
+    judged, passes = judges.final.graded(judged, block), judges.holds(judged)
     columns: list[tuple[str, str, str, Any]] = []
     values = {}
     for own in RESERVES:

@@ -17,6 +17,7 @@ from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.robustness import ROBUST
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.model import PRINTED, SWITCHES, ReadingChoice
@@ -34,6 +35,7 @@ ROUNDING_M = 1e-9
 """What sums of heights may be off by [m]."""
 PLACEHOLDER = 0.5
 SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "vehicle_crush_m")
+GRADED = ("robustness", "stands_under")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
 
 Rows = dict[str, np.ndarray]
@@ -95,20 +97,25 @@ class Judges:
         The sweep's own accuracy.
     least_margin
         Margin that a design must have to count as passing. Both evaluations prove that it lasts.
+    robust
+        Whether only a robust pass counts; both evaluations then ask for second opinions.
     """
 
     coarse: Evaluation
     final: Evaluation
     accuracy: Accuracy
     least_margin: float = 0.0
+    robust: bool = False
 
     def holds(self, judged: Judged) -> np.ndarray:
-        """Return whether rows pass with the requested margin, bool, shape (n,)."""
+        """Return whether rows pass with the requested margin and robustness, bool, shape (n,)."""
         passes = judged.verdict == PASS
+        if self.robust:
+            passes &= judged["robustness"] == ROBUST
         return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
 
 
-def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False) -> Judges:
+def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False, robust: bool = False) -> Judges:
     """Return the evaluations of a sweep.
 
     Parameters
@@ -121,6 +128,8 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
     compared
         Whether thousands of designs are drawn of a sweep that another one is only compared with. Where no proof is
         possible a design then passes that stands to the horizon: to go on costs fifteen times as much and more.
+    robust
+        As of `Judges`.
     """
     accuracy = accuracy_of(sweep)
     final = dataclasses.replace(evaluation_of(sweep, accuracy, proved=False), least_margin=least_margin)
@@ -131,9 +140,11 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
         final, coarse = (
             dataclasses.replace(each, control=each.control._replace(longest_horizon=0.0)) for each in (final, coarse)
         )
+    if robust:
+        final, coarse = final.asked(), dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED))
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
         coarse = final
-    return Judges(coarse, final, accuracy, least_margin)
+    return Judges(coarse, final, accuracy, least_margin, robust)
 
 
 def every_reading(sweep: Sweep) -> list[Sweep]:

@@ -15,6 +15,7 @@ EXAMPLES = """\b
 Examples:
   sweep need configs/site.yaml
   sweep need configs/site.yaml --margin '25 %' --plot depths.png
+  sweep need configs/site.yaml --robust
   sweep need configs/site.yaml --least height -o heights.parquet
   sweep need configs/uncertain_site.yaml --probability 0.95
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
@@ -34,6 +35,7 @@ Examples:
     "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
 )
 @click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
+@click.option("--robust", is_flag=True, help="Count only passes that stand under every second opinion.")
 @click.option("--own-readings", is_flag=True, help="Omit the answers for the other readings of the paper.")
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
@@ -52,6 +54,7 @@ def need(
     open_readings: bool,
     between: tuple[str, str] | None,
     tolerance: str | None,
+    robust: bool,
     own_readings: bool,
     jobs: int | None,
     backend: str,
@@ -88,6 +91,7 @@ def need(
             open_readings=open_readings,
             between=between,
             tolerance=tolerance,
+            robust=robust,
             both_readings=not own_readings,
             jobs=jobs,
             backend=backend,

@@ -52,7 +52,10 @@ __all__ = ["Trajectory", "simulate"]
 SAMPLE_S = 0.0005
 """Time between two samples of a trajectory [s]."""
 MOST_SAMPLES = 1_000_000
-_DECIDED = ("verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s")
+_DECIDED = (
+    *("verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"),
+    *("robustness", "stands_under"),
+)
 """Columns that are those of a row of ``sweep run``, which stops at the limit."""
 _ERRORS = ("rotation_error_deg", "displacement_error_m")
 BEFORE_THE_END = 1.0 - 1e-14
@@ -126,7 +129,7 @@ def simulate(
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
     designs = designs_of(block, None, sweep.model.resistance, sweep.model.ground)
     one, how = design_at(designs.table, 0), readings_of(sweep)
-    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
     decided = evaluation.judged(designs)
     layered = isinstance(designs.table, LayeredTable)
     control = _control(evaluation.control, how, float(decided["step_s"][0]), layered=layered)

@@ -24,7 +24,7 @@ from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_
 from boulder_sweep.judge.refinement import RowStates, finer_controls
 from boulder_sweep.judge.robustness import is_planar_default, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
-from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, Ground
+from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS, Ground
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
@@ -76,6 +76,8 @@ class Evaluation:
         Margin that a question asks for, from 0 to less than 1; see `judged`.
     second_opinion
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
+    askable
+        Whether second opinions know such designs.
     """
 
     readings: Readings
@@ -88,6 +90,7 @@ class Evaluation:
     ground: Ground = field(default_factory=Ground)
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
+    askable: bool = False
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -155,8 +158,22 @@ class Evaluation:
             judged = self._margins_proved(judged, designs)
         if not self.second_opinion or (self.only and "robustness" not in self.only):
             return judged
-        longest = self.control.longest_horizon
-        return with_second_opinions(judged, designs, self.second_opinion, self.resistance, self.limits, longest)
+        return self._graded(judged, designs.rows(judged.verdict == PASS), self.second_opinion)
+
+    def asked(self) -> Evaluation:
+        """Return the same with every second opinion, where they can be asked."""
+        return replace(self, second_opinion=SECOND_OPINIONS) if self.askable else self
+
+    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
+        """Return the judged rows of a block with every second opinion of its passes, where they can be asked."""
+        passing = judged.verdict == PASS
+        if not self.askable or not passing.any():
+            return judged
+        return self._graded(judged, designs_of(block, passing, self.resistance, self.ground), SECOND_OPINIONS)
+
+    def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
+        longest = self.control.longest_horizon or LONGEST_HORIZON * self.control.horizon
+        return with_second_opinions(judged, passes, laws, self.resistance, self.limits, longest)
 
     def _margins_proved(self, judged: Judged, designs: Designs) -> Judged:
         """Put margins that are not proved to last just below the one asked for; see `judged`."""
@@ -252,6 +269,7 @@ def evaluation_of(
         second_spring=SECOND_SPRING in sweep.plan.columns,
         ground=sweep.model.ground,
         second_opinion=sweep.model.second_opinion if is_planar_default(sweep) else (),
+        askable=is_planar_default(sweep),
     )
 
 

@@ -36,7 +36,12 @@ ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 IN_WORDS = (
     "stands with friction and vertical motion under three laws; not tested: soil on one side only, rounded stones"
 )
-"""What ``robust`` means, in words."""
+"""What ``robust`` means, in words,"""
+SENSITIVE_IN_WORDS = (
+    "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed (sweep need --robust) or a "
+    "crash test"
+)
+"""and ``sensitive``."""
 FREE_ROTATION_DEG = 6.0
 """Largest rotation up to which a pass is robust without being asked,"""
 FREE = {
@@ -125,19 +130,27 @@ def stands(designs: Designs, law: str, present: str, limits: Limits, longest_s: 
 
 
 def with_second_opinions(
-    judged: Judged, designs: Designs, laws: tuple[str, ...], present: str, limits: Limits, longest_s: float
+    judged: Judged, passes: Designs, laws: tuple[str, ...], present: str, limits: Limits, longest_s: float
 ) -> Judged:
-    """Return judged rows with every pass simulated again; the other arguments as of `stands`.
+    """Return judged rows with every pass simulated again.
 
     Where all of `SECOND_OPINIONS` are asked and a pass stands, it is robust; where one overturns it, it is sensitive.
+
+    Parameters
+    ----------
+    judged
+        The rows.
+    passes
+        Designs of those that pass.
+    laws, present, limits, longest_s
+        As of `stands`.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
     grade, standing = judged["robustness"].copy(), judged["stands_under"].copy()
-    some = designs.rows(passing)
     standing[passing] = 0
     turned = np.zeros(len(passing), dtype=bool)
     for law in laws:
-        there = stands(some, law, present, limits, longest_s)
+        there = stands(passes, law, present, limits, longest_s)
         standing[passing[there]] += 1 << SECOND_OPINIONS.index(law)
         turned |= ~there
     grade[passing[turned]] = SENSITIVE
