@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS
+from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS, NO_OPINION
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
@@ -16,6 +16,7 @@ from boulder_sweep.settings.model import (
     CLOSED_FORM,
     PRESETS,
     PRINTED,
+    SECOND_OPINIONS,
     SWITCHES,
 )
 from boulder_sweep.settings.starter import default_of
@@ -190,6 +191,12 @@ _FORMS: dict[str, Schema] = {
         ),
     },
     "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
+    "second_opinion": {
+        "anyOf": [
+            _words(NO_OPINION, *SECOND_OPINIONS),
+            {"type": "array", "items": _words(*SECOND_OPINIONS), "maxItems": len(SECOND_OPINIONS)},
+        ]
+    },
 }
 """Entries that are more than a quantity."""
 

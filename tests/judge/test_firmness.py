@@ -35,21 +35,24 @@ def test_shares_are_those_of_the_changed_sweeps() -> None:
     assert found.designs == sweep.n_designs  # all of them: the sample is the grid
     own = passes(sweep)
     printed = replace(sweep, model=replace(sweep.model, readings=ReadingChoice.of_preset("as_printed")))
-    assert found.changed["reading"] == pytest.approx(np.mean(passes(printed) != own))
-    turned = np.zeros(len(own), dtype=bool)
-    for factor in (0.95, 1.05):
-        speed = sweep.constants["impact_speed_m_s"] * factor
-        turned |= passes(replace(sweep, constants=sweep.constants | {"impact_speed_m_s": speed})) != own
-    assert found.changed["speed"] == pytest.approx(turned.mean())
+    assert found.lost["reading"] == pytest.approx(np.mean(~passes(printed)[own]))
+    speed = sweep.constants["impact_speed_m_s"] * 1.05
+    faster = replace(sweep, constants=sweep.constants | {"impact_speed_m_s": speed})
+    assert found.lost["speed"] == pytest.approx(np.mean(~passes(faster)[own]))
     assert found.passes == own.sum()
-    assert set(found.changed) == set(CHANGES)
-    assert all(0.0 < share < 1.0 for share in found.changed.values())
+    assert set(found.lost) == set(CHANGES) - {"kp_squared"}
+    assert all(0.0 < found.lost[name] <= 1.0 for name in ("reading", "speed", "broms", "width_capped"))
+    by_broms = firmness_of(replace(sweep, model=replace(sweep.model, resistance="broms")))
+    assert set(by_broms.lost) == set(CHANGES) - {"broms"}
 
 
 def test_less_resistance_is_what_it_says() -> None:
     """3 K_p in place of K_p^2: where K_p is 3 both are the same, and nothing changes."""
-    found = firmness_of(grid(friction="30 deg"))
-    assert found.changed["resistance"] == 0.0
+    found = firmness_of(
+        grid(friction="30 deg", site="embedment_ratio: [0.7, 0.75]", height="[3.6, 4] m", width="2.5 m")
+    )
+    assert found.passes > 0
+    assert found.lost["broms"] == 0.0
 
 
 def test_soil_that_stays_pressed_is_sampled_as_elastic() -> None:
@@ -84,4 +87,4 @@ def test_nothing_to_simulate() -> None:
     sweep = grid(height="[2 m, 3 m]", site="embedment_depth: 3.5 m")
     found = firmness_of(sweep)
     assert (found.designs, found.passes) == (0, 0)
-    assert set(found.changed.values()) == {0.0}
+    assert found.lost == {}

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boulder_kernels import Control, DesignTable, Status, corrected
+from boulder_kernels import Control, Status, corrected
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge import validity
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.judged import Judged, joined
-from boulder_sweep.judge.uplift import blow_lift
 from boulder_sweep.judge.validity import FLAGS, TESTED_ROTATION_DEG, flag_counts, meanings
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.settings.model import PRESETS
@@ -43,9 +42,8 @@ def test_inside_there_are_none() -> None:
 @pytest.mark.parametrize(
     ("flag", "changes", "outcomes"),
     [
-        ("crush", {}, {"x_v_max": 1.31, "x_b_max": 0.3}),
+        ("crush", {}, {"crush_max": 1.01}),
         ("rotation", {}, {"theta_max": math.radians(13.9)}),
-        ("width", {"W": 1.3}, {}),
         ("size", {"L": 0.05}, {}),
         ("size", {"W": 0.5}, {}),
         ("embedment", {"d": 1.1, "W": 0.9, "H": 3.3}, {}),
@@ -55,7 +53,6 @@ def test_inside_there_are_none() -> None:
         ("soil_pair", {"phi": math.radians(28.0), "beta": 110.0}, {}),
         ("soil_pair", {"beta": 5.0}, {}),
         ("overlap", {"H": 2.4}, {}),
-        ("uplift", {}, {"F_v_max": 5.2e5}),
     ],
 )
 def test_each_flag_is_raised_alone(flag: str, changes: dict[str, float], outcomes: dict[str, float]) -> None:
@@ -69,56 +66,37 @@ def test_nothing_is_proved_as_printed() -> None:
 
 
 def test_several_flags_stand_in_the_order_of_the_register() -> None:
-    both = judged(changes={"W": 2.4, "rho_b": 1.0}, x_v_max=2.0)
-    assert flags_of(both) == "crush;width;rock_density"
-    assert meanings(flags_of(both))[1] == "a wider boulder for its depth than tested"
+    both = judged(changes={"rho_b": 1.0}, crush_max=2.0)
+    assert flags_of(both) == "crush;rock_density"
+    assert meanings(flags_of(both))[1] == "a density that rock does not have"
     assert meanings("") == []
 
 
 def test_words_are_the_same_however_the_rows_are_cut() -> None:
-    rows = [judged(), judged(changes={"W": 2.4}), judged(x_v_max=2.0), judged()]
+    rows = [judged(), judged(changes={"rho_b": 1.0}), judged(crush_max=2.0), judged()]
     whole = joined(rows)
-    assert whole.words["validity"] == ("", "crush", "width")
+    assert whole.words["validity"] == ("", "crush", "rock_density")
     halves = joined([joined(rows[:1]), joined(rows[1:])])
     assert halves.words == whole.words
     assert np.array_equal(halves["validity"], whole["validity"])
 
 
 def test_counts_by_flag() -> None:
-    assert flag_counts([("", 3), ("crush;width", 2), ("width", 1)]) == {"": 3, "crush": 2, "width": 3}
+    assert flag_counts([("", 3), ("crush;size", 2), ("size", 1)]) == {"": 3, "crush": 2, "size": 3}
     assert flag_counts([]) == {"": 0}
 
 
 def test_the_crash_tests_are_inside() -> None:
-    """What the thresholds are taken from: the tests lie just inside. In the test that passed the vehicle itself went as
-    far as the paper says that model and test part: 1.04 m further than the boulder, as corrected."""
+    """What the thresholds are taken from: the tests lie just inside."""
     rwg, abg = (crash_test(name).constants for name in ("rwg", "abg"))
     for preset in PRESETS:
         found = simulate(crash_test("rwg"), readings=preset)
-        assert found.summary()["validity"] == ("crush" if preset == "corrected" else "unproved")
-        further = found.summary()["max_vehicle_displacement_m"] - found.summary()["max_displacement_m"]
-        assert further == pytest.approx(1.042 if preset == "corrected" else 0.770, abs=1e-3)
+        assert found.summary()["validity"] == ("" if preset == "corrected" else "unproved")
         rotation = found.summary()["max_rotation_deg"]
         assert TESTED_ROTATION_DEG[preset] == pytest.approx(rotation, abs=0.05)
         assert TESTED_ROTATION_DEG[preset] > rotation
-    wide = max(case["boulder_width_m"] / case["embedment_depth_m"] for case in (rwg, abg))
-    assert validity.TESTED_WIDTH_OVER_DEPTH - 0.01 < wide <= validity.TESTED_WIDTH_OVER_DEPTH
     overlap = min(c["boulder_height_m"] - c["embedment_depth_m"] - c["bumper_height_m"] for c in (rwg, abg))
     assert validity.TESTED_OVERLAP_M <= overlap < validity.TESTED_OVERLAP_M + 0.01
-
-
-def test_the_blow_lifts_the_boulder_that_was_thrown_out_and_not_the_one_that_held() -> None:
-    """Peak forces of the tests as simulated; the larger of the boulder that held is just inside."""
-    lifts = {}
-    for name in ("rwg", "abg"):
-        for preset in PRESETS:
-            motion = simulate(crash_test(name), readings=preset).motion
-            table = DesignTable(*(np.array([value]) for value in motion.design))
-            lifts[name, preset] = float(blow_lift(np.array([motion.outcome.maxima.F_v]), table)[0])
-    assert lifts["rwg", "corrected"] == pytest.approx(1.963, abs=2e-3)
-    assert validity.TESTED_LIFT - 0.01 < lifts["rwg", "as_printed"] <= validity.TESTED_LIFT
-    assert lifts["abg", "corrected"] == pytest.approx(6.43, abs=0.01)
-    assert lifts["abg", "as_printed"] == pytest.approx(5.84, abs=0.01)
 
 
 def test_a_truck_inside_the_boulder_is_never_a_pass() -> None:

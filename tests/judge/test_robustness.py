@@ -1,0 +1,143 @@
+"""Grades of passes, and second opinions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import boulder_sweep
+from boulder_kernels import Status
+from boulder_kernels.second_opinion import HeaveControl, second_opinions
+from boulder_sweep.columns import GRADES, STANDINGS
+from boulder_sweep.judge import robustness
+from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
+from boulder_sweep.judge.inputs import designs_of
+from boulder_sweep.judge.judged import PASS, Judged
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.robustness import FREE, SENSITIVE, is_free
+from boulder_sweep.judge.verdict import Limits, judge
+from boulder_sweep.settings import load
+from boulder_sweep.settings.model import SECOND_OPINIONS
+from boulder_sweep.soils import with_law
+from tests.judge.plain import plain_designs
+from tests.judge.test_verdict import outcome
+from tests.runner.grids import grid
+
+LIMITS = Limits(math.radians(20.0), "P1", studied=True)
+
+
+def grade(theta_deg: float, limits: Limits = LIMITS, error_deg: float = 0.0, **changes: float) -> str | None:
+    """Grade of a pass that turns by so much, without a second opinion."""
+    turned = outcome(Status.SETTLED, theta_max=math.radians(theta_deg), theta_error=math.radians(error_deg))
+    found: str | None = judge(turned, plain_designs(**changes), limits).row(0)["robustness"]
+    return found
+
+
+def evaluated(sweep: boulder_sweep.Sweep, *laws: str) -> tuple[Evaluation, Judged]:
+    """Rows of a small sweep with second opinions."""
+    sweep = replace(sweep, model=replace(sweep.model, second_opinion=laws))
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    return evaluation, evaluation(sweep.block(0, sweep.n_designs))
+
+
+def test_only_what_the_study_has_drawn_is_robust_without_asking() -> None:
+    assert grade(5.9) == "robust"
+    assert grade(6.1) == "open"
+    assert grade(5.9, error_deg=0.2) == "open"
+    assert grade(5.9, LIMITS._replace(studied=False)) == "open"
+    assert grade(5.9, LIMITS._replace(rotation=math.radians(15.0))) == "open"
+    assert grade(5.9, phi=math.radians(29.0)) == "open"
+    assert grade(5.9, H=3.4, d=2.6) == "open"  # embedded by 0.76 of its height
+    assert grade(5.9, beta=5.0) == "open"  # does not belong to 40 degrees
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_every_range_of_the_study_counts(name: str) -> None:
+    low, high = FREE[name]
+    assert bool(is_free(plain_designs(**{name: 1.01 * high}).table)[0]) is False
+    assert bool(is_free(plain_designs(**{name: 0.99 * low}).table)[0]) is False
+
+
+def test_what_does_not_pass_has_no_grade() -> None:
+    row = judge(outcome(Status.LIMIT, theta_max=LIMITS.rotation, t_limit=0.1), plain_designs(), LIMITS).row(0)
+    assert row["robustness"] is None
+    assert row["stands_under"] is None
+
+
+def test_second_opinions_are_those_of_the_kernels() -> None:
+    """Row by row, whatever else is in the block."""
+    sweep = grid()
+    evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
+    passing = np.flatnonzero(judged.verdict == PASS)
+    designs = designs_of(sweep.block(0, sweep.n_designs)).rows(passing)
+    control = HeaveControl(evaluation.limits.rotation, evaluation.control.longest_horizon)
+    standing = np.zeros(len(passing), dtype=int)
+    for bit, law in enumerate(SECOND_OPINIONS):
+        for row in range(len(passing)):
+            one = second_opinions(with_law(designs.rows(slice(row, row + 1)).table, law), control)
+            standing[row] += (one.status[0] == Status.BELOW_LIMIT) << bit
+    assert judged["stands_under"][passing].tolist() == standing.tolist()
+    words = [GRADES[code] for code in judged["robustness"][passing]]
+    assert words == ["robust" if bits == 3 else "sensitive" for bits in standing]
+    assert set(words) == {"robust", "sensitive"}
+    assert set(judged["stands_under"][judged.verdict != PASS].tolist()) <= {-1}
+
+
+def test_one_law_alone_makes_nothing_robust() -> None:
+    _, both = evaluated(grid(), *SECOND_OPINIONS)
+    _, broms = evaluated(grid(), "broms")
+    passing = both.verdict == PASS
+    known = {STANDINGS[code] for code in broms["stands_under"][passing]}
+    assert known <= {"paper", "paper;broms"}
+    stands = (both["stands_under"][passing] & 1).astype(bool)
+    assert np.array_equal(stands, broms["stands_under"][passing] == 1)
+
+
+def test_other_outcomes_do_not_change() -> None:
+    _, without = evaluated(grid())
+    _, asked = evaluated(grid(), *SECOND_OPINIONS)
+    for name, values in without.columns.items():
+        if name not in ("robustness", "stands_under"):
+            assert np.array_equal(values, asked[name], equal_nan=values.dtype.kind == "f"), name
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "model.readings=as_printed",
+        "soil.water_table=0.5 m",
+        "soil.cohesion=5 kPa",
+        "model.unloading=plastic",
+        "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]",
+    ],
+)
+def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
+    sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
+    assert not robustness.is_planar_default(sweep)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    assert evaluation.second_opinion == ()
+    assert not evaluation.limits.studied
+
+
+def test_another_law_of_the_file_keeps_its_second_opinions() -> None:
+    """The factor on the resistance is that of the law asked for, whatever the law of the file."""
+    sweep = grid()
+    weaker = replace(sweep, model=replace(sweep.model, resistance="broms"))
+    _, ours = evaluated(sweep, *SECOND_OPINIONS)
+    _, theirs = evaluated(weaker, *SECOND_OPINIONS)
+    both = (ours.verdict == PASS) & (theirs.verdict == PASS)
+    assert both.any()
+    assert np.array_equal(ours["stands_under"][both], theirs["stands_under"][both])
+
+
+def test_a_penetration_beyond_the_rating_overturns_a_pass() -> None:
+    sweep = grid()
+    evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
+    passing = designs_of(sweep.block(0, sweep.n_designs)).rows(judged.verdict == PASS)
+    near = passing._replace(bed_offset=np.full(passing.size, -30.0))
+    stands = robustness.stands(near, "broms", "kp_squared", evaluation.limits, 10.0)
+    assert not stands.any()
+    assert GRADES.index("sensitive") == SENSITIVE
