@@ -130,7 +130,7 @@ def verdict_counts(judged: Judged) -> dict[str, int]:
     for place, word in enumerate(GRADES):
         for under in set(standing[grade == place].tolist()):
             laws = STANDINGS[under].split(";")[1:] if word == "sensitive" and under >= 0 else []
-            key = f"pass/{word}" + (f", stands under {' and '.join(laws)}" if laws else "")
+            key = f"pass/{word}" + (f" (stands under {' and '.join(laws)})" if laws else "")
             found[key] = found.get(key, 0) + int(np.count_nonzero((grade == place) & (standing == under)))
     return dict(sorted((key, count) for key, count in found.items() if count))
 

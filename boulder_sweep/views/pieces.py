@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 RATIO = "embedment_ratio"
 DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
-VERDICT, REASON, VALIDITY = "verdict", "reason", "validity"
+VERDICT, REASON, VALIDITY, ROBUSTNESS = "verdict", "reason", "validity", "robustness"
 MOST_KEPT = 2_000_000
 """Most rows kept: a dozen maps with as many cells as a map may have. Of more, only rows that differ in the picture."""
 _RASTER = 500
@@ -25,7 +25,8 @@ _RASTER = 500
 
 Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
 """Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and those
-of `boulder_sweep.columns.OPTIONAL_COLUMNS`, and `VALIDITY`, are left out where the table does not have them."""
+of `boulder_sweep.columns.OPTIONAL_COLUMNS`, `VALIDITY` and `ROBUSTNESS` are left out where the table does not have
+them."""
 
 
 def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
@@ -63,7 +64,7 @@ def finished_pieces(finished: FinishedRows) -> Pieces:
     def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         nonlocal verified
         held = set(finished.columns) - finished.lacking
-        there = [name for name in columns if name in held or name not in (*OPTIONAL_COLUMNS, VALIDITY)]
+        there = [name for name in columns if name in held or name not in (*OPTIONAL_COLUMNS, VALIDITY, ROBUSTNESS)]
         stored = list(dict.fromkeys(own for name in there for own in ((DEPTH, HEIGHT) if name == RATIO else (name,))))
         for table in finished.tables(stored, verify=not verified):
             frame = table.to_pandas()
@@ -91,6 +92,8 @@ class Kept:
         How many rows there are, and how many of them pass.
     flags : Counter
         How many of these have each flag of the column ``validity``; under ``""`` those without any.
+    grades : Counter
+        How many of these have each grade of the column ``robustness``.
     thinned : bool
         Whether only rows are left that can be told apart in a picture.
     """
@@ -98,12 +101,13 @@ class Kept:
     def __init__(self, across: str, up: str, over: Sequence[str | None], levels: Mapping[str, np.ndarray]):
         self.count = self.passing = 0
         self.flags: Counter[str] = Counter()
+        self.grades: Counter[str] = Counter()
         self.thinned = False
         self._ends = {
             name: (levels[name].min(initial=np.inf), levels[name].max(initial=-np.inf)) for name in (across, up)
         }
         self._over = [name for name in over if name is not None]
-        self.columns = list(dict.fromkeys([across, up, *self._over, VERDICT, REASON, VALIDITY]))
+        self.columns = list(dict.fromkeys([across, up, *self._over, VERDICT, REASON, VALIDITY, ROBUSTNESS]))
         self._parts: list[pd.DataFrame] = []
         self._held = 0
 
@@ -116,6 +120,8 @@ class Kept:
             if VALIDITY in rows:
                 for words, count in rows.loc[passes, VALIDITY].astype(str).value_counts().items():
                     self.flags.update(dict.fromkeys(str(words).split(";"), int(count)))
+            if ROBUSTNESS in rows:
+                self.grades.update(rows.loc[passes, ROBUSTNESS].dropna().astype(str).tolist())
         if self._held == 0:
             self._parts = [rows]  # also without any rows, for its columns
         elif len(rows):

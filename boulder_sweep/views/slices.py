@@ -55,6 +55,8 @@ class Slice:
         Whether there were too many rows to keep them all.
     flags : dict of str to int
         How many of those that pass have each flag of the column ``validity``; under ``""`` those without any.
+    grades : dict of str to int
+        How many of those that pass have each grade of the column ``robustness``; empty for a table without it.
     left_out : dict of str to int
         Of which multiples only some are shown: how many values there are.
     sets : dict of str to sequence of str
@@ -75,6 +77,7 @@ class Slice:
     passing: int
     thinned: bool
     flags: Mapping[str, int] = field(default_factory=dict)
+    grades: Mapping[str, int] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     sets: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
@@ -178,6 +181,7 @@ def plane(
         passing=kept.passing,
         thinned=kept.thinned,
         flags=dict(kept.flags),
+        grades=dict(kept.grades),
         left_out=left_out,
         sets=named,
     )

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boulder_sweep.columns import GRADES
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import VERDICTS
 from boulder_sweep.views.labels import USUAL, label, name_of, size_of, unbroken, value_text
-from boulder_sweep.views.pieces import Pieces
+from boulder_sweep.views.pieces import ROBUSTNESS, Pieces
 from boulder_sweep.views.slices import Slice, plane, select
 
 if TYPE_CHECKING:
@@ -30,6 +31,9 @@ CLASSES = (
     ("error", VERDICTS["error"], "not computed"),
 )
 """Verdict, or verdict and reason; colour; words of the legend."""
+ROBUST, SENSITIVE, OPEN = GRADES
+HATCHES = {SENSITIVE: "////", OPEN: ".."}
+"""Passes that are not robust, where second opinions were asked for."""
 MOST_CELLS = 400
 """A map with more values along an axis is drawn as points."""
 NARROW = 2
@@ -154,10 +158,23 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
         masked = np.ma.masked_less(cells, 0)
         style: dict[str, Any] = {"cmap": colours, "norm": norm, "linewidth": 0.35, "edgecolors": "white"}
         axes.pcolormesh(_edges(x_levels), _edges(y_levels), masked, **style)
+        for grade, hatch in _hatches(shown).items():
+            graded = np.zeros(cells.shape, dtype=bool)
+            graded[y_place, x_place] = rows[ROBUSTNESS].astype(str).to_numpy() == grade
+            if graded.any():
+                covered = np.ma.masked_array(np.zeros(cells.shape), ~graded)
+                drawn = axes.pcolor(_edges(x_levels), _edges(y_levels), covered, facecolor="none", hatch=hatch)
+                drawn.set_edgecolor("white")
+                drawn.set_linewidth(0.0)
     else:
         known = codes >= 0  # of another version's words, as in the mask above
         axes.scatter(x[known], y[known], c=codes[known], cmap=colours, norm=norm, s=9, linewidths=0)
     return {int(code) for code in np.unique(codes) if code >= 0}
+
+
+def _hatches(shown: Slice) -> dict[str, str]:
+    """Return how passes that are not robust are hatched: not at all where no second opinion was asked for."""
+    return HATCHES if shown.grades.get(SENSITIVE) or (shown.grades.get(ROBUST) and not shown.grades.get(OPEN)) else {}
 
 
 def _edges(levels: np.ndarray) -> np.ndarray:
@@ -171,13 +188,13 @@ def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, whic
     n_columns = grid.shape[1]
     words = f"{which} designs stop the truck"
     beside = n_columns <= NARROW
-    legend_in = _legend(fig, present, beside=beside)
+    legend_in = _legend(fig, present, shown, beside=beside)
     headline = figures.headline(fig, words, legend_in + GAP_IN)
     if not beside and "\n" in headline:
         fig.legends[0].remove()
         beside = True
         fig.set_figwidth(fig.get_figwidth() + LEGEND_IN)
-        legend_in = _legend(fig, present, beside=True)
+        legend_in = _legend(fig, present, shown, beside=True)
         headline = figures.headline(fig, words, legend_in + GAP_IN)
     map_in = (fig.get_figwidth() - AXIS_IN - legend_in * beside) / n_columns - GAP_IN
     style: Any = {"fontsize": 8.5, "fontweight": "bold"}
@@ -207,11 +224,18 @@ def _held(shown: Slice, name: str, value: float, units: str) -> str:
     return value_text(name, value, units)
 
 
-def _legend(fig: Any, present: set[int], *, beside: bool) -> float:
+def _legend(fig: Any, present: set[int], shown: Slice, *, beside: bool) -> float:
     """Draw the legend above the maps, or beside them if the title leaves no room; return its width in inches."""
     from matplotlib.patches import Patch
 
     handles = [Patch(color=colour, label=words) for k, (_, colour, words) in enumerate(CLASSES) if k in present]
+    hatches = {grade: hatch for grade, hatch in _hatches(shown).items() if shown.grades.get(grade)}
+    if hatches:
+        colour = CLASSES[0][1]
+        style: dict[str, Any] = {"facecolor": colour, "edgecolor": "white", "linewidth": 0.0}
+        graded = [Patch(color=colour, label=f"pass: {ROBUST}")] if shown.grades.get(ROBUST) else []
+        graded += [Patch(**style, hatch=hatch, label=f"pass: {grade}") for grade, hatch in hatches.items()]
+        handles = [*graded, *handles[1:]]
     place, columns = ("outside right upper", 1) if beside else ("outside upper right", len(handles))
     drawn = fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
     return float(drawn.get_window_extent().width / fig.dpi)
@@ -222,6 +246,8 @@ def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     fixed = ", ".join(unbroken(_held(shown, name, value, units)) for name, value in shown.fixed.items())
     words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
+    if shown.grades:
+        words.append(", ".join(f"{shown.grades[grade]:,} {grade}" for grade in GRADES if shown.grades.get(grade)))
     for name, count in shown.left_out.items():
         words.append(f"{name_of(name)}: {count} values, not all shown")
     same = [

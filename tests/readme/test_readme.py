@@ -35,7 +35,7 @@ def sweep(*arguments: str, cwd: Path = ROOT) -> str:
 def m30(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """Run the README's main job: folder of the table, and what was printed."""
     out = tmp_path_factory.mktemp("readme") / "m30-sizing.sweep"
-    return out, sweep("run", "configs/m30_sizing.yaml", "-o", str(out))
+    return out, sweep("run", "configs/m30_sizing.yaml", "--second-opinion", "-o", str(out))
 
 
 def test_the_main_job_counts_what_the_readme_shows(m30: tuple[Path, str]) -> None:
@@ -45,6 +45,12 @@ def test_the_main_job_counts_what_the_readme_shows(m30: tuple[Path, str]) -> Non
 
 def test_the_first_answer() -> None:
     assert sweep("need", "configs/site.yaml", "--margin", "25%").rstrip() == marked("need")
+
+
+@pytest.mark.parametrize(("block", "option"), [("need-least", "--own-readings"), ("need-robust", "--robust")])
+def test_what_robust_costs(block: str, option: str) -> None:
+    command = ["need", "configs/site.yaml", "--set", "boulder.height=3.4 m", option]
+    assert sweep(*command).rstrip() == marked(block)
 
 
 def test_the_number_of_designs(m30: tuple[Path, str]) -> None:
