@@ -118,6 +118,7 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
     columns += [
         (("at the", "means"), lambda row: str(row["verdict"])),
+        *([_GRADE] if found.sweep.model.second_opinion else []),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
@@ -131,6 +132,8 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
     occurring = {row.get("p_fail_by") for row in rows}
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
+    if found.sweep.model.second_opinion:
+        lines += grade_lines(row["robustness"] for row in rows)
     if count == 1:
         lines += ["", *_index_lines(found, width)]
     return lines

@@ -142,6 +142,8 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
         )
     if robust:
         final, coarse = final.asked(), dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED))
+    else:  # asked of the answers alone
+        final, coarse = (dataclasses.replace(each, second_opinion=()) for each in (final, coarse))
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
         coarse = final
     return Judges(coarse, final, accuracy, least_margin, robust)

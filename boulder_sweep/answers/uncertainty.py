@@ -233,7 +233,10 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     driver = drivers(z, first[0])
     failing = rare_failing(asked, draws, found) if asked.rare else None
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
-    return chance_table(start, block, asked.judges.final(block), found, driver, asked.spread.words, failing)
+    judged = asked.judges.final(block)
+    if asked.sweep.model.second_opinion:
+        judged = asked.judges.final.graded(judged, block)
+    return chance_table(start, block, judged, found, driver, asked.spread.words, failing)
 
 
 def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Failing:

@@ -8,8 +8,17 @@ from dataclasses import asdict
 import click
 
 from boulder_sweep.cli.loading import load_sweep, refuse_missing, refuse_units_of_json, refuse_unwritable
-from boulder_sweep.cli.options import OUTPUT, cluster_options, jobs_option, json_option, set_option, units_option
+from boulder_sweep.cli.options import (
+    OUTPUT,
+    cluster_options,
+    jobs_option,
+    json_option,
+    second_opinion_option,
+    set_option,
+    units_option,
+)
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.settings.overrides import ALL_OPINIONS
 from boulder_sweep.text import counted
 
 EXAMPLES = """\b
@@ -28,6 +37,7 @@ Examples:
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 @click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
+@second_opinion_option
 @click.option(
     "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
 )
@@ -50,6 +60,7 @@ def uncertainty(
     confidence: str,
     margin: str,
     rare: bool,
+    second_opinion: bool,
     doubts: bool,
     seed: int,
     jobs: int | None,
@@ -78,7 +89,7 @@ def uncertainty(
     from boulder_sweep.cli.progress import kernels_for, working
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet)
+    sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     with working(quiet, kernels_for(sweep)) as progress:

@@ -44,11 +44,39 @@ def test_designs_that_are_not_touched_are_counted(sweep, possible_grid):
 
 
 def test_a_run_says_how_firm_its_verdicts_are(sweep, possible_grid):
-    _, out, _ = sweep("run", possible_grid)
+    _, out, _ = sweep("run", possible_grid, "--set", "boulder.height=[3.2, 3.6] m")
     assert "a simulation, not a rating by test" in out
-    assert "firm?  sample of 18 designs" in out
-    for change in ("other reading of the paper", "1 deg of friction angle", "5 % of speed", "3 K_p for K_p^2"):
-        assert change in out
+    words = " ".join(out.split())
+    assert "sample of 12 designs" in words
+    for change in (
+        "other reading of the paper",
+        "1 deg less friction angle",
+        "5 % more speed",
+        "broms",
+        "width_capped",
+    ):
+        assert change in words
+    assert "open: not asked; --second-opinion asks" in words
+
+
+def test_a_run_with_second_opinions_says_what_is_robust(sweep, possible_grid):
+    """And resumes with them."""
+    heights = ("--set", "boulder.height=[3.2, 3.6] m")
+    _, out, _ = sweep("run", possible_grid, *heights, "--second-opinion", "-o", "asked")
+    assert "robust" in out
+    assert "stands with friction and vertical motion" in " ".join(out.split())
+    assert "--second-opinion asks" not in out
+    code, _, err = sweep("run", possible_grid, *heights, "-o", "asked", "--resume")
+    assert code == 4, err
+
+
+def test_kp_squared_is_no_second_opinion(sweep, possible_grid):
+    code, _, err = sweep("run", possible_grid, "--set", "model.second_opinion=[kp_squared]")
+    assert code == 2
+    assert "kp_squared is no second opinion" in err
+    code, _, err = sweep("run", possible_grid, "--set", "model.second_opinion=broom")
+    assert code == 2
+    assert "did you mean broms" in err
 
 
 def test_json_is_one_object_on_stdout(sweep, possible_grid):

@@ -1,0 +1,81 @@
+"""Answers under second opinions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from boulder_sweep.answers.need import need
+from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
+from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.uncertainty import uncertainty
+from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.robustness import ROBUST
+from boulder_sweep.settings.model import SECOND_OPINIONS
+from tests.answers.designs import site
+
+
+def test_the_least_robust_depth_is_robust_and_the_next_one_is_not() -> None:
+    sweep = site(height="[3, 3.4] m")
+    found = need(sweep, robust=True)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
+    rows = [row for row in found.arrow.to_pylist() if row["passes_at"] is not None]
+    assert len(rows) >= 3
+    for row in rows:
+        assert row["robustness"] == "robust"
+        assert row["stands_under"] == "paper;broms;width_capped"
+        at = [row["passes_at"], row["fails_at"]]
+        given = sweep.constants | {name: row[name] for name in ("boulder_height_m", "friction_angle_deg")}
+        given.pop("embedment_ratio", None)
+        grades = []
+        for depth in at:
+            one = replace(sweep, axes=(), constants=given | {"embedment_depth_m": depth}, table=None)
+            judged = evaluation(one.block(0, 1))
+            grades.append(judged.verdict[0] == PASS and judged["robustness"][0] == ROBUST)
+        assert grades == [True, False]
+
+
+def test_robust_costs_depth_and_answers_are_graded_without_asking() -> None:
+    sweep = site(height="[3, 3.4] m")
+    least, robust = (need(sweep, robust=asked, both_readings=False) for asked in (False, True))
+    depths = [np.array(found.arrow["passes_at"].to_pylist(), dtype=float) for found in (least, robust)]
+    both = np.isfinite(depths[0]) & np.isfinite(depths[1])
+    assert (depths[1][both] > depths[0][both]).all()
+    grades = [grade for grade, depth in zip(least.arrow["robustness"].to_pylist(), depths[0], strict=True) if depth > 0]
+    assert set(grades) == {"sensitive"}
+    assert any(line.startswith("sensitive: a second opinion overturns it") for line in need_lines(least))
+    assert any(line.startswith("robust: stands with friction") for line in need_lines(robust))
+
+
+def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
+    wet = site()
+    wet = replace(wet, model=replace(wet.model, water_table_m=0.5))
+    with pytest.raises(QuestionError, match="dry, level, uniform soil"):
+        need(wet, robust=True)
+    assert set(need(wet, both_readings=False).arrow["robustness"].to_pylist()) <= {"open", None}
+    uncertain = site(friction="{mean: 38 deg, sd: 2 deg}")
+    with pytest.raises(QuestionError, match="cannot be used together"):
+        need(uncertain, robust=True, probability=0.95)
+
+
+def test_capacity_shows_the_grade_of_every_pass() -> None:
+    found = reserves(site(site="embedment_ratio: 0.7", height="3.4 m"))
+    grades = found.arrow["robustness"].to_pylist()
+    assert "robust" in grades
+    assert any("robust" in line.split() for line in reserve_lines(found))
+
+
+def test_uncertainty_grades_the_design_at_the_means_if_asked() -> None:
+    sweep = site(friction="{mean: 40 deg, sd: 1 deg}", site="embedment_ratio: 0.7", height="3.4 m")
+    without = uncertainty(sweep, half_width=0.2)
+    asked = replace(sweep, model=replace(sweep.model, second_opinion=SECOND_OPINIONS))
+    found = uncertainty(asked, half_width=0.2)
+    assert found.arrow["p_pass"].to_pylist() == without.arrow["p_pass"].to_pylist()
+    assert found.arrow["robustness"].to_pylist() == ["robust"]
+    assert "opinion" in uncertainty_lines(found)[1]
+    assert "opinion" not in uncertainty_lines(without)[1]
