@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUT_COLUMNS, OUTCOME_COLUMNS
+from boulder_sweep.columns import BY_NAME, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OUTCOME_COLUMNS
 from boulder_sweep.designs import Column, DesignBlock
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import Judged
@@ -103,7 +103,7 @@ def test_encodings(block, judged):
         name = column.path_in_schema
         if name == DESIGN_ID.name:
             assert "DELTA_BINARY_PACKED" in column.encodings
-        elif name in (*INPUT_COLUMNS, "verdict", "reason", "rating", "validity") and name != "impact_height_m":
+        elif (name in INPUT_COLUMNS or BY_NAME[name].type == "dictionary") and name != "impact_height_m":
             assert "RLE_DICTIONARY" in column.encodings
         else:
             assert "BYTE_STREAM_SPLIT" in column.encodings
