@@ -401,7 +401,8 @@ class _Run:
                 self.touching = not self.touching
                 self.changes += 1
                 solver = self.solver(t, state)
-        return HeaveImpact(*map(float, largest), float(t_limit), state, self.sets, self.changes)
+        theta, x_b, y_b, x_v = map(float, largest)
+        return HeaveImpact(theta, x_b, y_b, x_v, float(t_limit), state, self.sets, self.changes)
 
     def solver(self, t: float, state: Array) -> DOP853:
         return DOP853(
