@@ -51,11 +51,11 @@ WORKSPACE = RATES + STAGES * AXES
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 2e-4, 8e-3, 1e-9
 """Lengths of steps [s]."""
 MOST_ATTEMPTS = 50_000
-CAUTION = 0.99
-"""The energy must be below the barrier by the errors of the integrator and of the search for the least, and more."""
+CAUTION = 0.01
+"""Share of the least energy by which the energy must be below it: the errors of integrator and search, and more."""
 TURNS = 3
 """How often the least energy is looked for along x_b and along y_b in turn."""
-HALVINGS = 40
+HALVINGS = 24
 """Halvings of an interval in which it is looked for."""
 
 
@@ -240,27 +240,37 @@ def crush_energy(u: float, c: Constants) -> float:
 
 
 @kernel
-def least_energy(theta: float, x_start: float, work: np.ndarray, f: HeaveConstants) -> float:
+def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     """Least potential energy at a rotation, wherever the boulder stands [J] (Eq 137).
 
     Notes
     -----
-    Along x_b alone, and along y_b alone, the energy is convex: the least is found by halving, along either in turn.
+    Along x_b alone, and along y_b alone, the energy is convex: a least is found by halving, along either in turn.
+    Along x_b it is between the places where the uppermost and the lowest soil are as they were; along y_b between
+    those where all strips carry what they can, which is more than the weight, and where the boulder is out of the soil.
+    There may be several: the search starts from both ends along x_b and from the middle.
     """
-    x, y = x_start, 0.0
-    V = 0.0
-    for _ in range(TURNS):
-        low, high = x - 2.0 * f.c.d, x + 2.0 * f.c.d
-        for _halving in range(HALVINGS):
-            x = 0.5 * (low + high)
-            low, high = (x, high) if potential_energy(x, theta, y, work, f).Q_x > 0.0 else (low, x)
-        if f.heave > 0.0:
-            low, high = -0.5 * f.c.d, f.L
-            for _halving in range(HALVINGS):
-                y = 0.5 * (low + high)
-                low, high = (y, high) if potential_energy(x, theta, y, work, f).Q_y > 0.0 else (low, y)
-        V = potential_energy(x, theta, y, work, f).u
-    return V
+    sin, versin = sine_versine(theta)
+    upper = f.c.l_n * versin - f.c.z_0 * sin
+    left, right = min(upper, upper + f.c.d * sin), max(upper, upper + f.c.d * sin)
+    bottom, top = 0.0, f.L + 3.0 * f.c.d + f.s_0
+    for j in range(PIECES):
+        bottom = min(bottom, strip_depth(work, j, 0.0, sin, versin, f) - f.q_strip / f.k_strip)
+    least = np.inf
+    for start in range(3):
+        x, y = left + 0.5 * start * (right - left), 0.0
+        for _ in range(TURNS):
+            if f.heave > 0.0:
+                low, high = bottom, top
+                for _ in range(HALVINGS):
+                    y = 0.5 * (low + high)
+                    low, high = (y, high) if potential_energy(x, theta, y, work, f).Q_y > 0.0 else (low, y)
+            low, high = left, right
+            for _ in range(HALVINGS):
+                x = 0.5 * (low + high)
+                low, high = (x, high) if potential_energy(x, theta, y, work, f).Q_x > 0.0 else (low, x)
+        least = min(least, potential_energy(x, theta, y, work, f).u)
+    return least
 
 
 @kernel
@@ -349,9 +359,9 @@ def simulate_heave(
         h = min(h * min(0.9 * (control.tolerance / max(error, 1e-30)) ** 0.2, 4.0), LONGEST_STEP)
         if control.stop and field(work, START, 7) <= 0.0:
             if np.isnan(barrier):
-                x = field(work, START, 0)
-                forward = least_energy(control.theta_limit, x, work, f)
-                barrier = CAUTION * min(forward, least_energy(-control.theta_limit, x, work, f))
+                forward = least_energy(control.theta_limit, work, f)
+                least = min(forward, least_energy(-control.theta_limit, work, f))
+                barrier = least - CAUTION * abs(least)
             if energy_at(work, START, f) + (crush_energy(u, c) if touching else 0.0) < barrier:
                 status = Status.BELOW_LIMIT.value
                 break
@@ -380,7 +390,9 @@ def run_second_opinions(
         outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
         if is_computable(c):
             f = heave_constants(design, c, form, base)
-            outcome = simulate_heave(f, design.m_v, control, work, record)
+            # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
+            if not form.heave or f.k_strip * f.s_0 < f.q_strip:
+                outcome = simulate_heave(f, design.m_v, control, work, record)
         o = outcome
         out[0, row], out[1, row], out[2, row], out[3, row] = o.status, o.theta_max, o.x_b_max, o.y_b_max
         out[4, row], out[5, row], out[6, row], out[7, row] = o.x_v_max, o.t_limit, o.t_end, o.attempts
