@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 PIECES = 32
 """Depths of the soil, strips of the foot, points of the sides."""
 _SIDE_ROWS, _SIDE_COLUMNS = 8, 4
-_LONGEST_STEP = 2e-3  # [s]: what is pressed in for good is noted after each
+_LONGEST_STEP = 1e-3  # [s]: what is pressed in for good is noted after each
 _ABSOLUTE = np.array([1e-11, 1e-11, 1e-11, 1e-10, 1e-10, 1e-10, 1e-11, 1e-10, 1e-8])
 _SAMPLES = 8
 
