@@ -25,6 +25,7 @@ _GROUND = "boulder_sweep/soils.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
 
 _PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
+_HEAVE, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "second_opinion"))
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return (1.0 + half) / (1.0 - half)", "return (1.0 - half) / (1.0 + half)"),
@@ -110,4 +111,60 @@ MUTATIONS = (
     Mutation((123,), _PLASTIC, "work += soil.ultimate[n] * max(", "work += 0.5 * soil.ultimate[n] * max("),
     Mutation((124,), _PLASTIC, "(pressed * pressed - over * over)", "(pressed * pressed)"),
     Mutation((124,), _UNLOADING, "c.C_cos * abs(sin) + c.C_sin", "c.C_cos * abs(sin) - c.C_sin"),
+    Mutation((131,), _HEAVE, "f.b_b * cos - f.a_b * sin", "f.b_b * cos + f.a_b * sin"),
+    Mutation(
+        (131,), _HEAVE, "turning = Q.Q_theta - i.S * omega_b * omega_b", "turning = Q.Q_theta + i.S * omega_b * omega_b"
+    ),
+    Mutation((131,), _HEAVE, "Q.Q_y / f.m_b + i.Y * omega_b * omega_b", "Q.Q_y / f.m_b - i.Y * omega_b * omega_b"),
+    Mutation((131,), _HEAVE, "2.0 * l_n * sin * cos * f.M_first", "l_n * sin * cos * f.M_first"),
+    Mutation((131,), _HEAVE, "A = f.J_b + turned if f.heave", "A = f.c.J_eff if f.heave"),
+    Mutation((132,), _HEAVE, "edge = c.l_n if u > 0.0 else c.l_n - f.L", "edge = c.l_n"),
+    Mutation((132,), _HEAVE, "y_b - edge * sin + d_n * versin", "y_b - edge * sin - d_n * versin"),
+    Mutation((132,), _HEAVE, "lift = f.heave * stored if depth > 0.0 else 0.0", "lift = 0.0"),
+    Mutation((132,), _HEAVE, "d_n * sin - edge * (1.0 - versin)", "d_n * sin + edge * (1.0 - versin)"),
+    Mutation((132,), _HEAVE, "(1.0 / PIECES) * covered * v * abs(v)", "(1.0 / PIECES) * v * abs(v)"),
+    Mutation(
+        (133,),
+        _HEAVE,
+        "+ field(work, FOOT, j) * sin - f.c.c_y * versin",
+        "- field(work, FOOT, j) * sin - f.c.c_y * versin",
+    ),
+    Mutation(
+        (133,),
+        _HEAVE,
+        "elastic = min(max(f.k_strip * strip_depth(work, j, y_b, sin, versin, f), 0.0), f.q_strip)",
+        "elastic = min(f.k_strip * strip_depth(work, j, y_b, sin, versin, f), f.q_strip)",
+    ),
+    Mutation(
+        (133,),
+        _HEAVE,
+        "max(elastic - on * f.c_strip * (w_b - omega_b * X), 0.0)",
+        "max(elastic - f.c_strip * (w_b - omega_b * X), 0.0)",
+    ),
+    Mutation((133,), _HEAVE, "math.exp(math.pi * math.tan(design.phi))", "math.exp(math.tan(design.phi))"),
+    Mutation((133,), _OPINION, "field(work, SETS, j) + over", "over"),
+    Mutation((134,), _HEAVE, "return v / math.sqrt(v * v + f.v_s * f.v_s)", "return v / (abs(v) + f.v_s)"),
+    Mutation((134,), _HEAVE, "along - omega_b * c.l_n", "along + omega_b * c.l_n"),
+    Mutation((134,), _HEAVE, "SUMS + 4 * PIECES, j, max(F, 0.0)", "SUMS + 4 * PIECES, j, max(-F, 0.0)"),
+    Mutation((134,), _HEAVE, "rub = -f.friction * s.total * slipping", "rub = -f.friction * s.elastic * slipping"),
+    Mutation((134,), _HEAVE, "at_rest = 1.0 - math.sin(design.phi)", "at_rest = 1.0"),
+    Mutation((134,), _HEAVE, "math.tan(2.0 / 3.0 * design.phi)", "math.tan(design.phi)"),
+    Mutation((135,), _HEAVE, "a = f.a_b + 0.5 * f.L * min", "a = f.a_b - 0.5 * f.L * min"),
+    Mutation((135,), _HEAVE, "return 6.0 * f.s_0 / f.L", "return 2.0 * f.s_0 / f.L"),
+    Mutation(
+        (136,), _HEAVE, "elastic * (depth - 0.5 * elastic / f.k_strip)", "elastic * (depth - elastic / f.k_strip)"
+    ),
+    Mutation(
+        (136,), _HEAVE, "weight * (y_b - f.a_b * sin - f.b_b * versin)", "weight * (y_b - f.a_b * sin + f.b_b * versin)"
+    ),
+    Mutation((136,), _HEAVE, "- (f.b_b + f.c.c_y) * versin)", "- f.b_b * versin)"),
+    Mutation((137,), _OPINION, "barrier = least - CAUTION * abs(least)", "barrier = least + 2.0 * abs(least)"),
+    Mutation((137,), _OPINION, "- f.q_strip / f.k_strip)", "+ 0.5 * f.q_strip / f.k_strip)"),
+    Mutation(
+        (137,),
+        _OPINION,
+        "control.stop and field(work, START, 7) <= 0.0",
+        "control.stop and field(work, START, 7) <= 9.0",
+    ),
+    Mutation((137,), _OPINION, "+ (crush_energy(u, c) if touching else 0.0) < barrier", "< barrier"),
 )

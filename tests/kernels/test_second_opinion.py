@@ -11,16 +11,20 @@ from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
 from boulder_kernels import Status
-from boulder_kernels.design import constants_of
+from boulder_kernels.design import G, constants_of
+from boulder_kernels.dynamics import contact_displacement, spring_compression
 from boulder_kernels.heave import PIECES, SETS, Base, Form, HeaveConstants, heave_constants, potential_energy, prepare
 from boulder_kernels.second_opinion import (
     CAUTION,
+    START,
     WORKSPACE,
     HeaveControl,
     HeaveOutcome,
     HeaveRecord,
+    energy_at,
     least_energy,
     no_heave_record,
+    press_in,
     second_opinions,
     simulate_heave,
 )
@@ -191,6 +195,24 @@ def test_what_is_pressed_in_stays() -> None:
     assert found >= 3
 
 
+def test_pressing_in_by_hand() -> None:
+    """What a strip is pressed in beyond q/k_b stays, once, and adds up (Eq 133)."""
+    f = heave_constants(RWG, constants_of(RWG, bk.corrected(), 0), BOTH, BASE)
+    work = np.zeros(WORKSPACE)
+    prepare(work, f)
+    deepest = RWG.rho_s * G * RWG.d * np.exp(np.pi * np.tan(RWG.phi)) * np.tan(np.pi / 4 + RWG.phi / 2) ** 2 / 100e6
+    settlement = f.m_b * G / (100e6 * RWG.L * RWG.W)
+    for depth, known, pressed in (
+        (0.9 * deepest, 0.0, False),
+        (deepest + 0.01, 0.01, True),
+        (deepest + 0.005, 0.01, False),
+        (deepest + 0.03, 0.03, True),
+    ):
+        work[START + 2] = settlement - depth
+        assert press_in(work, f) == pressed
+        assert work[SETS : SETS + PIECES] == pytest.approx(np.full(PIECES, known), abs=1e-12)
+
+
 @pytest.mark.compiled
 def test_a_strip_pressed_beyond_its_capacity_takes_energy() -> None:
     """Nothing else dissipates: what goes is at least the capacity times the sets, and no more than by rounding."""
@@ -216,7 +238,7 @@ def test_without_rise_and_friction_on_a_stiff_base_it_is_the_planar_motion(law: 
         design = under(design, law)
         exact = control(2.5e-4, 0.35, LIMIT, PIECES)._replace(locate_yield=True)
         known = bk.simulate_design(design, bk.corrected(), exact, bk.no_record()).maxima
-        for stiffness, degrees, metres in ((1e11, 0.03, 3e-3), (1e13, 3e-3, 3e-5)):
+        for stiffness, degrees, metres in ((1e11, 0.03, 3e-3), (1e13, 3e-3, 2e-4)):
             found = simulate(design, NEITHER, how, Base(stiffness=stiffness), elements=PIECES).outcome
             assert found.theta_max * DEGREE == pytest.approx(known.theta * DEGREE, abs=degrees)
             assert found.x_b_max == pytest.approx(known.x_b, abs=metres)
@@ -315,6 +337,25 @@ def test_no_place_costs_less_than_the_least_energy() -> None:
             values = np.append(values, [potential_energy(x, theta, y, work, f).u for x, y in nearby])
             assert least - CAUTION * abs(least) <= values.min()
             assert least > values.min() - 0.5 * np.ptp(values)  # nor is it out of reach
+
+
+def test_the_proof_counts_all_energy_and_waits_for_the_truck() -> None:
+    """It ends where boulder, soil, base and crush hold less than the least, and the truck no longer drives forward.
+
+    A slow truck with a stiff damper, which gives back much: when it stops, the boulder alone already holds less.
+    """
+    limit = np.radians(20.0)
+    design = under(RWG, "broms")._replace(v_0=8.0, c_v=1e7)
+    outcome, f, work = simulate(design, BOTH, HeaveControl(limit, 1.0))
+    assert outcome.status == Status.BELOW_LIMIT
+    x, theta, _, x_v, *_, v_v = work[START : START + 8]
+    assert v_v < 0.0
+    sin, versin = np.sin(theta), 1.0 - np.cos(theta)
+    u = spring_compression(x_v, v_v, contact_displacement(x, sin, versin, f.c), f.c)
+    held, crush = energy_at(work, START, f), 0.5 * f.c.k_v * u**2
+    least = min(least_energy(side * limit, work, f) for side in (-1.0, 1.0))
+    assert crush > 0.1 * least
+    assert held + crush < (1.0 - CAUTION) * least
 
 
 def shallow(design: bk.Design) -> bk.Design:
