@@ -300,7 +300,7 @@ def simulate_heave(
     t, h, touching = 0.0, FIRST_STEP, True
     u = write_rate(work, START, 0, touching, f)
     theta_max = x_b_max = y_b_max = x_v_max = 0.0
-    t_limit, barrier = np.nan, np.nan
+    t_limit, barrier, is_old = np.nan, np.inf, True
     written, attempts = 0, 0
     status = Status.STEP_BUDGET.value
     while attempts < MOST_ATTEMPTS:
@@ -344,8 +344,7 @@ def simulate_heave(
         if at_limit and control.stop:
             status, theta_max = Status.LIMIT.value, control.theta_limit
             break
-        if press_in(work, f):
-            barrier = np.nan
+        is_old = press_in(work, f) or is_old
         if changes:
             touching = not touching
             u = 0.0
@@ -358,11 +357,13 @@ def simulate_heave(
                 put(work, RATES, axis, field(work, RATES + AXES * (STAGES - 1), axis))
         h = min(h * min(0.9 * (control.tolerance / max(error, 1e-30)) ** 0.2, 4.0), LONGEST_STEP)
         if control.stop and field(work, START, 7) <= 0.0:
-            if np.isnan(barrier):
+            held = energy_at(work, START, f) + (crush_energy(u, c) if touching else 0.0)
+            # What is pressed in only lowers the least: it is looked for again where that may decide.
+            if held < barrier and is_old:
                 forward = least_energy(control.theta_limit, work, f)
                 least = min(forward, least_energy(-control.theta_limit, work, f))
-                barrier = least - CAUTION * abs(least)
-            if energy_at(work, START, f) + (crush_energy(u, c) if touching else 0.0) < barrier:
+                barrier, is_old = least - CAUTION * abs(least), False
+            if held < barrier:
                 status = Status.BELOW_LIMIT.value
                 break
         if t >= control.longest:
