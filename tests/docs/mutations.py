@@ -158,13 +158,13 @@ MUTATIONS = (
         (136,), _HEAVE, "weight * (y_b - f.a_b * sin - f.b_b * versin)", "weight * (y_b - f.a_b * sin + f.b_b * versin)"
     ),
     Mutation((136,), _HEAVE, "- (f.b_b + f.c.c_y) * versin)", "- f.b_b * versin)"),
-    Mutation((137,), _OPINION, "barrier = least - CAUTION * abs(least)", "barrier = least + 2.0 * abs(least)"),
-    Mutation((137,), _OPINION, "- f.q_strip / f.k_strip)", "+ 0.5 * f.q_strip / f.k_strip)"),
+    Mutation((137,), _OPINION, "least - CAUTION * abs(least), False", "least + 2.0 * abs(least), False"),
+    Mutation((137,), _OPINION, "bottom = min(bottom, ", "bottom = max(-0.5 * f.c.d, "),
     Mutation(
         (137,),
         _OPINION,
         "control.stop and field(work, START, 7) <= 0.0",
         "control.stop and field(work, START, 7) <= 9.0",
     ),
-    Mutation((137,), _OPINION, "+ (crush_energy(u, c) if touching else 0.0) < barrier", "< barrier"),
+    Mutation((137,), _OPINION, "f) + (crush_energy(u, c) if touching else 0.0)", "f)"),
 )
