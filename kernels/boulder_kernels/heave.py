@@ -356,7 +356,7 @@ def forces(
 
 @inlined
 def seated_sine(f: HeaveConstants) -> float:
-    """Sine of the rotation at which a foot on its base begins to lift, when the boulder may not rise (Eq 135)."""
+    """Sine of the rotation at which the weight is on the end of the foot, when the boulder may not rise (Eq 135)."""
     return 6.0 * f.s_0 / f.L
 
 

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels.design import design_in
+from boulder_kernels._jit import compiler
+from boulder_kernels.design import constants_of, design_in
+from boulder_kernels.heave import ROOM, Base, Form, forces, heave_constants, potential_energy, prepare
 from boulder_kernels.lane_events import begin_searches, find_events, find_limits, keep_steps, search_on, start_steps
 from boulder_kernels.lane_steps import (
     attempt_steps,
@@ -53,6 +55,7 @@ def assembly(kernel, *arguments: object) -> str:
 
     Code that comes out of the cache has no listing, so it is compiled afresh.
     """
+    compiler()  # tells Numba of what is called and is no kernel
     options = {name: value for name, value in kernel.options.items() if name not in ("nopython", "cache")}
     fresh = numba.njit(**options)(kernel.py_func)
     fresh(*arguments)
@@ -150,6 +153,22 @@ def test_layers_of_soil_are_vectorised(kernel) -> None:
         packed = sum(count for name, count in found.items() if name.endswith(register))
         assert packed > 100
         assert len(SCALAR.findall(code)) < packed / 10
+
+
+def test_pieces_of_a_second_opinion_are_vectorised() -> None:
+    """Soil, sides and foot of one impact: roots and divisions in whole registers; only the ends of sums are left."""
+    design = random_designs(1, seed=143)[0]
+    f = heave_constants(design, constants_of(design, bk.corrected(), 0), Form(True, True), Base())
+    work = np.zeros(ROOM)
+    prepare(work, f)
+    code = assembly(forces, 0.05, 1.0, 0.05, 0.5, 0.01, 0.1, 0.6, 12.0, True, work, f)
+    held = assembly(potential_energy, 0.05, 0.05, 0.01, work, f)
+    assert not CALL.search(code + held)
+    found, register = widths(code), widest()
+    if register and register != "xmm":
+        assert found[f"div {register}"] >= 3
+        assert found[f"sqr {register}"] >= 2
+        assert widths(held)[f"max {register}"] >= 2
 
 
 def test_wide_vectors_are_asked_for() -> None:
