@@ -307,15 +307,14 @@ def forces(
         put(work, SUMS + 2 * PIECES, j, e.lift)
         put(work, SUMS + 3 * PIECES, j, max(-F, 0.0))
         put(work, SUMS + 4 * PIECES, j, max(F, 0.0))
-    Q_x, Q_theta, Q_y = summed(work, 0), summed(work, 1), summed(work, 2)
     far, near = summed(work, 3), summed(work, 4)
     # The faces slip along themselves, each with one speed all over.
     along = v_b * sin + w_b * cos
     F_far = -f.friction * far * slipping(along - omega_b * c.l_n, f)
     F_near = -f.friction * near * slipping(along + omega_b * (f.L - c.l_n), f)
-    Q_x += (F_far + F_near) * sin
-    Q_y += (F_far + F_near) * cos
-    Q_theta += F_near * (f.L - c.l_n) - F_far * c.l_n
+    Q_x = (F_far + F_near) * sin
+    Q_y = (F_far + F_near) * cos
+    Q_theta = F_near * (f.L - c.l_n) - F_far * c.l_n
 
     for j in range(PIECES):
         a, b = field(work, SIDE_A, j), field(work, SIDE_B, j)
@@ -323,24 +322,20 @@ def forces(
         v_x, v_y = v_b + omega_b * Y, w_b - omega_b * X
         pressed = f.side * max(field(work, SIDE_DEPTH, j) - f.heave * y_b, 0.0)
         share = -pressed / math.sqrt(v_x * v_x + v_y * v_y + f.v_s * f.v_s)
-        put(work, SUMS, j, share * v_x)
-        put(work, SUMS + PIECES, j, share * (v_x * Y - v_y * X))
-        put(work, SUMS + 2 * PIECES, j, share * v_y)
-    Q_x += summed(work, 0)
-    Q_theta += summed(work, 1)
-    Q_y += summed(work, 2)
+        put(work, SUMS, j, field(work, SUMS, j) + share * v_x)
+        put(work, SUMS + PIECES, j, field(work, SUMS + PIECES, j) + share * (v_x * Y - v_y * X))
+        put(work, SUMS + 2 * PIECES, j, field(work, SUMS + 2 * PIECES, j) + share * v_y)
 
     weight = f.m_b * G
     if f.heave > 0.0:
         for j in range(PIECES):
             s = foot_strip(work, j, y_b, w_b, omega_b, sin, versin, f)
             rub = -f.friction * s.total * slipping(v_b + omega_b * s.Y, f)
-            put(work, SUMS, j, rub)
-            put(work, SUMS + PIECES, j, rub * s.Y - s.total * s.X)
-            put(work, SUMS + 2 * PIECES, j, s.total)
-        Q_x += summed(work, 0)
-        Q_theta += summed(work, 1) + weight * (f.a_b * cos + f.b_b * sin)
-        Q_y += summed(work, 2) - weight
+            put(work, SUMS, j, field(work, SUMS, j) + rub)
+            put(work, SUMS + PIECES, j, field(work, SUMS + PIECES, j) + (rub * s.Y - s.total * s.X))
+            put(work, SUMS + 2 * PIECES, j, field(work, SUMS + 2 * PIECES, j) + s.total)
+        Q_theta += weight * (f.a_b * cos + f.b_b * sin)
+        Q_y -= weight
     else:
         # The whole weight, on the corner that the boulder turns about (Eq 135).
         a = f.a_b + 0.5 * f.L * min(max(sin / seated_sine(f), -1.0), 1.0)
@@ -349,6 +344,9 @@ def forces(
         Q_x += rub
         Q_theta += rub * Y + weight * (f.a_b * cos + f.b_b * sin - X)
 
+    Q_x += summed(work, 0)
+    Q_theta += summed(work, 1)
+    Q_y += summed(work, 2)
     u = spring_compression(x_v, v_v, contact_displacement(x_b, sin, versin, c), c)
     F_v = c.k_v * u if touching else 0.0
     return Forces(Q_x + F_v, Q_y, Q_theta + F_v * contact_lever(sin, versin, c), u)
