@@ -89,7 +89,7 @@ def empty_record(end: float, count: int) -> HeaveRecord:
 
 
 def assert_as_the_oracle(design: bk.Design, law: str, form: Form, horizon: float, tolerance: float = 1e-10) -> None:
-    """Hold an impact against the oracle: 1e-3 degrees, 1e-5 m and 1e-4 m of the truck, which goes on at speed, 1e-5 s."""
+    """Hold an impact against the oracle: 1e-3 degrees, 1e-5 m and s; 1e-4 m of the truck, which goes on at speed."""
     inputs = replace(inputs_of(design), resistance=law)
     known = known_impact(inputs, heave=form.heave, friction=form.friction, horizon=horizon, limit=LIMIT)
     found, _, work = simulate(under(design, law), form, HeaveControl(LIMIT, horizon, tolerance, False))
