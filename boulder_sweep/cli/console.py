@@ -168,9 +168,9 @@ def status_lines(status: RunStatus) -> list[str]:
     return lines
 
 
-def wrapped(text: str) -> list[str]:
+def wrapped(text: str, width: int = 80) -> list[str]:
     """Return a sentence as lines for a terminal of 80 columns."""
-    return textwrap.wrap(text, 80, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
 def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si") -> list[str]:
