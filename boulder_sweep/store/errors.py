@@ -21,8 +21,11 @@ class OutputExistsError(StoreError):
 
     def __init__(self, out: Location, rows_done: int, rows: int):
         self.out, self.rows_done, self.rows = out, rows_done, rows
-        state = "is finished" if rows_done == rows else f"holds {rows_done:,} of {rows:,} rows"
-        super().__init__(f"{out} exists and {state}: use --resume to continue it or --overwrite to start again")
+        if rows_done == rows:
+            state = f"is finished: see it with `sweep report {out}`, or"
+        else:
+            state = f"holds {rows_done:,} of {rows:,} rows: use --resume to continue it, or"
+        super().__init__(f"{out} exists and {state} use --overwrite to start again")
 
 
 class SettingsDifferError(StoreError):
