@@ -132,7 +132,7 @@ def need(
     open_readings: bool = False,
     between: Ends = None,
     tolerance: str | float | None = None,
-    both_readings: bool = True,
+    both_readings: bool = False,
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,

@@ -34,7 +34,7 @@ Examples:
     "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
 )
 @click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
-@click.option("--own-readings", is_flag=True, help="Omit the answers for the other readings of the paper.")
+@click.option("--other-readings", is_flag=True, help="Also answer by the other readings of the paper: takes longer.")
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Design chart (.png, .svg or .pdf).")
@@ -52,7 +52,7 @@ def need(
     open_readings: bool,
     between: tuple[str, str] | None,
     tolerance: str | None,
-    own_readings: bool,
+    other_readings: bool,
     jobs: int | None,
     backend: str,
     scheduler: str | None,
@@ -71,7 +71,7 @@ def need(
     truck goes over the boulder at the end of the range (overlap below criterion.min_overlap), and `never` if not.
     """
     from boulder_sweep.answers.need import need as find
-    from boulder_sweep.answers.printing import need_lines
+    from boulder_sweep.answers.need_printing import need_lines
     from boulder_sweep.cli.progress import kernels_for, working
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
@@ -88,7 +88,7 @@ def need(
             open_readings=open_readings,
             between=between,
             tolerance=tolerance,
-            both_readings=not own_readings,
+            both_readings=other_readings,
             jobs=jobs,
             backend=backend,
             scheduler=scheduler,
@@ -97,7 +97,7 @@ def need(
     if as_json:
         show(json.dumps(found.to_dict()))
     else:
-        show(*need_lines(found, units=units))
+        show(*need_lines(found, units=units, file=grid))
     if not quiet:
         counts = ", ".join(f"{word} {count:,}" for word, count in found.counts().items())
         say(f"{counted(len(found), 'row')}: {counts}; {counted(found.simulated, 'simulation')}")

@@ -61,7 +61,7 @@ def test_the_lightest_boulder_may_reach_no_deeper_than_it_must_overlap(
 ) -> None:
     """The deepest embedment of a range may leave too little overlap; the best one is just above that limit."""
     usual = {"height": "[1.8, 3.6] m", "site": "embedment_ratio: [0.45, 0.75]"}
-    found = need(site(**(usual | changes)), "mass", both_readings=False)
+    found = need(site(**(usual | changes)), "mass")
     frame = found.frame
     assert frame.least_boulder_mass_kg[0] < lighter_kg
     assert passes(found, frame, frame[DEPTH], DEPTH).all()
@@ -99,7 +99,7 @@ def test_no_boulder_among_many_is_lighter_than_the_lightest() -> None:
     for _ in range(8):
         bounds, changes = random_bounds(rng)
         sweep = site(**changes)
-        answer = need(sweep, "mass", both_readings=False).frame.iloc[0]
+        answer = need(sweep, "mass").frame.iloc[0]
         least = answer.least_boulder_mass_kg
         best = np.array([answer[f"boulder_{side}_m"] for side in bounds], dtype=float)
         ends = np.array(list(bounds.values()))
@@ -149,7 +149,7 @@ def lighter_around(sweep: Sweep, answer: pd.Series, count: int = 2000) -> np.nda
 
 def assert_lightest(sweep: Sweep) -> pd.Series:
     """Assert that no boulder around the lightest is lighter by more than a millimetre of the shortest side."""
-    answer = need(sweep, "mass", both_readings=False).frame.iloc[0]
+    answer = need(sweep, "mass").frame.iloc[0]
     assert answer.found == "found"
     shortest = min(answer.boulder_length_m, answer.boulder_width_m, answer.boulder_height_m)
     lighter = lighter_around(sweep, answer)
@@ -195,7 +195,7 @@ def test_no_boulder_around_the_lightest_of_shallow_ones_is_lighter() -> None:
     rng = np.random.default_rng(3)
     for _ in range(24):
         sweep = site(**shallow_bounds(rng))
-        if need(sweep, "mass", both_readings=False).frame.found[0] == "found":
+        if need(sweep, "mass").frame.found[0] == "found":
             assert_lightest(sweep)
 
 

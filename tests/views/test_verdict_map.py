@@ -392,7 +392,7 @@ def test_a_map_in_us_units(named_soils: str) -> None:
 
 def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None:
     sweep = load_text(NAMED, tmp_path / "named.yaml")
-    found = boulder_sweep.need(sweep, both_readings=False)
+    found = boulder_sweep.need(sweep)
     found.plot(tmp_path / "chart.svg", units="us")
     drawn = (tmp_path / "chart.svg").read_text()
     assert all(f"<!-- {name} -->" in drawn for name in ("loose", "dense", "gravel"))
