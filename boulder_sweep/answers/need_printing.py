@@ -208,15 +208,13 @@ def need_columns(need: Need, units: str = "si") -> list[Column]:
     if key.name == BOULDER_MASS.name:
         columns.append((("mass", unit), _answer(key, "", size)))
         columns += [(head_of(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]
-        columns.append((("margin", ""), _margin))
+        columns.append(_margin_or_chance(need))
         return columns + [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
     columns.append((head_of(key.name, units), _answer(key, "", size)))
     if key.name == "embedment_depth_m":
         columns.append((("ratio", "d/H"), _ratio))
         columns.append((("above", unit), _above_ground))
-    columns += [_mass(units), (("margin", ""), _margin)]
-    if "p_pass" in need.arrow.column_names:
-        columns[-1] = (("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}")
+    columns += [_mass(units), _margin_or_chance(need)]
     columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
     return columns
 
@@ -257,6 +255,13 @@ def _mass(units: str) -> Column:
     if units == "us":
         return ("mass", "lb"), lambda row: f"{row['boulder_mass_kg']:.0f}"
     return ("mass", "t"), lambda row: f"{row['boulder_mass_kg'] / 1000:.1f}"
+
+
+def _margin_or_chance(need: Need) -> Column:
+    """Return the column of the margin at the answer, or of the probability of passing if one is asked for."""
+    if "p_pass" in need.arrow.column_names:
+        return ("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}"
+    return ("margin", ""), _margin
 
 
 def _margin(row: Row) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.answers.keys import key_of
-from boulder_sweep.answers.lightest import LightestQuestion, _Boulders
+from boulder_sweep.answers.lightest import Boulders, LightestQuestion
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.designs import block_of
@@ -73,7 +73,7 @@ def test_the_deepest_embedment_tried_overlaps_enough_by_the_sums_of_the_verdict(
     sweep = site(height="[1.6, 4.0] m", site="embedment_depth: [0.1, 4.0] m")
     sweep = dataclasses.replace(sweep, criterion=dataclasses.replace(sweep.criterion, min_overlap_m=least))
     asked = LightestQuestion(sweep, key_of("mass"), judges_of(sweep))
-    trial = _Boulders(asked, asked.open.rows(0, 1), "boulder_height_m")
+    trial = Boulders(asked, asked.open.rows(0, 1), "boulder_height_m")
     height = np.arange(1600, 4001) / 1000
     depth = trial.depth(np.zeros(len(height), dtype=int), height, np.ones(len(height)))
     overlap = height - depth - 0.5
