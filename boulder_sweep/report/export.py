@@ -10,11 +10,12 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from boulder_sweep.columns import DESIGN_ID
+from boulder_sweep.answers.files import AnswerFile, result_of
+from boulder_sweep.columns import BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.contents import setting_lines
-from boulder_sweep.settings.shown_units import Shown, check_system, shown_column, shown_settings
+from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.targets import check_target
@@ -24,6 +25,7 @@ from boulder_sweep.views.wording import NOT_A_TEST
 if TYPE_CHECKING:
     import pyarrow as pa
 
+Result = FinishedRows | AnswerFile
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
@@ -65,7 +67,8 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
     Parameters
     ----------
     out
-        Folder that a sweep wrote; a run may still be writing into it.
+        Folder that a sweep wrote, perhaps with a run still writing into it, or a file of `need`, `uncertainty`,
+        `reserves` or of a time history.
     file
         The table: ``.xlsx``, with a second sheet of units, settings and versions, ``.csv`` or ``.parquet``.
     units
@@ -87,7 +90,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         The units are unknown.
     """
     check_system(units)
-    target, finished = Path(file), FinishedRows(location_of(out))
+    target, finished = Path(file), result_of(location_of(out), ReportError)
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
@@ -96,7 +99,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
         )
-    writer: Callable[[BinaryIO, FinishedRows, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
+    writer: Callable[[BinaryIO, Result, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
     try:
         with replacing(target) as passing:
             return writer(passing, finished, units)
@@ -104,7 +107,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
 
-def about(finished: FinishedRows, columns: Iterable[Shown], units: str = "si") -> Iterator[tuple[str, str, str]]:
+def about(finished: Result, columns: Iterable[Shown], units: str = "si") -> Iterator[tuple[str, str, str]]:
     """Yield what a reader must know about a table, three texts for each line; settings in ``si`` or ``us`` units."""
     identity: Mapping[str, Any] = finished.identity
     yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
@@ -125,7 +128,7 @@ def about(finished: FinishedRows, columns: Iterable[Shown], units: str = "si") -
         yield line, "", ""
 
 
-def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
+def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
     """Yield the rows piece by piece in the requested units."""
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -133,7 +136,7 @@ def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], p
     for table in finished.tables():
         if finished.judged_by:
             table = table.append_column(JUDGED_BY.stored, pa.array([finished.judged_by] * len(table)))
-        columns = [JUDGED_BY if name == JUDGED_BY.stored else shown_column(name, units) for name in table.column_names]
+        columns = [JUDGED_BY if field.name == JUDGED_BY.stored else _shown(field, units) for field in table.schema]
         for place, column in enumerate(columns):
             if column.size != 1.0:
                 values = pc.divide(table.column(place), column.size)
@@ -141,7 +144,18 @@ def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], p
         yield columns, table.rename_columns([column.name for column in columns])
 
 
-def _csv(target: BinaryIO, finished: FinishedRows, units: str) -> int:
+def _shown(field: pa.Field, units: str) -> Shown:
+    """Return how a column is shown, by the register of columns or, of an answer, by its own metadata.
+
+    Intervals are texts and stay in their unit.
+    """
+    if field.name in BY_NAME or not field.metadata:
+        return shown_column(field.name, units)
+    unit, meaning = (field.metadata.get(key, b"").decode() for key in (b"unit", b"meaning"))
+    return shown_as(field.name, unit, meaning, units if str(field.type) == "double" else "si")
+
+
+def _csv(target: BinaryIO, finished: Result, units: str) -> int:
     """Write comma-separated values; null is empty."""
     rows = 0
     file = TextIOWrapper(target, newline="", encoding="utf-8")
@@ -166,7 +180,7 @@ def _cell(text: str) -> str:
     return f"'{shown}" if first.startswith(FORMULA_SIGNS) else shown
 
 
-def _parquet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
+def _parquet(target: BinaryIO, finished: Result, units: str) -> int:
     """Write one Parquet file with units and meanings in its field metadata, settings and versions in its own."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -190,7 +204,7 @@ def _parquet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
     return rows
 
 
-def _sheet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
+def _sheet(target: BinaryIO, finished: Result, units: str) -> int:
     """Write a spreadsheet: the designs, and what a reader must know about them."""
     rows, columns = 0, list[Shown]()
     with _workbook(target) as book:

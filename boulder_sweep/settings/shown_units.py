@@ -86,11 +86,16 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
 def shown_column(stored: str, units: str) -> Shown:
     """Return how a column of the result is shown: its name ends in the unit."""
     spec = column_spec(stored)
-    if units == "si" or not spec.unit:
-        return Shown(stored, stored, spec.unit, 1.0, spec.meaning)
-    unit, size = shown_unit(spec.unit, units)
-    name = stored if size == 1.0 else stored.removesuffix(_suffix(spec.unit)) + _suffix(unit)
-    return Shown(stored, name, unit, size, spec.meaning)
+    return shown_as(stored, spec.unit, spec.meaning, units)
+
+
+def shown_as(stored: str, unit: str, meaning: str, units: str) -> Shown:
+    """Return how a column of a unit and a meaning is shown."""
+    if units == "si" or not unit:
+        return Shown(stored, stored, unit, 1.0, meaning)
+    other, size = shown_unit(unit, units)
+    name = stored if size == 1.0 else stored.removesuffix(_suffix(unit)) + _suffix(other)
+    return Shown(stored, name, other, size, meaning)
 
 
 def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:

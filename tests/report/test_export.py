@@ -5,6 +5,7 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import openpyxl
@@ -13,13 +14,15 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
+from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import export as module
 from boulder_sweep.report import write_explorer, write_report, writing
 from boulder_sweep.report.export import export
 from boulder_sweep.report.page import ASSETS, SCRIPTS
-from boulder_sweep.settings.shown_units import shown_column, shown_settings
+from boulder_sweep.settings import load_text
+from boulder_sweep.settings.shown_units import shown_column, shown_settings, shown_unit
 from boulder_sweep.settings.units import factor
 
 US = {
@@ -254,3 +257,71 @@ def test_a_page_holds_its_scripts_whatever_the_locale(tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     for script in SCRIPTS:
         assert (ASSETS / f"{script}.js").read_text(encoding="utf-8").strip() in page
+
+
+ONE_SITE = """\
+name: one site
+boulder: {length: 1.65 m, width: 1.68 m, height: [2.6, 3.2, 3.4] m, density: 2600 kg/m^3}
+site: {embedment_depth: 2 m}
+soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: SPEED, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    """Files of answers: name to file and table."""
+    folder = tmp_path_factory.mktemp("answers")
+    plain = load_text(ONE_SITE.replace("SPEED", "30 mph"), Path("one.yaml"))
+    uncertain = load_text(ONE_SITE.replace("SPEED", "{mean: 13.4 m/s, cov: 5 %}"), Path("one.yaml"))
+    found = {
+        "need": boulder_sweep.need(plain),
+        "capacity": reserves(plain),
+        "uncertainty": boulder_sweep.uncertainty(uncertain, half_width=0.1),
+    }
+    for name, one in found.items():
+        one.write(folder / f"{name}.parquet")
+    history = boulder_sweep.simulate(plain, 2)
+    history.to_parquet(folder / "simulate.parquet")
+    return {name: (folder / f"{name}.parquet", one.arrow) for name, one in found.items()} | {
+        "simulate": (folder / "simulate.parquet", history.to_arrow())
+    }
+
+
+@pytest.mark.parametrize("name", ["need", "capacity", "uncertainty", "simulate"])
+@pytest.mark.parametrize("kind", ["csv", "xlsx", "parquet"])
+def test_files_of_answers_are_exported_like_results(answers, tmp_path, name, kind):
+    file, table = answers[name]
+    target = tmp_path / f"out.{kind}"
+    assert export(file, target, units="us") == len(table)
+    read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "xlsx": lambda file: pd.read_excel(file, "designs")}[kind]
+    found = read(target)
+    assert len(found.columns) == len(table.column_names)
+    for place, field in enumerate(table.schema):
+        shown, own = found.columns[place], table.column(place).to_pylist()
+        unit = field.metadata[b"unit"].decode() if field.metadata else ""
+        size = shown_unit(unit, "us").size if unit and field.name != "passes_within" else 1.0
+        there = [None if pd.isna(value) or value == "" else value for value in found[shown]]
+        for one, other in zip(there, own, strict=True):
+            if isinstance(other, float):
+                assert one == pytest.approx(other / size, rel=1e-12)
+            else:
+                assert (one or "") == (other or ""), shown
+        assert (shown == field.name) == (size == 1.0)
+
+
+def test_answers_keep_their_meanings_and_units(answers, tmp_path):
+    export(answers["need"][0], tmp_path / "need.xlsx", units="us")
+    lines = list(openpyxl.load_workbook(tmp_path / "need.xlsx")["about"].iter_rows(values_only=True))
+    meaning = next(line for line in lines if line[0] == "least_embedment_depth_ft")
+    assert meaning[1:] == ("ft", "smallest value of site.embedment_depth that passes; null where none does")
+    assert any(line[0] == "fails_at_ft" for line in lines)
+    sheet = openpyxl.load_workbook(tmp_path / "need.xlsx")["designs"]
+    (cell,) = [cell for cell in sheet[1] if cell.value == "least_embedment_depth_ft"]
+    assert sheet.cell(3, cell.column).number_format == "0.000"
+
+
+def test_a_parquet_file_of_somebody_else_is_refused(tmp_path):
+    pd.DataFrame({"x": [1.0]}).to_parquet(tmp_path / "other.parquet")
+    with pytest.raises(ReportError, match="is neither the folder of a run nor a file that `sweep` wrote"):
+        export(tmp_path / "other.parquet", tmp_path / "out.csv")
