@@ -108,8 +108,8 @@ def measure(rows: int = ROWS, verified: int = VERIFIED, drawn: int = DRAWN) -> T
         ["what", "CPU time", "wall time", "simulations", "CPU time of each"],
     )
     sweep = random_sweep(rows)
-    need(random_sweep(100), both_readings=False)
-    found = Timed.of(lambda: need(sweep, both_readings=False))
+    need(random_sweep(100))
+    found = Timed.of(lambda: need(sweep))
     counts = ", ".join(f"{word} {count:,}" for word, count in found.result.counts().items())
     table.rows.append(_row(f"least depth to 1 mm, {rows:,} random designs", found, found.result.simulated, rows))
     tried, wrong = wrong_ends(found.result, verified)

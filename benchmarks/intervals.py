@@ -72,7 +72,7 @@ def linear(dimensions: int, seeds: int, half_width: float, probabilities: tuple[
 def simulated(inputs: int, seeds: int, probabilities: tuple[float, ...] = SIMULATED) -> Held:
     """Compare for the uncertain site, so many of its inputs uncertain, at depths that pass with these probabilities."""
     sweep = load(SITE, CERTAIN[: len(CERTAIN) + 1 - inputs])
-    found = [need(sweep, probability=each, both_readings=False).frame.passes_at[0] for each in probabilities]
+    found = [need(sweep, probability=each).frame.passes_at[0] for each in probabilities]
     depths = np.array(found, dtype=float)
     given = sweep.plan.given_rows(0, 1)
     rows = {name: np.repeat(values, len(depths)) for name, values in given.items()} | {"embedment_depth_m": depths}

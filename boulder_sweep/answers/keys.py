@@ -12,7 +12,8 @@ from boulder_sweep.answers.moving import narrowed
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.leaf import LeafError, outside, read_single
-from boulder_sweep.settings.problems import Position, did_you_mean
+from boulder_sweep.settings.names import BOULDER_MASS, UnknownNameError, named
+from boulder_sweep.settings.problems import Position
 from boulder_sweep.settings.tree import Scalar
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
     from boulder_sweep.settings import Sweep
 
-BOULDER_MASS = fields.Field("boulder", "mass", "boulder_mass_kg", "kg", "mass of the boulder")
-"""The mass of the boulder, which is not an input but follows from four inputs."""
 Ends = tuple[str | float, str | float] | None
 """Search range given by the user."""
 TOLERANCES = {
@@ -100,7 +99,7 @@ def key_of(word: str, *, most: bool = False, tolerance: str | float | None = Non
     Parameters
     ----------
     word
-        Key of the file (``embedment_depth``, ``soil.density``) or column of the table.
+        As of `boulder_sweep.settings.names.named`; ``mass`` is that of the boulder.
     most
         Whether its largest value is wanted.
     tolerance
@@ -111,34 +110,14 @@ def key_of(word: str, *, most: bool = False, tolerance: str | float | None = Non
     QuestionError
         The word names no input or several, or the tolerance is not a positive value of the right kind.
     """
-    field = _field(word)
+    try:
+        field = BOULDER_MASS if word == BOULDER_MASS.key else named(word)
+    except UnknownNameError as problem:
+        raise QuestionError(str(problem)) from None
     value = TOLERANCES[field.unit] if tolerance is None else quantity(tolerance, field.unit, "--tolerance")
     if not 0.0 < value < math.inf:
         raise QuestionError(f"--tolerance {tolerance}: must be positive")
     return Key(field, most, value)
-
-
-def _field(word: str) -> fields.Field:
-    if word in (BOULDER_MASS.key, BOULDER_MASS.path, BOULDER_MASS.name):
-        return BOULDER_MASS
-    found = [field for field in fields.INPUTS if word in (field.path, field.name)]
-    found = found or [field for field in fields.INPUTS if word == field.key]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise QuestionError(f"'{word}' is ambiguous; use {' or '.join(field.path for field in found)}")
-    near = [known for known in _words() if word.lower() in known] or [
-        field.key for field in fields.INPUTS if word.lower() in field.also
-    ]
-    hint = f"; did you mean {' or '.join(near)}?" if near else did_you_mean(word, _words())
-    raise QuestionError(f"'{word}' is not an input ({', '.join(_words())}){hint}")
-
-
-def _words() -> list[str]:
-    """Return the shortest unambiguous name of every input and of the boulder's mass."""
-    every = (*fields.INPUTS, BOULDER_MASS)
-    keys = [field.key for field in every]
-    return [BOULDER_MASS.key, *(f.path if keys.count(f.key) > 1 else f.key for f in fields.INPUTS)]
 
 
 def quantity(text: str | float, unit: str, option: str) -> float:

@@ -40,8 +40,6 @@ ROUNDS = 8
 """Number of finer lattices, each half as wide as the one before."""
 CELLS = 8
 """Pieces that the range of the height is cut into by the scan."""
-NEIGHBOURS = 8192
-"""Random boulders around the lightest so far that are drawn at a time."""
 NEAREST, FARTHEST = 1e-3, 0.1
 """How far they are from it in each side [m], in scale and in depth (as a share): log-uniform between these."""
 UNLUCKY = 3
@@ -74,6 +72,8 @@ class LightestQuestion:
     """
 
     rows_at_once = 16
+    neighbours = 8192
+    """Random boulders around the lightest so far that are drawn at a time."""
 
     def __init__(self, sweep: Sweep, key: Key, judges: Judges) -> None:
         if sweep.table is not None:
@@ -98,13 +98,21 @@ class LightestQuestion:
         bounds = {side: self.bounds[side] for side in self.free} or {SCALE: SCALES}
         return bounds | {SHARE: (0.0, 1.0)} if low < high else bounds
 
+    def given(self, start: int, stop: int) -> Rows:
+        """Return the other inputs of the rows ``[start, stop)``."""
+        return self.open.rows(start, stop)
+
+    def trial(self, rows: Rows, side: str) -> Boulders:
+        """Return the object that tries boulders in some rows, by a side or the scale."""
+        return Boulders(self, rows, side)
+
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
-        rows = self.open.rows(start, stop)
+        rows = self.given(start, stop)
         n = stop - start
         # If the lightest boulder is as long, wide or high as it may be, a search for this side has no way to vary the
         # others at that end; the search for another side has.
-        trials = [_Boulders(self, rows, side) for side in reversed(self.free or [SCALE])]
+        trials = [self.trial(rows, side) for side in reversed(self.free or [SCALE])]
         found = [trial.certified(trial.lightest()) for trial in trials]
         best = _lightest(found)
         sizes = {name: _taken((own.sizes[name] for own in found), best) for name in self.searched}
@@ -131,7 +139,7 @@ class _SizedBrackets(Brackets):
     sizes: Sides
 
 
-class _Boulders:
+class Boulders:
     """Tries boulders for some rows and counts the simulations.
 
     Parameters
@@ -298,16 +306,17 @@ class _Boulders:
         self, rows: np.ndarray, sizes: Sides, mass: np.ndarray, draw: int
     ) -> tuple[np.ndarray, Sides, np.ndarray]:
         """Return rows, sizes and masses of random boulders that are lighter than those of some rows."""
+        count = self.asked.neighbours
         # The same for every row, so that an answer does not depend on the rows that are searched with it.
         rng = np.random.default_rng(draw)
-        reach = NEAREST * (FARTHEST / NEAREST) ** rng.random(NEIGHBOURS)
-        index = np.repeat(rows, NEIGHBOURS)
+        reach = NEAREST * (FARTHEST / NEAREST) ** rng.random(count)
+        index = np.repeat(rows, count)
         tried = {}
         for name, ends in self.asked.searched.items():
-            values = np.clip(sizes[name][rows][:, None] + reach * rng.uniform(-1.0, 1.0, NEIGHBOURS), *ends)
+            values = np.clip(sizes[name][rows][:, None] + reach * rng.uniform(-1.0, 1.0, count), *ends)
             if name == SHARE:
                 # What passes by sliding may do so at any depth.
-                values = np.where(rng.random(NEIGHBOURS) < 0.5, values, rng.random(NEIGHBOURS)).ravel()
+                values = np.where(rng.random(count) < 0.5, values, rng.random(count)).ravel()
                 tried[name] = values
             else:
                 tried[name] = _millimetres(values).ravel()

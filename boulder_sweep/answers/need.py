@@ -134,7 +134,7 @@ def need(
     between: Ends = None,
     tolerance: str | float | None = None,
     robust: bool = False,
-    both_readings: bool = True,
+    both_readings: bool = False,
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,
@@ -300,14 +300,15 @@ def _question(
         if key.name == BOULDER_MASS.name:
             return LightestQuestion(sweep, key, judges)
         return Question(sweep, key, between, judges)
-    if key.name == BOULDER_MASS.name:
-        raise QuestionError(
-            "--least mass does not support --probability; use --least height or --least embedment_depth"
-        )
     chance = share(probability, "--probability")
     if not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
-    from boulder_sweep.answers.probability import ProbabilityQuestion  # imports scipy.stats
+    # These import scipy.stats.
+    if key.name == BOULDER_MASS.name:
+        from boulder_sweep.answers.likely_lightest import LikelyLightestQuestion
+
+        return LikelyLightestQuestion(sweep, key, judges, chance, seed, variants)
+    from boulder_sweep.answers.probability import ProbabilityQuestion
 
     return ProbabilityQuestion(sweep, key, between, judges, chance, seed, variants)
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.answers.keys import BOULDER_MASS, key_of
-from boulder_sweep.answers.lightest import SIDES
+from boulder_sweep.answers.keys import key_of
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shown_units import shown_unit
@@ -18,8 +16,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from boulder_sweep.answers.doubts import Doubt
-    from boulder_sweep.answers.keys import Key
-    from boulder_sweep.answers.need import Need
     from boulder_sweep.answers.reserves import Reserve, Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
     from boulder_sweep.settings import Sweep
@@ -50,75 +46,53 @@ HEADS = {
     "bed_offset_m": ("bed", "m"),
 }
 """Name and unit above the column of an input."""
-NOTES = {
-    "always": "≤, ≥: passes throughout the searched range, up to this end of it",
-    "never": "never: passes nowhere in the searched range",
-    "not_monotone": "*: fails again further on; column passes_within (-o) lists all passing ranges",
-    "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
-}
 NOT_FAILING = {
     "no_progress": "no_progress: small steps lead no nearer to the rare designs; see P(pass)",
     "contradicts": "contradicts: P(fail) would contradict P(pass), which is counted; see P(pass)",
 }
-SHORT = {"as_printed": "printed", "corrected": "corrected"}
-
 Row = Mapping[str, Any]
 Cell = Callable[[Row], str]
 Column = tuple[tuple[str, str], Cell]
 
 
-def need_lines(need: Need, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
-    """Return the answers as lines.
-
-    Parameters
-    ----------
-    need
-        The answers.
-    width
-        Width of the terminal; columns that do not fit are left out, the least important first.
-    most
-        Most rows shown.
-
-    Returns
-    -------
-    list of str
-        Header, one line for each row, and a legend.
-    """
-    count = len(need)
-    rows = _shown_rows(need.arrow, most, units)
-    lines = table_lines(need_columns(need, units), rows, width)
-    if count > most:
-        lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
-    occurring = {row[name] for row in rows for name in row if name.startswith("found")}
-    lines += [note for word, note in NOTES.items() if word in occurring]
-    return lines + grade_lines(row["robustness"] for row in rows if row["passes_at"])
+GRADE: Column = (("second", "opinion"), lambda row: row["robustness"] or "-")
+"""Column of what second opinions say of a pass."""
 
 
 def grade_lines(grades: Iterable[str | None]) -> list[str]:
     """Return what the grades mean that occur."""
     from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS
 
-    meanings = {"robust": IN_WORDS, "sensitive": SENSITIVE_IN_WORDS}
-    occurring = set(grades)
-    return [
-        line
-        for word, meaning in meanings.items()
-        if word in occurring
-        for line in textwrap.wrap(f"{word}: {meaning}", WIDTH, subsequent_indent=" " * (len(word) + 2))
-    ]
+    meanings, occurring = {"robust": IN_WORDS, "sensitive": SENSITIVE_IN_WORDS}, set(grades)
+    words = [f"{word}: {meaning}" for word, meaning in meanings.items() if word in occurring]
+    return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
 
 
 def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
     """Return probabilities as lines: varying inputs, verdict at the means, probability, most influential input.
 
-    Parameters: see `need_lines`. For a single design, its Sobol indices follow.
+    Parameters
+    ----------
+    found
+        The probabilities.
+    width
+        Width of the terminal; columns that do not fit are left out, the least important first.
+    most
+        Most rows shown.
+    units
+        ``si`` or ``us``.
+
+    Returns
+    -------
+    list of str
+        Header, one line for each row, and a legend; for a single design, its Sobol indices follow.
     """
     count = len(found)
     rows = _shown_rows(found.arrow, most, units)
-    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
+    columns = leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
     columns += [
         (("at the", "means"), lambda row: str(row["verdict"])),
-        *([_GRADE] if found.sweep.model.second_opinion else []),
+        *([GRADE] if found.sweep.model.second_opinion else []),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
@@ -162,18 +136,18 @@ def _share(value: float) -> str:
 def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
     """Return what designs withstand as lines: varying inputs, verdict, each value and its distance from the design.
 
-    Parameters are those of `need_lines`.
+    Parameters are those of `uncertainty_lines`.
     """
     from boulder_sweep.answers.reserves import RESERVES
 
     count = len(found)
     rows = _shown_rows(found.arrow, most, units)
-    columns = _leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
-    columns += [(("verdict", ""), lambda row: str(row["verdict"])), _GRADE]
+    columns = leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
+    columns += [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
     for reserve, decimals in zip(RESERVES, (2, 0, 2), strict=True):
         field = key_of(reserve.input).field
         size = 1.0 if units == "si" else shown_unit(field.unit, units).size
-        columns.append((_head(field.name, units), _withstood(reserve, field.name, decimals, size)))
+        columns.append((head_of(field.name, units), _withstood(reserve, field.name, decimals, size)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
     lines = table_lines(columns, rows, width)
     if count > most:
@@ -221,7 +195,7 @@ def _index_lines(found: Uncertainty, width: int) -> list[str]:
     return table_lines(columns, found.indices.to_pylist(), width)
 
 
-def _head(name: str, units: str) -> tuple[str, str]:
+def head_of(name: str, units: str) -> tuple[str, str]:
     """Return name and unit over the column of an input."""
     word, unit = HEADS[name]
     if units == "si" or name not in COLUMNS:
@@ -233,38 +207,17 @@ def _shown_rows(table: pa.Table, most: int, units: str) -> list[Row]:
     """Return the rows of a table to show: all, or evenly spaced ones."""
     count = len(table)
     places = range(count) if count <= most else [place * (count - 1) // (most - 1) for place in range(most)]
-    rows = [table.slice(place, 1).to_pylist()[0] for place in places]
+    return rows_of(table.take(list(places)), units)
+
+
+def rows_of(table: pa.Table, units: str) -> list[Row]:
+    """Return all rows of a table in the units asked for."""
+    rows = table.to_pylist()
     if units == "si":
         return rows
     named = ((field.name, (field.metadata or {}).get(b"unit", b"").decode()) for field in table.schema)
     sizes = {name: shown_unit(unit, units).size for name, unit in named}
     return [{n: value / sizes[n] if isinstance(value, float) else value for n, value in row.items()} for row in rows]
-
-
-def need_columns(need: Need, units: str = "si") -> list[Column]:
-    """Return the columns of a terminal table: varying inputs, the answer, and what follows from it."""
-    key = need.key
-    open_ = (key.name, *need.derived)
-    unit, size = (key.field.unit, 1.0) if units == "si" else shown_unit(key.field.unit, units)
-    columns = _leading(need.sweep, need.arrow, [name for name in HEADS if name not in open_], units)
-    if key.name == BOULDER_MASS.name:
-        columns.append((("mass", unit), _answer(key, "", size)))
-        columns += [(_head(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]
-        columns += [(("margin", ""), _margin), _GRADE_FOUND]
-        return columns + [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
-    columns.append((_head(key.name, units), _answer(key, "", size)))
-    if key.name == "embedment_depth_m":
-        columns.append((("ratio", "d/H"), _ratio))
-        columns.append((("above", unit), _above_ground))
-    columns += [_mass(units), (("margin", ""), _margin), _GRADE_FOUND]
-    if "p_pass" in need.arrow.column_names:
-        columns[-2] = (("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}")
-    columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
-    return columns
-
-
-_GRADE: Column = (("second", "opinion"), lambda row: row["robustness"] or "-")
-_GRADE_FOUND: Column = (("second", "opinion"), lambda row: (row["passes_at"] and row["robustness"]) or "-")
 
 
 def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> list[str]:
@@ -274,25 +227,30 @@ def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> l
     while len(widths) > 1 and sum(widths) + 2 * (len(widths) - 1) > width:
         texts.pop()
         widths.pop()
-    lines = [
-        "  ".join(text.rjust(own) for text, own in zip(line, widths, strict=True)) for line in zip(*texts, strict=True)
-    ]
-    return [*lines[:2], "  ".join("─" * own for own in widths), *lines[2:]]
+    lines = table_texts(texts)
+    return [line.rstrip() for line in (*lines[:2], "  ".join("─" * own for own in widths), *lines[2:])]
 
 
-def _leading(sweep: Sweep, table: pa.Table, names: Sequence[str], units: str) -> list[Column]:
+def table_texts(columns: Sequence[Sequence[str]]) -> list[str]:
+    """Return columns of texts side by side as lines."""
+    widths = [max(map(len, column)) for column in columns]
+    return ["  ".join(map(str.rjust, line, widths)) for line in zip(*columns, strict=True)]
+
+
+def leading(sweep: Sweep, table: pa.Table, names: Sequence[str], units: str) -> list[Column]:
     """Return the columns that tell rows apart: names of sets, and inputs that vary; the numbers of listed designs."""
-    labels: list[Column] = [((name, ""), _word(name)) for name in sweep.plan.labels if name in table.column_names]
+    labels: list[Column] = [((name, ""), word_of(name)) for name in sweep.plan.labels if name in table.column_names]
     if sweep.table is not None:
         return [*labels, (("design", ""), lambda row: str(row["design_id"]))]
-    return labels + [(_head(name, units), _number(name)) for name in names if _varies(sweep, table, name)]
+    return labels + [(head_of(name, units), number_of(name)) for name in names if varies(sweep, table, name)]
 
 
-def _word(name: str) -> Cell:
+def word_of(name: str) -> Cell:
+    """Return a formatter for a column of words."""
     return lambda row: str(row[name])
 
 
-def _varies(sweep: Sweep, table: pa.Table, name: str) -> bool:
+def varies(sweep: Sweep, table: pa.Table, name: str) -> bool:
     """Whether an input differs between rows; a table holds depths, also where the file gives ratios."""
     if name == "embedment_ratio":
         given = sweep.plan.given.get(name)
@@ -300,51 +258,8 @@ def _varies(sweep: Sweep, table: pa.Table, name: str) -> bool:
     return name in table.column_names and len(set(table[name].to_pylist())) > 1
 
 
-def _number(name: str) -> Cell:
+def number_of(name: str) -> Cell:
+    """Return a formatter for an input."""
     if name == "embedment_ratio":
         return lambda row: f"{row['embedment_depth_m'] / row['boulder_height_m']:.5g}"
     return lambda row: f"{row[name]:.5g}"
-
-
-def _size(name: str) -> Cell:
-    """Return a formatter for a side of the boulder or its depth."""
-    return lambda row: "" if row["passes_at"] is None else f"{row[name]:.3f}"
-
-
-def _answer(key: Key, suffix: str, size: float) -> Cell:
-    """Return a formatter for the answer by some readings."""
-    decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
-    name, found = f"{key.answer}{suffix}", f"found{suffix}"
-
-    def cell(row: Row) -> str:
-        if row[name] is None:
-            return "blocked" if row[found] == "blocked_by_overlap" else str(row[found])
-        before = {"always": "≥" if key.most else "≤"}.get(row[found], "")
-        return f"{before}{row[name]:.{decimals}f}{'*' if row[found] == 'not_monotone' else ''}"
-
-    return cell
-
-
-def _ratio(row: Row) -> str:
-    if row["passes_at"] is None:
-        return ""
-    return f"{row['embedment_depth_m'] / row['boulder_height_m']:.3f}"
-
-
-def _above_ground(row: Row) -> str:
-    if row["passes_at"] is None:
-        return ""
-    return f"{row['boulder_height_m'] - row['embedment_depth_m']:.2f}"
-
-
-def _mass(units: str) -> Column:
-    """Return the column of the mass of the boulder: tonnes, or pounds."""
-    if units == "us":
-        return ("mass", "lb"), lambda row: f"{row['boulder_mass_kg']:.0f}"
-    return ("mass", "t"), lambda row: f"{row['boulder_mass_kg'] / 1000:.1f}"
-
-
-def _margin(row: Row) -> str:
-    if row["margin"] is None or row["passes_at"] is None:
-        return ""
-    return f"{row['margin']:.1%}"

@@ -19,6 +19,7 @@ from boulder_sweep.answers.search import WORDS
 from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
 from boulder_sweep.locations import Location, RemotePath, location_of
+from boulder_sweep.store.errors import settings_file
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.provenance import identity_in, judged_by, sha256_of
 from boulder_sweep.store.schema import number_array, part_table, word_array
@@ -302,13 +303,16 @@ def read_parquet(
     BoulderSweepError
         It cannot be read, is damaged, or another command wrote it.
     """
+    if advice := settings_file(path):
+        raise refusal(advice)
     try:
         table = pq.read_table(path, page_checksum_verification=True)
         table.validate(full=True)
         kinds = {field.name: field.type for field in table.schema}
         found = identity_in(table.schema.metadata)
         if not found.keys() >= _IDENTITY or not kinds.keys() >= set(columns):
-            raise refusal(f"{path} is neither the folder of a run nor a file that `{command}` wrote")
+            advice = "; `sweep export` takes it" if found.keys() >= _IDENTITY else ""
+            raise refusal(f"{path} is neither the folder of a run nor a file that `{command}` wrote{advice}")
         odd = [name for name, kind in kinds.items() if name in BY_NAME and not _is_of(BY_NAME[name].type, kind)]
         if odd or sha256_of(found["settings"]) != found["settings_sha256"]:
             raise refusal(f"{path} is damaged; write it again with `{command}`")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,11 +12,17 @@ from boulder_sweep.cli.options import json_option, units_option
 from boulder_sweep.cli.output import show
 from boulder_sweep.text import counted
 
+if TYPE_CHECKING:
+    from boulder_sweep.report.comparison import Comparison
+
 EXAMPLES = """\b
 Examples:
   sweep compare before.sweep after.sweep
   sweep compare before.sweep after.sweep --show 20 --units us
 """
+WHEN = ("before", "after")
+MOST_PAIRS = 4
+"""Most values shown of an input that differs."""
 LEAST = {"mass_kg": ("lightest boulder", "kg"), "depth_m": ("shallowest depth", "m")}
 
 
@@ -28,10 +35,11 @@ LEAST = {"mass_kg": ("lightest boulder", "kg"), "depth_m": ("shallowest depth", 
 @units_option
 @json_option
 def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> int:
-    """Compare the results in BEFORE and AFTER design by design, matched by their inputs.
+    """Compare the results in BEFORE and AFTER design by design, matched by the inputs they share.
 
-    Shows what differs in settings and versions, how many verdicts changed and how, and the least mass and depth that
-    pass. Lists the designs whose rotation changed most.
+    Of an input of which they share no value, as of two soils, the values are paired in order. Shows what differs in
+    settings and versions, how many verdicts changed and how, and the least mass and depth that pass. Lists the
+    designs whose rotation changed most.
     """
     from boulder_sweep.report.comparison import compare as match
     from boulder_sweep.settings.shown_units import shown_unit
@@ -46,9 +54,7 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
             show(f"rules    {name}: {judged_by or 'judged by the rules of this version'}")
     for line in found.changed:
         show(f"changed  {line}")
-    alone = f"{found.only_before:,} only before, {found.only_after:,} only after"
-    show(f"{counted(len(found.matched), 'design')} in both; {alone}")
-    show(f"{counted(len(found.flipped), 'verdict')} changed")
+    show(*_found_lines(before, after, found, units))
     for change, count in found.flips().items():
         show(f"  {count:>9,}  {change}")
     for name, pair in found.least.items():
@@ -56,9 +62,40 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
         shown, size = shown_unit(unit, units)
         values = ["none passes" if value is None else f"{value / size:,.5g} {shown}" for value in pair]
         show(f"{words} that passes: {values[0]} before, {values[1]} after")
-    for row in found.flipped.head(listed).itertuples():
-        show(
-            f"  design {row.design_id_before:,} -> {row.design_id_after:,}: "
-            f"{row.max_rotation_deg_before:.4g} -> {row.max_rotation_deg_after:.4g} deg"
-        )
+    for row in found.flipped.head(listed).to_dict("records"):
+        show(*_design_lines(row, found, units))
     return 0
+
+
+def _found_lines(before: str, after: str, found: Comparison, units: str) -> list[str]:
+    """Return how many designs both have, what tells them apart, and how many verdicts changed."""
+    from boulder_sweep.cli.console import wrapped
+    from boulder_sweep.views.labels import name_of, size_of, unit_of
+
+    turned, matched = found.turned(), len(found.matched)
+    alone = f"{found.only_before:,} only before, {found.only_after:,} only after"
+    lines = [f"{counted(matched, 'design')} in both; {alone}"]
+    for name in found.differ:
+        size, pairs = size_of(name, units), found.values(name)
+        shown = [f"{one / size:.6g} -> {other / size:.6g}" for one, other in pairs[:MOST_PAIRS]]
+        more = f" and {len(pairs) - MOST_PAIRS} more" if len(pairs) > MOST_PAIRS else ""
+        lines += wrapped(f"differs  {name_of(name)}: {', '.join(shown)} {unit_of(name, units)}".rstrip() + more)
+    lines += wrapped(f"{turned['passes_lost']:,} of {turned['passes']:,} passes in {before} do not pass in {after}")
+    lines += wrapped(f"{turned['passes_gained']:,} of {matched - turned['passes']:,} others do")
+    return [*lines, f"{counted(len(found.flipped), 'verdict')} changed"]
+
+
+def _design_lines(row: dict[str, Any], found: Comparison, units: str) -> list[str]:
+    """Return one design whose verdict changed: how, and the inputs that tell it apart."""
+    from boulder_sweep.cli.console import wrapped
+    from boulder_sweep.views.labels import value_text
+
+    verdicts, ids = (" -> ".join(str(row[f"{name}_{when}"]) for when in WHEN) for name in ("verdict", "design_id"))
+    rotation = " -> ".join(f"{row[f'max_rotation_deg_{when}']:.4g}" for when in WHEN)
+    inputs = [
+        value_text(name, row[name], units)
+        if name in row
+        else " -> ".join(value_text(name, row[f"{name}_{when}"], units) for when in WHEN)
+        for name in found.varying
+    ]
+    return [f"  design {ids}: {verdicts}, {rotation} deg", *(f"    {line}" for line in wrapped(", ".join(inputs), 76))]

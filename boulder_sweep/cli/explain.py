@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import TYPE_CHECKING
 
 import click
@@ -14,7 +13,6 @@ from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.explanation import Explanation
-    from boulder_sweep.impact.trajectory import Trajectory
 
 EXAMPLES = """\b
 Examples:
@@ -58,7 +56,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
         show(json.dumps(found.as_dict(units)))
         return 0
     values = {"design": shown_values(found.inputs, units), "outcome": shown_values(found.stored, units)}
-    show(*value_lines(values), *why_lines(found))
+    show(*value_lines(values), *why_lines(found, units))
     for name in found.unequal:
         show(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
     for line in found.changed:
@@ -72,10 +70,10 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     return 0
 
 
-def why_lines(found: Explanation) -> list[str]:
+def why_lines(found: Explanation, units: str = "si") -> list[str]:
     """Return what decided a row, and how near it came to every limit."""
+    from boulder_sweep.cli.console import impact_lines
     from boulder_sweep.judge.validity import BY_FLAG
-    from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
     from boulder_sweep.views.wording import REASON_WORDS, ground_words
 
     row, history = found.stored, found.trajectory
@@ -85,42 +83,9 @@ def why_lines(found: Explanation) -> list[str]:
         return lines
     ground = ground_words(history.settings)
     lines += [f"  soil: {ground}"] if ground else []
-    limit = math.degrees(history.motion.control.theta_limit)
-    if row["time_to_limit_s"] is not None:
-        lines.append(
-            f"  rotation: the limit of {limit:g} deg is reached {1e3 * row['time_to_limit_s']:.1f} ms after contact"
-        )
-    else:
-        peak = history.motion.outcome.maxima
-        lines.append(
-            f"  rotation: {row['max_rotation_deg']:.4g} deg of {limit:g} deg allowed, "
-            f"{1 - row['max_rotation_deg'] / limit:.1%} below, {1e3 * peak.t_theta:.0f} ms after contact"
-        )
-        rating = history.settings["criterion"]["rating"]
-        lines.append(
-            f"  penetration: {row['penetration_m']:.4g} m, {rating} allows {PENETRATION_LIMITS_M[rating]:g} m "
-            f"beyond the far face"
-        )
-    if row.get("permanent_tilt_deg") is not None:
-        lines.append(
-            f"  afterwards: swings back by {row['swing_back_deg']:.3g} deg and comes to rest at "
-            f"{row['permanent_tilt_deg']:.3g} deg, to within {row['permanent_tilt_error_deg']:.1g} deg"
-        )
-    lines += _second_spring_line(history)
-    if row["rotation_error_deg"] is not None:
-        lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
+    lines += impact_lines(row, history, units)
     if row.get("validity"):
         lines.append("  outside what the model was tested on (docs/validity.md):")
         names = row["validity"].split(";")
         lines += [f"    {name}: {BY_FLAG[name].meaning}" if name in BY_FLAG else f"    {name}" for name in names]
     return lines
-
-
-def _second_spring_line(history: Trajectory) -> list[str]:
-    """Return when the second spring of the vehicle took over; nothing for a vehicle without."""
-    motion = history.motion
-    if motion.second is None:
-        return []
-    reached = history.time_s[motion.record.offset > 0.0]
-    when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
-    return [f"  front: its second spring acts from a crush of {motion.second.s_2:.4g} m on, {when}"]

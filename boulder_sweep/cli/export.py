@@ -12,6 +12,7 @@ EXAMPLES = """\b
 Examples:
   sweep export m30-sizing.sweep -o designs.xlsx --units us
   sweep export m30-sizing.sweep -o designs.csv
+  sweep export depths.parquet -o depths.xlsx
 """
 
 
@@ -22,6 +23,7 @@ Examples:
 def export(out: str, file: str, units: str) -> int:
     """Write the result in OUT as one table for colleagues, in SI or US customary units.
 
+    OUT is the folder of a run, or a file that -o of `sweep need`, `capacity` or `uncertainty`, or --trajectory wrote.
     The names of the columns end in their units. A spreadsheet has a second sheet with units, meanings, settings,
     versions and hashes.
     """

@@ -26,7 +26,7 @@ from boulder_sweep.cli.export import export
 from boulder_sweep.cli.fit_vehicle import fit_vehicle
 from boulder_sweep.cli.need import need
 from boulder_sweep.cli.new import new
-from boulder_sweep.cli.options import GROUP_EPILOG, OrderedGroup, version_option
+from boulder_sweep.cli.options import GROUP_EPILOG, GroupedCommands, version_option
 from boulder_sweep.cli.output import ready_streams, say
 from boulder_sweep.cli.plot import plot
 from boulder_sweep.cli.report import report
@@ -75,32 +75,20 @@ def start_light() -> None:
     atexit.register(gc.freeze)
 
 
-COMMANDS = (
-    new,
-    run,
-    check,
-    need,
-    uncertainty,
-    capacity,
-    simulate,
-    explore,
-    status,
-    plot,
-    report,
-    export,
-    compare,
-    explain,
-    tradeoff,
-    validate,
-    fit_vehicle,
-)
-"""In the order of ``sweep --help``."""
+GROUPS = {
+    "Ask": (new, check, need, uncertainty, capacity, simulate, explore),
+    "Tables": (run, status, explain, compare),
+    "Share": (plot, report, export),
+    "Model": (tradeoff, validate, fit_vehicle),
+}
+"""As in ``sweep --help``: what answers a question, what makes and reads tables, what goes to others, what is behind."""
+COMMANDS = tuple(command for group in GROUPS.values() for command in group)
 COMPLETION = "_SWEEP_COMPLETE"
 """Set by the completion of a shell."""
 REPORT = "this is a bug in boulder-sweep, not in your file; please report it with the command and the file"
 
 
-@click.group(cls=OrderedGroup, epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=GroupedCommands, epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
 @version_option
 def cli() -> None:
     """Find out which boulder, buried how deep in which soil, stops a truck.
@@ -110,8 +98,10 @@ def cli() -> None:
     """
 
 
-for command in COMMANDS:
-    cli.add_command(command)
+for heading, commands in GROUPS.items():
+    for command in commands:
+        cli.add_command(command)
+        cli.headings[str(command.name)] = heading
 cli.add_command(capacity, "which")  # its name before; not listed, and out with the next release
 
 

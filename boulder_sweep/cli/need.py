@@ -17,7 +17,7 @@ Examples:
   sweep need configs/site.yaml --margin '25 %' --plot depths.png
   sweep need configs/site.yaml --robust
   sweep need configs/site.yaml --least height -o heights.parquet
-  sweep need configs/uncertain_site.yaml --probability 0.95
+  sweep need configs/uncertain_site.yaml --probability 0.95 --least mass
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
 
@@ -36,7 +36,7 @@ Examples:
 )
 @click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
 @click.option("--robust", is_flag=True, help="Count only passes that stand under every second opinion.")
-@click.option("--own-readings", is_flag=True, help="Omit the answers for the other readings of the paper.")
+@click.option("--other-readings", is_flag=True, help="Also answer by the other readings of the paper: takes longer.")
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Design chart (.png, .svg or .pdf).")
@@ -55,7 +55,7 @@ def need(
     between: tuple[str, str] | None,
     tolerance: str | None,
     robust: bool,
-    own_readings: bool,
+    other_readings: bool,
     jobs: int | None,
     backend: str,
     scheduler: str | None,
@@ -74,7 +74,7 @@ def need(
     truck goes over the boulder at the end of the range (overlap below criterion.min_overlap), and `never` if not.
     """
     from boulder_sweep.answers.need import need as find
-    from boulder_sweep.answers.printing import need_lines
+    from boulder_sweep.answers.need_printing import need_lines
     from boulder_sweep.cli.progress import kernels_for, working
     from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 
@@ -92,7 +92,7 @@ def need(
             between=between,
             tolerance=tolerance,
             robust=robust,
-            both_readings=not own_readings,
+            both_readings=other_readings,
             jobs=jobs,
             backend=backend,
             scheduler=scheduler,
@@ -101,7 +101,7 @@ def need(
     if as_json:
         show(json.dumps(found.to_dict()))
     else:
-        show(*need_lines(found, units=units))
+        show(*need_lines(found, units=units, file=grid))
     if not quiet:
         counts = ", ".join(f"{word} {count:,}" for word, count in found.counts().items())
         say(f"{counted(len(found), 'row')}: {counts}; {counted(found.simulated, 'simulation')}")

@@ -16,38 +16,65 @@ EXAMPLES = """\b
 Examples:
   sweep new
   sweep new my-site.yaml
-  sweep new my-site.yaml --yes
+  sweep new --class M40 --units us -o my-site.yaml
 """
+DEFAULT = "my-site.yaml"
+SYSTEMS = ("si", "us")
 
 
 @click.command("new", short_help="Write a commented settings file to start from.", epilog=EXAMPLES)
-@click.argument("file", type=OutputPath(dir_okay=False, path_type=Path), default="my-site.yaml")
+@click.argument("file", type=OutputPath(dir_okay=False, path_type=Path), required=False)
+@click.option("--class", "vehicle", metavar="CLASS", help="Class of the vehicle in ASTM F2656, such as M40 [M30].")
+@click.option("--units", type=click.Choice(SYSTEMS), help="Units of the values [si].")
+@click.option(
+    "-o", "--output", "output", type=OutputPath(dir_okay=False, path_type=Path), help="The file, as the argument."
+)
 @click.option("-y", "--yes", is_flag=True, help="Do not prompt; take the answers in brackets.")
-def new(file: Path, yes: bool) -> int:
-    """Write FILE [my-site.yaml], a settings file with a comment for every entry, after three questions."""
+def new(file: Path | None, vehicle: str | None, units: str | None, output: Path | None, yes: bool) -> int:
+    """Write FILE [my-site.yaml], a settings file with a comment for every entry.
+
+    Asks for name, class and units, unless --class or --units is given.
+    """
     from boulder_sweep.errors import ExistingFileError
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.starter import CLASSES, UNITS, UNPUBLISHED, starter
+    from boulder_sweep.settings.starter import CLASSES, is_published, starter
 
+    if file is not None and output is not None:
+        raise click.UsageError(f"two files are named, {file} and {output}; name one")
+    file = file or output or Path(DEFAULT)
+    asks = not yes and vehicle is None and units is None and sys.stdin.isatty()
+    vehicle, units = (vehicle or next(iter(CLASSES))).upper(), units or SYSTEMS[0]
+    if vehicle not in CLASSES:
+        raise click.UsageError(f"--class {vehicle} is not a class of ASTM F2656; there are {', '.join(CLASSES)}")
     if file.exists() or file.is_symlink():
         raise ExistingFileError(f"{file} exists already; name another file")
     name = re.sub(r"[^\w.+-]+", "-", file.stem).strip("-.+")[:80] or "my-site"
-    vehicle, units = next(iter(CLASSES)), UNITS[0]
-    if not yes and sys.stdin.isatty():
+    if asks:
         name = click.prompt("Name of the study", default=name, value_proc=_checked_name, err=True)
         vehicle = click.prompt("Class of the vehicle", type=click.Choice(list(CLASSES)), default=vehicle, err=True)
-        units = click.prompt("Units", type=click.Choice(UNITS), default=units, err=True)
+        units = click.prompt("Units", type=click.Choice(SYSTEMS), default=units, err=True)
     with file.open("x", encoding="utf-8") as new_file:  # no link is followed that has come since
         new_file.write(starter(name, vehicle, "us" if units == "us" else "si", str(file)))
-    quoted = shlex.quote(str(file))
-    if CLASSES[vehicle][0] != CLASSES[next(iter(CLASSES))][0]:
-        show(
-            f"{file}: fill in {', '.join(UNPUBLISHED)};",
-            f"none is published for {vehicle} (sweep fit-vehicle fits the first two). Then: sweep check {quoted}",
-        )
-        return 0
-    show(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep need {quoted}")
+    if is_published(vehicle):
+        show(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep need {shlex.quote(str(file))}")
+    else:
+        show(*_lines_to_fill_in(file, vehicle, SYSTEMS.index(units)))
     return 0
+
+
+def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
+    """Say which entries of a vehicle nobody has published, and how to find them."""
+    from boulder_sweep.settings.starter import CATEGORIES, CLASSES
+
+    mass = CATEGORIES[CLASSES[vehicle][0]].mass[units]
+    return [
+        f"{file}: fill in three entries; none is published for {vehicle}.",
+        "  vehicle.spring, vehicle.damper: from a crash against a rigid wall. Measure the",
+        "    deceleration of the vehicle over time (or its displacement), then",
+        f"    sweep fit-vehicle PULSE.csv --mass '{mass}'",
+        "  vehicle.bed_offset: from the front bumper to the front of the cargo bed",
+        f"Then: sweep check {shlex.quote(str(file))}",
+    ]
 
 
 def _checked_name(text: str) -> str:

@@ -70,12 +70,25 @@ class OutputPath(click.Path):
 OUTPUT = OutputPath()
 
 
-class OrderedGroup(click.Group):
-    """Group that lists its commands in the order of a session, not of the alphabet."""
+class GroupedCommands(click.Group):
+    """Group that lists its commands under headings, in the order in which they were added."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.headings: dict[str, str] = {}
+        """Heading of every command; one without is not listed."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the commands in the order they were added, each by its own name only."""
-        return [name for name, command in self.commands.items() if name == command.name]
+        """Return the commands that are listed."""
+        return list(self.headings)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a section for each heading."""
+        width = formatter.width - 6 - max(map(len, self.headings))
+        for heading in dict.fromkeys(self.headings.values()):
+            with formatter.section(heading):
+                own = [name for name, under in self.headings.items() if under == heading]
+                formatter.write_dl([(name, self.commands[name].get_short_help_str(width)) for name in own])
 
 
 def version_option(function: Command) -> Command:

@@ -15,9 +15,9 @@ from boulder_sweep.locations import beside, location_of
 EXAMPLES = """\b
 Examples:
   sweep plot m30-sizing.sweep
-  sweep plot m30-sizing.sweep -o map.png --at boulder_width_m=1.8
+  sweep plot m30-sizing.sweep -o map.png --at width=1.8
   sweep plot m30-sizing.sweep --units us
-  sweep plot m30-sizing.sweep --across boulder_width_m
+  sweep plot m30-sizing.sweep --across width
 """
 COLUMN = "COLUMN"
 
@@ -40,8 +40,10 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     """Draw a map of the verdicts in OUT: embedment across, height up, one map for each soil.
 
     OUT is the folder of a run, perhaps in progress, of which finished designs are drawn.
-    COLUMN is the name of an input column of the table, embedment_ratio, or soil or vehicle where these have names.
+    COLUMN is an input as in the file (boulder.width or width) or as in the table (boulder_width_m), or soil or vehicle
+    where these have names.
     """
+    axes = {option: name and _column(option, name) for option, name in axes.items()}
     given: dict[str, str] = {}
     for name, text in map(_given, at):
         if name in given:
@@ -81,7 +83,19 @@ def _given(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals:
         raise click.UsageError(f"--at {text}: missing =; write COLUMN=VALUE")
-    return name.strip(), value.strip()
+    return _column("at", name.strip()), value.strip()
+
+
+def _column(option: str, word: str) -> str:
+    """Return the column of the input that a word names; a name of sets stays as it is."""
+    from boulder_sweep.settings.names import UnknownNameError, named
+
+    if word in ("soil", "vehicle"):
+        return word
+    try:
+        return named(word).name
+    except UnknownNameError as problem:
+        raise click.UsageError(f"--{option} {problem}") from None
 
 
 def _held(name: str, text: str, sets: Mapping[str, Sequence[str]]) -> float:

@@ -24,6 +24,7 @@ from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
     metavar="F.png",
     help="Draw where the energy goes, and add its columns to the time history.",
 )
+@click.option("--all", "every", is_flag=True, help="Print every column of the outcome as well.")
 @click.option("--animate", type=OUTPUT, metavar="F.gif|.mp4|.html", help="Animate the side view.")
 @units_option
 @set_option
@@ -35,6 +36,7 @@ def simulate(
     plot: str | None,
     trajectory: str | None,
     energy: str | None,
+    every: bool,
     animate: str | None,
     units: str,
     overrides: tuple[str, ...],
@@ -62,12 +64,18 @@ def simulate(
         say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design
     from boulder_sweep.settings.shown_units import shown_values
+    from boulder_sweep.views.wording import verdict_line
 
     with working(quiet, kernels_for(sweep, "design")):
         result = simulate_design(sweep, number)
     # Before anything else: there may be nothing to draw, and a film takes a while.
-    values = shown_values(result.summary(), units)
-    show(*([json.dumps(values)] if as_json else [*console.value_lines(values), *_cautions(values)]))
+    row = result.summary()
+    if as_json:
+        show(json.dumps(shown_values(row, units)))
+    else:
+        lines = [] if row["max_rotation_deg"] is None else console.impact_lines(row, result, units)
+        columns = ["", *console.value_lines(shown_values(row, units))] if every else []
+        show(*console.wrapped(verdict_line(result)), *lines, *_cautions(row), *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:
@@ -83,10 +91,10 @@ def simulate(
     return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0
 
 
-def _cautions(values: dict[str, Any]) -> list[str]:
+def _cautions(row: dict[str, Any]) -> list[str]:
     """Return the remarks that go with the result."""
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
 
-    lines = [f"caution: {words}" for words in meanings(values["validity"] or "")]
+    lines = [f"caution: {words}" for words in meanings(row["validity"] or "")]
     lines += ["see docs/validity.md"] if lines else []
-    return [*lines, f"pass: {NOT_A_RATING}"] if values["verdict"] == "pass" else lines
+    return [*lines, f"pass: {NOT_A_RATING}"] if row["verdict"] == "pass" else lines

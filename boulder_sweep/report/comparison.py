@@ -1,16 +1,21 @@
-"""Two results of the same designs: which verdicts changed and why, the least depth and mass before and after."""
+"""Two results of designs that share inputs: which verdicts changed and why, least depth and mass before and after."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import Location, RemotePath, location_of
+from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.provenance import differences
 from boulder_sweep.store.reader import read
+from boulder_sweep.text import counted
+from boulder_sweep.views.labels import RATIO, name_of, unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +32,13 @@ class Comparison:
     Attributes
     ----------
     matched : DataFrame
-        Designs of both results: inputs, and outcomes with ``_before`` and ``_after`` behind their names.
+        Designs of both results: inputs, and outcomes with ``_before`` and ``_after`` behind their names; so have the
+        inputs in `differ`.
+    differ : tuple of str
+        Columns of inputs of which the two results have no value in common. Designs are matched by all others, and
+        their values of these in order.
+    varying : tuple of str
+        Columns of the given inputs that tell designs of one result apart.
     only_before, only_after : int
         Designs without a counterpart in the other result.
     changed : tuple of str
@@ -39,6 +50,8 @@ class Comparison:
     """
 
     matched: pd.DataFrame
+    differ: tuple[str, ...]
+    varying: tuple[str, ...]
     only_before: int
     only_after: int
     changed: tuple[str, ...]
@@ -51,6 +64,16 @@ class Comparison:
         table = self.matched[self.matched.verdict_before != self.matched.verdict_after]
         change = (table.max_rotation_deg_after - table.max_rotation_deg_before).abs()
         return table.loc[change.sort_values(ascending=False, kind="stable").index]
+
+    def turned(self) -> dict[str, int]:
+        """Return how many matched designs pass before, how many of these no longer do, and how many others do now."""
+        before, after = (self.matched[f"verdict_{when}"] == "pass" for when in ("before", "after"))
+        counts = {"passes": before, "passes_lost": before & ~after, "passes_gained": after & ~before}
+        return {name: int(mask.sum()) for name, mask in counts.items()}
+
+    def values(self, name: str) -> list[tuple[float, float]]:
+        """Return the pairs of values of an input that differs, before and after, in order."""
+        return sorted(set(zip(self.matched[f"{name}_before"], self.matched[f"{name}_after"], strict=True)))
 
     def flips(self) -> dict[str, int]:
         """Return the number of designs for each change of verdict and reason."""
@@ -68,6 +91,8 @@ class Comparison:
             "matched": len(self.matched),
             "only_before": self.only_before,
             "only_after": self.only_after,
+            "differ": list(self.differ),
+            **self.turned(),
             "flipped": len(self.flipped),
             "flips": self.flips(),
             "least": {name: list(pair) for name, pair in self.least.items()},
@@ -82,7 +107,8 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     Parameters
     ----------
     before, after
-        Folders that a sweep wrote. Designs are matched by their inputs, whatever their order.
+        Folders that a sweep wrote. Designs are matched by their inputs, whatever their order. An input of which the
+        two have no value in common is left out of that, and its values are matched in order, the least with the least.
 
     Returns
     -------
@@ -91,18 +117,33 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
 
     Raises
     ------
+    ReportError
+        No design of one has a counterpart in the other.
     StoreError
         There is no result in a folder, or it is damaged.
     """
-    tables = [_table(location_of(folder)) for folder in (before, after)]
-    keys = [f"key_{name}" for name in INPUT_COLUMNS]
-    matched = tables[0].merge(
-        tables[1].drop(columns=[*INPUT_COLUMNS, "mass_kg"]), on=[*keys, "nth"], suffixes=("_before", "_after")
-    )
-    one, other = (FinishedRows(location_of(folder)) for folder in (before, after))
+    places = [location_of(folder) for folder in (before, after)]
+    one, other = (FinishedRows(place) for place in places)
+    tables = [_table(place) for place in places]
+    follow = _following(one.identity["settings"]["inputs"], other.identity["settings"]["inputs"])
+    names = [name for name in (*INPUT_COLUMNS, RATIO) if name not in follow]
+    differ = [name for name in names if not set(tables[0][_key(name)]) & set(tables[1][_key(name)])]
+    as_many = _values_in_order(tables, differ)
+    same = [name for name in names if name not in differ]
+    shared = [_key(name) for name in same] + ["place"]
+    for table in tables:
+        table["nth"] = table.groupby(shared).cumcount()  # repeated designs
+    matched = tables[0].merge(tables[1].drop(columns=same), on=[*shared, "nth"], suffixes=("_before", "_after"))
+    if matched.empty or not as_many:
+        raise ReportError(f"{before} and {after} have no design in common{_apart(tables, differ)}")
+    for name in (*follow, "mass_kg"):
+        if matched[f"{_key(name)}_before"].equals(matched[f"{_key(name)}_after"]):
+            matched = matched.rename(columns={f"{name}_before": name}).drop(columns=f"{name}_after")
     passing = [table[table.verdict == "pass"] for table in tables]
     return Comparison(
-        matched=matched.drop(columns=[*keys, "nth"]),
+        matched=matched.drop(columns=[name for name in matched if name.startswith("key_")] + ["place", "nth"]),
+        differ=tuple(differ),
+        varying=tuple(name for name in names if any(len(set(table[_key(name)])) > 1 for table in tables)),
         only_before=len(tables[0]) - len(matched),
         only_after=len(tables[1]) - len(matched),
         changed=tuple(differences(one.identity, other.identity)),
@@ -115,15 +156,54 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
 
 
 def _table(folder: Location) -> pd.DataFrame:
-    """Read a result with the keys for matching; repeated designs are numbered."""
+    """Read a result with the keys for matching."""
     table = read(folder, ["design_id", *INPUT_COLUMNS, *OUTCOMES])
     for name in ("verdict", "reason"):
         table[name] = table[name].astype(str)
-    for name in INPUT_COLUMNS:
-        table[f"key_{name}"] = table[name].map({value: f"{value:.{DIGITS}g}" for value in table[name].unique()})
-    table["nth"] = table.groupby([f"key_{name}" for name in INPUT_COLUMNS]).cumcount()
     table["mass_kg"] = table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")
+    table[RATIO] = table.embedment_depth_m / table.boulder_height_m
+    for name in (*INPUT_COLUMNS, RATIO, "mass_kg"):
+        table[_key(name)] = table[name].map({value: f"{value:.{DIGITS}g}" for value in table[name].unique()})
+    table[RATIO] = table[_key(RATIO)].astype(float)
     return table
+
+
+def _key(name: str) -> str:
+    return f"key_{name}"
+
+
+def _following(*inputs: Mapping[str, Any]) -> list[str]:
+    """Return the columns that follow from others in both results, by what their settings give."""
+    found = ["embedment_depth_m" if all(RATIO in own for own in inputs) else RATIO]
+    if all(own.get("impact_height_m") == IMPACT_HEIGHT_RULE for own in inputs):
+        found.append("impact_height_m")
+    return found
+
+
+def _values_in_order(tables: Sequence[pd.DataFrame], differ: Sequence[str]) -> bool:
+    """Number the values of the inputs that differ, in order, as the column ``place``; whether both have as many."""
+    for table in tables:
+        table["place"] = table.groupby(list(differ)).ngroup() if differ else 0
+    counts = [[table[name].nunique() for name in (*differ, "place")] for table in tables]
+    return counts[0] == counts[1]
+
+
+def _apart(tables: Sequence[pd.DataFrame], differ: Sequence[str]) -> str:
+    """Say why two results have no design in common, and what helps."""
+    if not differ:
+        return ": every single value occurs in both, but no combination does"
+    reasons = []
+    for name in differ:
+        unit = f" {unit_of(name)}".rstrip()
+        held = [
+            f"{counted(table[name].nunique(), 'value')} ({table[name].min():.6g} to {table[name].max():.6g}{unit})"
+            for table in tables
+        ]
+        reasons.append(f"{name_of(name)} has {held[0]} in one and {held[1]} in the other")
+    return (
+        f": {'; '.join(reasons)}. Values that differ are paired in order, so give both as many of them, or one value "
+        f"in common"
+    )
 
 
 def _least(values: pd.Series) -> float | None:

@@ -10,10 +10,12 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from boulder_sweep.answers.files import AnswerFile, result_of
+from boulder_sweep.columns import BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.contents import setting_lines
-from boulder_sweep.settings.shown_units import Shown, check_system, shown_column
+from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
 from boulder_sweep.store.files import replacing
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.targets import check_target
@@ -23,12 +25,38 @@ from boulder_sweep.views.wording import NOT_A_TEST
 if TYPE_CHECKING:
     import pyarrow as pa
 
+Result = FinishedRows | AnswerFile
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
 JUDGED_BY = Shown(
     "judged_by", "judged_by", "", 1.0, "by whose rules the verdict was found; a column of tables of other versions only"
 )
+NUMBER_FORMATS = {
+    "m": "0.000",
+    "ft": "0.000",
+    "kg": "#,##0",
+    "lb": "#,##0",
+    "kg/m^3": "#,##0",
+    "pcf": "0.0",
+    "MN/m^3": "0.0",
+    "pci": "0.0",
+    "m/s": "0.00",
+    "mph": "0.0",
+    "N/m": "#,##0",
+    "lb/in": "#,##0",
+    "N*s/m": "#,##0",
+    "lb*s/in": "#,##0.0",
+    "kN": "#,##0.0",
+    "kip": "#,##0.0",
+    "deg": "0.00",
+    "s": "0.0000",
+    "1": "0.000",
+}
+"""How a spreadsheet shows numbers, by unit; the cells keep all digits."""
+ERROR_FORMAT = "0.0E+00"
+"""Of estimated errors, which are small."""
+ABOUT_WIDTHS = (44, 12, 90)
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
 
@@ -39,7 +67,8 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
     Parameters
     ----------
     out
-        Folder that a sweep wrote; a run may still be writing into it.
+        Folder that a sweep wrote, perhaps with a run still writing into it, or a file of `need`, `uncertainty`,
+        `reserves` or of a time history.
     file
         The table: ``.xlsx``, with a second sheet of units, settings and versions, ``.csv`` or ``.parquet``.
     units
@@ -61,7 +90,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         The units are unknown.
     """
     check_system(units)
-    target, finished = Path(file), FinishedRows(location_of(out))
+    target, finished = Path(file), result_of(location_of(out), ReportError)
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
@@ -70,7 +99,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
         )
-    writer: Callable[[BinaryIO, FinishedRows, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
+    writer: Callable[[BinaryIO, Result, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
     try:
         with replacing(target) as passing:
             return writer(passing, finished, units)
@@ -78,8 +107,8 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
 
-def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[str, str, str]]:
-    """Yield what a reader must know about a table, three texts for each line."""
+def about(finished: Result, columns: Iterable[Shown], units: str = "si") -> Iterator[tuple[str, str, str]]:
+    """Yield what a reader must know about a table, three texts for each line; settings in ``si`` or ``us`` units."""
     identity: Mapping[str, Any] = finished.identity
     yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
     yield "rows", f"{finished.rows_done:,} of {finished.rows:,}", ""
@@ -95,11 +124,11 @@ def about(finished: FinishedRows, columns: Iterable[Shown]) -> Iterator[tuple[st
         yield column.name, column.unit, column.meaning
     yield "", "", ""
     yield "settings", "", ""
-    for line in setting_lines(identity["settings"]):
+    for line in setting_lines(shown_settings(identity["settings"], units)):
         yield line, "", ""
 
 
-def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
+def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
     """Yield the rows piece by piece in the requested units."""
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -107,7 +136,7 @@ def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], p
     for table in finished.tables():
         if finished.judged_by:
             table = table.append_column(JUDGED_BY.stored, pa.array([finished.judged_by] * len(table)))
-        columns = [JUDGED_BY if name == JUDGED_BY.stored else shown_column(name, units) for name in table.column_names]
+        columns = [JUDGED_BY if field.name == JUDGED_BY.stored else _shown(field, units) for field in table.schema]
         for place, column in enumerate(columns):
             if column.size != 1.0:
                 values = pc.divide(table.column(place), column.size)
@@ -115,7 +144,18 @@ def _tables(finished: FinishedRows, units: str) -> Iterator[tuple[list[Shown], p
         yield columns, table.rename_columns([column.name for column in columns])
 
 
-def _csv(target: BinaryIO, finished: FinishedRows, units: str) -> int:
+def _shown(field: pa.Field, units: str) -> Shown:
+    """Return how a column is shown, by the register of columns or, of an answer, by its own metadata.
+
+    Intervals are texts and stay in their unit.
+    """
+    if field.name in BY_NAME or not field.metadata:
+        return shown_column(field.name, units)
+    unit, meaning = (field.metadata.get(key, b"").decode() for key in (b"unit", b"meaning"))
+    return shown_as(field.name, unit, meaning, units if str(field.type) == "double" else "si")
+
+
+def _csv(target: BinaryIO, finished: Result, units: str) -> int:
     """Write comma-separated values; null is empty."""
     rows = 0
     file = TextIOWrapper(target, newline="", encoding="utf-8")
@@ -140,7 +180,7 @@ def _cell(text: str) -> str:
     return f"'{shown}" if first.startswith(FORMULA_SIGNS) else shown
 
 
-def _parquet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
+def _parquet(target: BinaryIO, finished: Result, units: str) -> int:
     """Write one Parquet file with units and meanings in its field metadata, settings and versions in its own."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -152,7 +192,9 @@ def _parquet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
                 field.with_metadata({"unit": column.unit, "meaning": column.meaning})
                 for field, column in zip(table.schema, columns, strict=True)
             ]
-            schema = pa.schema(fields, {"about": "\n".join("\t".join(line) for line in about(finished, columns))})
+            schema = pa.schema(
+                fields, {"about": "\n".join("\t".join(line) for line in about(finished, columns, units))}
+            )
             writer = writer or pq.ParquetWriter(target, schema, compression="zstd")
             writer.write_table(table.cast(writer.schema))
             rows += len(table)
@@ -162,7 +204,7 @@ def _parquet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
     return rows
 
 
-def _sheet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
+def _sheet(target: BinaryIO, finished: Result, units: str) -> int:
     """Write a spreadsheet: the designs, and what a reader must know about them."""
     rows, columns = 0, list[Shown]()
     with _workbook(target) as book:
@@ -170,14 +212,59 @@ def _sheet(target: BinaryIO, finished: FinishedRows, units: str) -> int:
         designs.freeze_panes = "B2"
         for columns, table in _tables(finished, units):
             if rows == 0:
-                designs.append(_cells(column.name for column in columns))
+                _set_widths(designs, [max(len(column.name) + 4, 10) for column in columns])
+                designs.append([_bold(designs, text) for text in _cells(column.name for column in columns)])
+                styled = [_styled(designs, column) for column in columns]
             for values in zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True):
-                designs.append(values)
+                designs.append([_filled(cell, value) for cell, value in zip(styled, values, strict=True)])
             rows += len(table)
+        if rows:
+            designs.auto_filter.ref = f"A1:{_letter(len(columns))}{rows + 1}"
         sheet = book.create_sheet("about")
-        for line in about(finished, columns):
+        _set_widths(sheet, ABOUT_WIDTHS)
+        for line in about(finished, columns, units):
             sheet.append(_cells(line))
     return rows
+
+
+def _set_widths(sheet: Any, widths: Iterable[float]) -> None:
+    """Set the widths of the columns of a sheet, in characters; before its first row."""
+    for place, width in enumerate(widths, 1):
+        sheet.column_dimensions[_letter(place)].width = width
+
+
+def _letter(place: int) -> str:
+    from openpyxl.utils import get_column_letter
+
+    return str(get_column_letter(place))
+
+
+def _bold(sheet: Any, text: str) -> Any:
+    """Return the cell of a header."""
+    from openpyxl.cell import WriteOnlyCell
+    from openpyxl.styles import Font
+
+    cell = WriteOnlyCell(sheet, text)
+    cell.font = Font(bold=True)
+    return cell
+
+
+def _styled(sheet: Any, column: Shown) -> Any:
+    """Return the cell of a column that is filled for every row: rows are written one by one."""
+    from openpyxl.cell import WriteOnlyCell
+
+    cell = WriteOnlyCell(sheet)
+    if column.unit in NUMBER_FORMATS and column.stored != DESIGN_ID.name:
+        cell.number_format = ERROR_FORMAT if "_error_" in column.name else NUMBER_FORMATS[column.unit]
+    return cell
+
+
+def _filled(cell: Any, value: Any) -> Any:
+    """Return a styled cell with a value; text and nothing need no style."""
+    if value is None or isinstance(value, str):
+        return value
+    cell.value = value
+    return cell
 
 
 @contextmanager

@@ -103,13 +103,18 @@ def read_single(node: Node, field: Field) -> float:
     if not isinstance(node, Scalar):
         raise LeafError([Mistake(node.position, "takes one value here, not a list or a range")])
     try:
-        value = _to_float(read_quantity(node, field.unit).value)
+        value = _to_float(read_quantity(node, field.unit, sample=_sample(field)).value)
     except NumberError as error:
         raise LeafError([Mistake(node.position, str(error))]) from None
     problem = outside(value, field)
     if problem:
         raise LeafError([Mistake(node.position, problem)])
     return value
+
+
+def _sample(field: Field) -> str:
+    """Return the value that a message about an entry suggests: its default; empty where it has none."""
+    return "" if field.default is None else describe(field.default, field.unit)
 
 
 def outside(value: float, field: Field) -> str:
@@ -141,7 +146,7 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
     mistakes: dict[str, Mistake] = {}
     for item in items:
         try:
-            quantities.append(read_quantity(item, field.unit, unit))
+            quantities.append(read_quantity(item, field.unit, unit, _sample(field)))
         except NumberError as error:
             mistakes.setdefault(str(error), Mistake(item.position, str(error)))
     if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:

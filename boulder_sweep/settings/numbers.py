@@ -32,7 +32,7 @@ class Quantity(NamedTuple):
     has_unit: bool
 
 
-def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Quantity:
+def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sample: str = "") -> Quantity:
     """Return the number a node holds, converted to `unit`.
 
     Parameters
@@ -43,6 +43,8 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Qu
         Unit of the table; the unit of a bare number.
     outer_unit : Scalar, optional
         Unit after the bracket of the list that holds the number.
+    sample : str
+        A value of the entry, which a message suggests; one of its unit by default.
 
     Raises
     ------
@@ -52,7 +54,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Qu
     if not isinstance(node, Scalar):
         kind = "a list" if isinstance(node, Sequence) else "a block"
         raise NumberError(f"one number is needed here, not {kind}")
-    number, unit_text = split_number(node.text, unit)
+    number, unit_text = split_number(node.text, unit, sample)
     if outer_unit is not None:
         if unit_text:
             raise NumberError(
@@ -68,8 +70,8 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None) -> Qu
         raise NumberError(str(error)) from None
 
 
-def split_number(text: str, unit: str) -> tuple[Fraction, str]:
-    """Return the number at the beginning of a text and the rest, its unit.
+def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]:
+    """Return the number at the beginning of a text and the rest, its unit; `sample` as of `read_quantity`.
 
     Raises
     ------
@@ -78,7 +80,7 @@ def split_number(text: str, unit: str) -> tuple[Fraction, str]:
     """
     stripped = text.strip().replace("−", "-")
     quoted = f"'{shorten(text)}'"
-    needed = _needed(unit)
+    needed = _needed(unit, sample)
     if not stripped or stripped in ("~", "null", "Null", "NULL"):
         raise NumberError(f"is empty; {needed}")
     if stripped.lower() in _YES_NO:
@@ -133,11 +135,11 @@ def describe(value: float, unit: str) -> str:
     return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
 
 
-def _needed(unit: str) -> str:
+def _needed(unit: str, sample: str) -> str:
     expected = EXPECTED[unit]
     if unit == "1":
         return "a number is needed"
-    return f"{expected.words} is needed, such as {_SAMPLES[unit]}"
+    return f"{expected.words} is needed, such as {sample or _SAMPLES[unit]}"
 
 
 _SAMPLES = {

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from boulder_sweep.settings.entries import TOP_KEYS
+from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import SECOND_OPINIONS
-from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, shorten
+from boulder_sweep.settings.names import BOULDER_MASS, UnknownNameError, named
+from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, nearest, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
 from boulder_sweep.settings.tree import Sequence as List
 from boulder_sweep.settings.yaml_reader import parse_node
@@ -36,8 +39,8 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
     root : Mapping
         The tree of the file, changed in place.
     overrides : sequence of str
-        As typed behind ``--set``; the value is YAML, so lists and ranges work as in the file. ``--accuracy=fine``
-        is an option of its own.
+        As typed behind ``--set``, the key as of `boulder_sweep.settings.names.named`; the value is YAML, so lists and
+        ranges work as in the file. ``--accuracy=fine`` is an option of its own.
     problems : ProblemList
         Receives what cannot be understood.
     """
@@ -46,6 +49,13 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
         option, key = (key, OPTIONS[key]) if key in OPTIONS else ("--set", key)
         path = key.strip().split(".")
         position, name = Position(option), shorten(key.strip())
+        if len(path) == 1 and path[0] not in ("", *TOP_KEYS):
+            try:
+                path = named(path[0], (*FIELDS, BOULDER_MASS)).path.split(".")
+            except UnknownNameError as unknown:
+                if nearest(path[0], TOP_KEYS) is None:
+                    problems.add(position, name, unknown.what)
+                    continue
         if not equals or not all(path) or len(path) > 4:
             problems.add(position, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
             continue

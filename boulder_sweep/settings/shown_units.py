@@ -18,6 +18,7 @@ _SHOWN: dict[str, tuple[str, str]] = {
     "m/s": ("m/s", "mph"),
     "N/m": ("kN/m", "lb/in"),
     "N*s/m": ("kN*s/m", "lb*s/in"),
+    "kPa": ("kPa", "psf"),
 }
 _FORCES = {"kN": ("kN", "kip"), "N": ("kN", "kip"), "J": ("kJ", "kip*ft")}
 _OF_FORCE = {"kN": 1.0, "N": 1e-3, "J": 1e-3}
@@ -85,11 +86,16 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
 def shown_column(stored: str, units: str) -> Shown:
     """Return how a column of the result is shown: its name ends in the unit."""
     spec = column_spec(stored)
-    if units == "si" or not spec.unit:
-        return Shown(stored, stored, spec.unit, 1.0, spec.meaning)
-    unit, size = shown_unit(spec.unit, units)
-    name = stored if size == 1.0 else stored.removesuffix(_suffix(spec.unit)) + _suffix(unit)
-    return Shown(stored, name, unit, size, spec.meaning)
+    return shown_as(stored, spec.unit, spec.meaning, units)
+
+
+def shown_as(stored: str, unit: str, meaning: str, units: str) -> Shown:
+    """Return how a column of a unit and a meaning is shown."""
+    if units == "si" or not unit:
+        return Shown(stored, stored, unit, 1.0, meaning)
+    other, size = shown_unit(unit, units)
+    name = stored if size == 1.0 else stored.removesuffix(_suffix(unit)) + _suffix(other)
+    return Shown(stored, name, other, size, meaning)
 
 
 def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
@@ -102,6 +108,45 @@ def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
         column = shown_column(name, units)
         found[column.name] = value / column.size if isinstance(value, float) else value
     return found
+
+
+def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
+    """Return the resolved settings in the units asked for: numbers under a name that ends in a unit, and its name.
+
+    Parameters
+    ----------
+    settings
+        As of `boulder_sweep.settings.Sweep.resolved`, or a part of it.
+    units
+        ``si`` or ``us``.
+    """
+    if units == "si":
+        return dict(settings)
+    found = {}
+    for name, value in settings.items():
+        unit, size = _unit_of(name, units)
+        shown = name if size == 1.0 else name.removesuffix(_suffix(unit)) + _suffix(shown_unit(unit, units).unit)
+        found[shown] = _shown_setting(value, size, units)
+    return found
+
+
+def _unit_of(name: str, units: str) -> tuple[str, float]:
+    """Return the unit that the name of a setting ends in, and the size of the one it is shown in."""
+    ending = [unit for unit in _SHOWN if name.endswith(_suffix(unit))]
+    unit = max(ending, key=len, default="")
+    return unit, shown_unit(unit, units).size if unit else 1.0
+
+
+def _shown_setting(value: Any, size: float, units: str) -> Any:
+    """Return a value, or all values of a list, a distribution or a long axis, divided by the size of the unit."""
+    if isinstance(value, Mapping):
+        if size == 1.0:
+            return shown_settings(value, units)
+        plain = ("cov", "count")  # have no unit
+        return {name: one if name in plain else _shown_setting(one, size, units) for name, one in value.items()}
+    if isinstance(value, list):
+        return [_shown_setting(one, size, units) for one in value]
+    return value / size if isinstance(value, float) else value
 
 
 def _suffix(unit: str) -> str:

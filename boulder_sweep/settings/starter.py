@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, Field, fields_of
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.numbers import describe
+from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.text import printable
 
 
@@ -20,15 +21,16 @@ def default_of(field: Field) -> float | str | None:
     return attributes.get(field.name, field.default)
 
 
-def default_text(field: Field) -> str:
-    """Return the default of an entry with its unit, empty where there is none."""
+def default_text(field: Field, units: str = "si") -> str:
+    """Return the default of an entry with its unit, to five digits in US units; empty where there is none."""
     value = default_of(field)
     if value is None or isinstance(value, str):
         return value or ""
-    return describe(value, field.unit)
+    unit, size = shown_unit(field.unit, units) if units == "us" else (field.unit, 1.0)
+    return describe(value, unit) if size == 1.0 else f"{value / size:.5g} {unit}"
 
 
-UNITS = ("si", "us")
+UNITS = SYSTEMS
 
 
 class Category(NamedTuple):
@@ -54,6 +56,14 @@ CLASSES = {f"{code}{mph}": (code, mph) for code, category in CATEGORIES.items() 
 UNPUBLISHED = ("vehicle.spring", "vehicle.damper", "vehicle.bed_offset")
 """Entries without a published value but for the first category: left empty, so that a file is refused without them."""
 
+KM_PER_MILE = 1.609344
+
+
+def is_published(vehicle: str) -> bool:
+    """Whether spring, damper and cargo bed of a class are published: those of the paper's medium-duty truck."""
+    return CLASSES[vehicle][0] == next(iter(CATEGORIES))
+
+
 _EXAMPLES: dict[str, tuple[str, str]] = {
     "boulder.length": ("1.6 m", "5 ft"),
     "boulder.width": ("{from: 1.6 m, to: 2.4 m, step: 0.2 m}", "{from: 5 ft, to: 8 ft, step: 6 in}"),
@@ -66,9 +76,10 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "soil.friction_angle": ("[36 deg, 40 deg]",) * 2,
     "soil.subgrade_reaction": ("60 MN/m^3", "220 pci"),
     "soil.layers": (
-        "[{from: 1.2 m, density: 2 t/m^3, friction_angle: 38 deg, subgrade_reaction: 50 MN/m^3}]",
+        "[{from: 1.2 m, density: 2000 kg/m^3, friction_angle: 38 deg, subgrade_reaction: 50 MN/m^3}]",
         "[{from: 4 ft, density: 125 pcf, friction_angle: 38 deg, subgrade_reaction: 180 pci}]",
     ),
+    "soil.cohesion": ("0 kPa", "0 psf"),
     "soil.water_table": ("0.8 m", "2.6 ft"),
     "vehicle.spring": ("3103.3 kN/m", "17720 lb/in"),
     "vehicle.damper": ("138.91 kN*s/m", "793 lb*s/in"),
@@ -117,11 +128,19 @@ def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", 
 def _line(field: Field, vehicle: str, units: int) -> str:
     """Return one entry with its meaning, commented out where a file may do without it."""
     code, mph = CLASSES[vehicle]
-    of_class = {"vehicle.mass": CATEGORIES[code].mass[units], "vehicle.speed": f"{mph} mph"}
-    if code != next(iter(CATEGORIES)):
+    speed = f"{mph} mph" if units else f"{mph * KM_PER_MILE:.4g} km/h"
+    of_class = {"vehicle.mass": CATEGORIES[code].mass[units], "vehicle.speed": speed}
+    if not is_published(vehicle):
         of_class |= dict.fromkeys(UNPUBLISHED, "")
     path = field.path
-    value = of_class[path] if path in of_class else _EXAMPLES[path][units] if path in _EXAMPLES else default_text(field)
+    value = (
+        of_class[path]
+        if path in of_class
+        else _EXAMPLES[path][units]
+        if path in _EXAMPLES
+        else default_text(field, UNITS[units])
+    )
     needed = path in of_class or (field in INPUTS and (not field.optional or field.name == EMBEDMENT[0]))
     sign = "" if needed else "# "
-    return f"  {sign}{field.key}: {value}".ljust(60) + f"# {field.meaning}"
+    empty = "" if value else "fill in: "
+    return f"  {sign}{field.key}: {value}".ljust(58) + f"  # {empty}{field.meaning}"

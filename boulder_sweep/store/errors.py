@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import shlex
+
 from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError
 from boulder_sweep.locations import Location
 from boulder_sweep.text import printable
 
 _LONGEST = 200
 """Most characters of a stranger's records that a message quotes."""
+
+
+def settings_file(place: object) -> str:
+    """Say that a place in which a result is expected is a settings file, and what to do; empty for another."""
+    if not str(place).lower().endswith((".yaml", ".yml")):
+        return ""
+    return f"{place} is a settings file; run it first: sweep run {shlex.quote(str(place))}"
 
 
 class StoreError(BoulderSweepError):
@@ -21,8 +30,11 @@ class OutputExistsError(StoreError):
 
     def __init__(self, out: Location, rows_done: int, rows: int):
         self.out, self.rows_done, self.rows = out, rows_done, rows
-        state = "is finished" if rows_done == rows else f"holds {rows_done:,} of {rows:,} rows"
-        super().__init__(f"{out} exists and {state}: use --resume to continue it or --overwrite to start again")
+        if rows_done == rows:
+            state = f"is finished: see it with `sweep report {out}`, or"
+        else:
+            state = f"holds {rows_done:,} of {rows:,} rows: use --resume to continue it, or"
+        super().__init__(f"{out} exists and {state} use --overwrite to start again")
 
 
 class SettingsDifferError(StoreError):

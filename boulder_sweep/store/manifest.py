@@ -27,6 +27,7 @@ from boulder_sweep.store.errors import (
     NotASweepError,
     OtherVersionError,
     StoreError,
+    settings_file,
 )
 from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
 from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
@@ -365,12 +366,18 @@ def _opened(folder: Location) -> IO[bytes]:
 def _no_result(folder: Location) -> str:
     """Describe why a path holds no result."""
     if not folder.exists():
-        return f"there is no {folder}; the result of a sweep is a folder, such as m30-sizing.sweep"
+        return f"there is no {folder}; the result of a run is a folder, such as m30-sizing.sweep"
     if folder.is_dir():
         return f"{folder} is not the result of a sweep (no {MANIFEST_NAME})"
+    if advice := settings_file(folder):
+        return advice
     around = folder.resolve().parent
-    inside = f": name the folder it lies in, {around}" if (around / MANIFEST_NAME).exists() else ""
-    return f"{folder} is a file; the result of a sweep is a folder{inside}"
+    advice = "; `sweep export` takes a file of answers, `sweep report` one of `sweep uncertainty`"
+    if (around / MANIFEST_NAME).exists():
+        advice = f": name the folder it lies in, {around}"
+    elif folder.suffix.lower() != ".parquet":
+        advice = ""
+    return f"{folder} is a file; the result of a run is a folder{advice}"
 
 
 def _differing_columns(manifest: Manifest) -> list[str]:

@@ -40,9 +40,9 @@ def verdict_line(trajectory: Trajectory) -> str:
     if reason == "overturns":
         detail = f"past {limit:g}° after {trajectory.motion.outcome.t_limit:.3f} s"
     else:
-        detail = f"{theta:.1f}° of {limit:g}° allowed"
-    words = f", {REASON_WORDS.get(reason, reason)}" if reason else ""
-    return f"{name}: {trajectory.verdict.upper()}{words}, {detail}"
+        detail = "" if math.isnan(theta) else f"{theta:.1f}° of {limit:g}° allowed"
+    words = (trajectory.verdict.upper(), REASON_WORDS.get(reason, reason), detail)
+    return f"{name}: {', '.join(word for word in words if word)}"
 
 
 def terms_line(settings: Mapping[str, Any]) -> str:

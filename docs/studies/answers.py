@@ -9,7 +9,8 @@ from scipy.special import ndtri
 
 from boulder_sweep import load, need, uncertainty
 from boulder_sweep.answers.doubts import doubts
-from boulder_sweep.answers.printing import doubt_lines, need_lines, reserve_lines, uncertainty_lines
+from boulder_sweep.answers.need_printing import need_lines
+from boulder_sweep.answers.printing import doubt_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.published import PUBLISHED
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.crash_tests.tables import Table
@@ -47,12 +48,12 @@ ONE_STIFFNESS = ("soil.subgrade_reaction=63 MN/m^3",)
 
 def need_of_site(root: Path) -> str:
     """Return the depths of the site as a terminal shows them."""
-    return _fenced(need_lines(need(load(root / SITE))))
+    return _fenced(need_lines(need(load(root / SITE)), file=str(SITE)))
 
 
 def lightest_of_grid(root: Path) -> str:
     """Return the lightest boulders of the M30 grid as a terminal shows them, at one stiffness of the soil."""
-    return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass")))
+    return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass"), file=str(GRID)))
 
 
 def capacity_of_site(root: Path) -> str:
@@ -78,7 +79,7 @@ def doubts_of_site(root: Path) -> str:
 def open_readings_words(root: Path) -> str:
     """Return the depths for a chance of 95 % with the readings of the file, and with the readings left open."""
     sweep = load(root / UNCERTAIN)
-    closed = need(sweep, probability=0.95, both_readings=False).frame.passes_at[0]
+    closed = need(sweep, probability=0.95).frame.passes_at[0]
     open_ = need(sweep, probability=0.95, open_readings=True).frame.passes_at[0]
     return (
         f"A chance of 95 % needs {closed:.2f} m by the corrected readings, {open_:.2f} m with the readings left open."
@@ -105,7 +106,7 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
     one_depth = "site.embedment_depth=2 m"
     unfactored = load(root / GRID, [one_depth])
     factored = load(root / GRID, [one_depth, f"partial_factor.friction_angle={factor}"])
-    frame = need(factored, both_readings=False).frame
+    frame = need(factored).frame
     found = (frame.found == "found").to_numpy()
     rows = {name: values[found] for name, values in unfactored.plan.given_rows(0, unfactored.n_designs).items()}
     rows["embedment_depth_m"] = frame.passes_at.to_numpy()[found]

@@ -206,8 +206,8 @@ def limits_words() -> str:
 
 def questions_table(root: Path) -> str:
     """Return how many designs answer a question, as a grid and by search."""
-    plain = need(load(root / "configs" / "site.yaml"), both_readings=False)
-    likely = need(load(root / "configs" / "uncertain_site.yaml"), probability=0.95, both_readings=False)
+    plain = need(load(root / "configs" / "site.yaml"))
+    likely = need(load(root / "configs" / "uncertain_site.yaml"), probability=0.95)
     questions = (
         ("the least depth, for 10⁶ combinations", DEPTHS * 1e6, plain.simulated / len(plain) * 1e6),
         (

@@ -11,7 +11,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.answers.keys import key_of
-from boulder_sweep.answers.lightest import LightestQuestion, _Boulders
+from boulder_sweep.answers.lightest import Boulders, LightestQuestion
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.designs import block_of
@@ -61,7 +61,7 @@ def test_the_lightest_boulder_may_reach_no_deeper_than_it_must_overlap(
 ) -> None:
     """The deepest embedment of a range may leave too little overlap; the best one is just above that limit."""
     usual = {"height": "[1.8, 3.6] m", "site": "embedment_ratio: [0.45, 0.75]"}
-    found = need(site(**(usual | changes)), "mass", both_readings=False)
+    found = need(site(**(usual | changes)), "mass")
     frame = found.frame
     assert frame.least_boulder_mass_kg[0] < lighter_kg
     assert passes(found, frame, frame[DEPTH], DEPTH).all()
@@ -73,7 +73,7 @@ def test_the_deepest_embedment_tried_overlaps_enough_by_the_sums_of_the_verdict(
     sweep = site(height="[1.6, 4.0] m", site="embedment_depth: [0.1, 4.0] m")
     sweep = dataclasses.replace(sweep, criterion=dataclasses.replace(sweep.criterion, min_overlap_m=least))
     asked = LightestQuestion(sweep, key_of("mass"), judges_of(sweep))
-    trial = _Boulders(asked, asked.open.rows(0, 1), "boulder_height_m")
+    trial = Boulders(asked, asked.open.rows(0, 1), "boulder_height_m")
     height = np.arange(1600, 4001) / 1000
     depth = trial.depth(np.zeros(len(height), dtype=int), height, np.ones(len(height)))
     overlap = height - depth - 0.5
@@ -99,7 +99,7 @@ def test_no_boulder_among_many_is_lighter_than_the_lightest() -> None:
     for _ in range(8):
         bounds, changes = random_bounds(rng)
         sweep = site(**changes)
-        answer = need(sweep, "mass", both_readings=False).frame.iloc[0]
+        answer = need(sweep, "mass").frame.iloc[0]
         least = answer.least_boulder_mass_kg
         best = np.array([answer[f"boulder_{side}_m"] for side in bounds], dtype=float)
         ends = np.array(list(bounds.values()))
@@ -149,7 +149,7 @@ def lighter_around(sweep: Sweep, answer: pd.Series, count: int = 2000) -> np.nda
 
 def assert_lightest(sweep: Sweep) -> pd.Series:
     """Assert that no boulder around the lightest is lighter by more than a millimetre of the shortest side."""
-    answer = need(sweep, "mass", both_readings=False).frame.iloc[0]
+    answer = need(sweep, "mass").frame.iloc[0]
     assert answer.found == "found"
     shortest = min(answer.boulder_length_m, answer.boulder_width_m, answer.boulder_height_m)
     lighter = lighter_around(sweep, answer)
@@ -195,7 +195,7 @@ def test_no_boulder_around_the_lightest_of_shallow_ones_is_lighter() -> None:
     rng = np.random.default_rng(3)
     for _ in range(24):
         sweep = site(**shallow_bounds(rng))
-        if need(sweep, "mass", both_readings=False).frame.found[0] == "found":
+        if need(sweep, "mass").frame.found[0] == "found":
             assert_lightest(sweep)
 
 

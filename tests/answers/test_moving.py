@@ -94,7 +94,7 @@ def test_every_named_soil_moves_from_its_own_mean() -> None:
     ],
 )
 def test_the_answer_moves_with_what_is_searched(changes: dict[str, str], asked: dict[str, str], exact: float) -> None:
-    row = need(one(**changes), probability=0.95, both_readings=False, **asked).frame.iloc[0]
+    row = need(one(**changes), probability=0.95, **asked).frame.iloc[0]
     assert row.found in ("found", "not_monotone")
     assert row.passes_at == pytest.approx(exact, abs=0.011 if asked else 0.0021)
     assert row.p_pass == pytest.approx(0.95, abs=0.01)
@@ -103,7 +103,7 @@ def test_the_answer_moves_with_what_is_searched(changes: dict[str, str], asked: 
 def test_the_largest_mean_speed_for_a_probability() -> None:
     text = "{distribution: triangular, low: 12 m/s, mode: 13 m/s, high: 14 m/s}"
     sweep = load_text(FILE.format(speed=text), Path("speed.yaml"))
-    row = need(sweep, most="speed", probability=0.95, both_readings=False).frame.iloc[0]
+    row = need(sweep, most="speed", probability=0.95).frame.iloc[0]
     assert row.found == "found"
     assert row.passes_at == pytest.approx(15.985 - (1.0 - np.sqrt(0.1)), abs=0.02)
 
@@ -141,8 +141,6 @@ def test_what_cannot_move_is_refused(changes: dict[str, str], asked: dict, messa
 
 def test_the_usual_range_is_narrowed_to_the_means_that_are_admitted() -> None:
     sweep = one(friction="{distribution: uniform, low: 10 deg, high: 60 deg}")
-    likely, likelier = (
-        need(sweep, "friction_angle", probability=wanted, both_readings=False).frame.iloc[0] for wanted in (0.45, 0.5)
-    )
+    likely, likelier = (need(sweep, "friction_angle", probability=wanted).frame.iloc[0] for wanted in (0.45, 0.5))
     assert likely.passes_at == pytest.approx(35.175 - 25.0 + 0.45 * 50.0, abs=0.05)
     assert (likelier.found, likelier.fails_at) == ("never", 35.0)

@@ -16,7 +16,7 @@ import boulder_sweep
 import boulder_sweep.answers.need as need_module
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import Need, need
-from boulder_sweep.answers.printing import need_lines
+from boulder_sweep.answers.need_printing import need_lines
 from boulder_sweep.answers.trials import Judges, judges_of
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.judged import PASS
@@ -47,7 +47,7 @@ def certify(found: Need) -> int:
 
 
 def test_brackets_of_random_designs_are_certified() -> None:
-    found = need(random_designs(2000), "embedment_depth", both_readings=False)
+    found = need(random_designs(2000), "embedment_depth")
     assert certify(found) >= 500
     counts = found.counts()
     assert sum(counts.values()) == len(found) == 2000
@@ -58,7 +58,7 @@ def test_brackets_of_random_designs_are_certified() -> None:
 @pytest.mark.parametrize("accuracy", ["fast", "fine"])
 @pytest.mark.parametrize("readings", ["corrected", "as_printed"])
 def test_brackets_hold_for_every_accuracy_and_reading(accuracy: str, readings: str) -> None:
-    assert certify(need(site(readings=readings, accuracy=accuracy), both_readings=False)) >= 4
+    assert certify(need(site(readings=readings, accuracy=accuracy))) >= 4
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_brackets_hold_for_every_accuracy_and_reading(accuracy: str, readings: s
 )
 def test_any_input_may_be_asked_for(question: dict[str, str], column: str) -> None:
     sweep = site(height="3 m", friction="[36, 38, 40, 42] deg", site="embedment_depth: [1.9, 2.0, 2.1, 2.2] m")
-    found = need(sweep, **question, both_readings=False)
+    found = need(sweep, **question)
     sense = "most" if "most" in question else "least"
     assert found.key.answer == f"{sense}_{column}"
     certify(found)
@@ -82,15 +82,15 @@ def test_any_input_may_be_asked_for(question: dict[str, str], column: str) -> No
 
 
 def test_ratio_as_key() -> None:
-    depth = need(site(), "embedment_depth", both_readings=False).frame
-    ratio = need(site(), "embedment_ratio", both_readings=False).frame
+    depth = need(site(), "embedment_depth").frame
+    ratio = need(site(), "embedment_ratio").frame
     assert np.allclose(
         ratio.least_embedment_ratio * ratio.boulder_height_m, depth.least_embedment_depth_m, atol=4e-3, equal_nan=True
     )
 
 
 def test_an_axis_is_the_range() -> None:
-    found = need(site(site="embedment_ratio: [0.6, 0.62]", height="3.4 m"), both_readings=False).frame
+    found = need(site(site="embedment_ratio: [0.6, 0.62]", height="3.4 m")).frame
     assert found[DEPTH].between(0.6 * 3.4 - 1e-3, 0.62 * 3.4 + 1e-3).all()
     assert found.found.tolist() == ["never", "always"]
     assert found.fails_at[0] == pytest.approx(0.62 * 3.4, abs=1e-3)
@@ -98,8 +98,8 @@ def test_an_axis_is_the_range() -> None:
 
 
 def test_margin_needs_more_depth() -> None:
-    plain = need(site(), both_readings=False).frame
-    more = need(site(), margin="25 %", both_readings=False)
+    plain = need(site()).frame
+    more = need(site(), margin="25 %")
     assert (more.frame.least_embedment_depth_m > plain.least_embedment_depth_m)[more.frame.passes_at.notna()].all()
     assert more.frame.margin[more.frame.passes_at.notna()].between(0.25, 0.27).all()
 
@@ -130,7 +130,7 @@ def test_a_margin_is_proved_to_last() -> None:
 
 
 def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
-    found = need(site(height="2.6 m", friction="36 deg"), both_readings=False).frame.iloc[0]
+    found = need(site(height="2.6 m", friction="36 deg")).frame.iloc[0]
     assert found.found == "blocked_by_overlap"
     assert math.isnan(found.passes_at)
     assert found.fails_at < 2.6 - 0.5
@@ -139,7 +139,7 @@ def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
 
 def test_what_is_not_monotone_is_said_with_all_that_passes() -> None:
     """Hardly buried, a boulder may slide less than is allowed; deeper it turns over; deeper still it is held."""
-    found = need(random_designs(300), between=("0.05 m", "1.2 m"), both_readings=False)
+    found = need(random_designs(300), between=("0.05 m", "1.2 m"))
     frame = found.frame[found.frame.found == "not_monotone"]
     assert len(frame) >= 10
     rows, inside, outside = [], [], []
@@ -164,11 +164,11 @@ def test_answers_do_not_depend_on_the_threads() -> None:
 
 def test_rows_do_not_depend_on_their_neighbours() -> None:
     sweep = random_designs(40)
-    whole = need(sweep, both_readings=False).frame
+    whole = need(sweep).frame
     assert sweep.table is not None
     for row in (3, 17):
         alone = DesignList("one.csv", {name: values[row : row + 1] for name, values in sweep.table.columns.items()})
-        frame = need(Sweep("one", None, (), sweep.constants, alone), both_readings=False).frame
+        frame = need(Sweep("one", None, (), sweep.constants, alone)).frame
         for name in ("found", "passes_at", "max_rotation_deg"):
             pd.testing.assert_series_equal(
                 frame[name].astype(str), whole[name][row : row + 1].astype(str).reset_index(drop=True)
@@ -176,8 +176,9 @@ def test_rows_do_not_depend_on_their_neighbours() -> None:
 
 
 def test_both_readings() -> None:
-    found = need(site())
-    printed = need(site(readings="as_printed"), both_readings=False)
+    assert need(site()).others == []
+    found = need(site(), both_readings=True)
+    printed = need(site(readings="as_printed"))
     assert found.others == ["as_printed"]
     pd.testing.assert_series_equal(
         found.frame.least_embedment_depth_m_as_printed, printed.frame.least_embedment_depth_m, check_names=False
@@ -195,9 +196,9 @@ def test_only_what_is_drawn_for_other_readings_ends_at_the_horizon(monkeypatch: 
         return judges
 
     monkeypatch.setattr(need_module, "judges_of", noted)
-    need(site())
+    need(site(), both_readings=True)
     sweep = load_text(ONE_UNCERTAIN, Path("one.yaml"))
-    need(sweep, probability=0.9)
+    need(sweep, probability=0.9, both_readings=True)
     assert asked == [("corrected", 10.0), ("as_printed", 10.0), ("corrected", 10.0), ("as_printed", 0.0)]
 
 
@@ -267,14 +268,14 @@ def test_an_axis_between_two_multiples_is_refused_and_searched_with_a_finer_tole
     sweep = site(height="3 m", friction="40 deg", site="embedment_depth: [1.9491, 1.9499] m")
     with pytest.raises(QuestionError, match="holds no multiple"):
         need(sweep)
-    assert need(sweep, tolerance="0.1 mm", both_readings=False).frame.passes_at[0] == 1.9491
+    assert need(sweep, tolerance="0.1 mm").frame.passes_at[0] == 1.9491
 
 
 @pytest.mark.parametrize("question", [{}, {"least": "embedment_ratio"}, {"tolerance": "1 in"}])
 def test_the_end_of_the_range_tells_what_is_blocked_and_not_the_last_multiple_before_it(question: dict) -> None:
-    found = need(site(height="2.6 m"), both_readings=False, **question).frame
+    found = need(site(height="2.6 m"), **question).frame
     assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap"]
-    assert need(site(height="2.6 m"), between=("1.5 m", "1.8 m"), both_readings=False).frame.found[0] == "never"
+    assert need(site(height="2.6 m"), between=("1.5 m", "1.8 m")).frame.found[0] == "never"
 
 
 @pytest.mark.parametrize("question", [{"between": ("1 m", "1.9 m")}, {"most": "impact_height"}])
@@ -284,7 +285,7 @@ def test_one_height_tells_what_is_blocked_from_what_never_passes(question: dict,
     heights = np.concatenate([height - np.arange(400, 0, -8) * 1e-3, height + np.array([-4e-4, 0.0, 4e-4, 8e-3])])
     sweep = site(height=str([float(own) for own in heights.round(4)]), friction="30 deg", site="embedment_depth: 1.9 m")
     sweep = dataclasses.replace(sweep, criterion=dataclasses.replace(sweep.criterion, min_overlap_m=least))
-    found = need(sweep, **question, both_readings=False).frame.found
+    found = need(sweep, **question).frame.found
     blocked = heights < height - 1e-9 if least else heights <= height + 1e-9  # without overlap the truck passes over
     assert found.tolist() == np.where(blocked, "blocked_by_overlap", "never").tolist()
 
@@ -295,18 +296,18 @@ def test_a_curve_of_the_chart_holds_one_ratio_of_embedment(tmp_path: Path, monke
     monkeypatch.setattr("boulder_sweep.views.design_chart._curve", lambda *words: curves.append(words[2]))
     monkeypatch.setattr("matplotlib.axes.Axes.legend", lambda *_, **__: None)  # of no curve
     sweep = site(height="[3, 3.2, 3.4] m", friction="40 deg", site="embedment_ratio: [0.6, 0.65, 0.7]")
-    need(sweep, most="speed", both_readings=False).plot(tmp_path / "chart.png")
+    need(sweep, most="speed").plot(tmp_path / "chart.png")
     assert [rows.boulder_height_m.tolist() for rows in curves] == [[3.0, 3.2, 3.4]]
     assert (curves[0].embedment_depth_m / curves[0].boulder_height_m).tolist() == pytest.approx([0.65] * 3)
 
 
 def test_ranges_that_are_narrow_by_themselves_are_searched() -> None:
     """Ends of half a millimetre where the truck goes over, no range at all, and one value that is not round."""
-    found = need(site(height="[0.7, 0.7696, 3] m", friction="40 deg"), both_readings=False).frame
+    found = need(site(height="[0.7, 0.7696, 3] m", friction="40 deg")).frame
     assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap", "found"]
-    one = need(site(height="2.999 m", friction="40 deg", site="embedment_ratio: [0.7]"), both_readings=False).frame
+    one = need(site(height="2.999 m", friction="40 deg", site="embedment_ratio: [0.7]")).frame
     assert one.found.tolist() == ["always"]
-    coarse = need(site(height="[0.7, 3] m", friction="40 deg"), tolerance="5 cm", both_readings=False).frame
+    coarse = need(site(height="[0.7, 3] m", friction="40 deg"), tolerance="5 cm").frame
     assert coarse.found.tolist() == ["blocked_by_overlap", "found"]
 
 
@@ -322,9 +323,7 @@ def test_distributions_are_refused() -> None:
 
 
 def test_tolerance_makes_the_lattice() -> None:
-    assert (
-        need(site(), tolerance="5 cm", both_readings=False).frame.passes_at.dropna().mul(20).mod(1).abs().max() < 1e-9
-    )
+    assert need(site(), tolerance="5 cm").frame.passes_at.dropna().mul(20).mod(1).abs().max() < 1e-9
     assert key_of("embedment_depth").values(np.array([1234]))[0] == 1.234
 
 
@@ -345,7 +344,7 @@ def test_table_has_units_and_settings(tmp_path: Path) -> None:
 
 
 def test_chart_is_drawn(tmp_path: Path) -> None:
-    need(site()).plot(tmp_path / "chart.png")
+    need(site(), both_readings=True).plot(tmp_path / "chart.png")
     need(site(), "mass").plot(tmp_path / "mass.png")
     assert (tmp_path / "chart.png").stat().st_size > 10_000
     with pytest.raises(PictureError, match="no curve"):

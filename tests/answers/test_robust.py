@@ -42,7 +42,7 @@ def test_the_least_robust_depth_is_robust_and_the_next_one_is_not() -> None:
 
 def test_robust_costs_depth_and_answers_are_graded_without_asking() -> None:
     sweep = site(height="[3, 3.4] m")
-    least, robust = (need(sweep, robust=asked, both_readings=False) for asked in (False, True))
+    least, robust = (need(sweep, robust=asked) for asked in (False, True))
     depths = [np.array(found.arrow["passes_at"].to_pylist(), dtype=float) for found in (least, robust)]
     both = np.isfinite(depths[0]) & np.isfinite(depths[1])
     assert (depths[1][both] > depths[0][both]).all()
@@ -57,7 +57,7 @@ def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
     wet = replace(wet, model=replace(wet.model, water_table_m=0.5))
     with pytest.raises(QuestionError, match="dry, level, uniform soil"):
         need(wet, robust=True)
-    assert set(need(wet, both_readings=False).arrow["robustness"].to_pylist()) <= {"open", None}
+    assert set(need(wet).arrow["robustness"].to_pylist()) <= {"open", None}
     uncertain = site(friction="{mean: 38 deg, sd: 2 deg}")
     with pytest.raises(QuestionError, match="cannot be used together"):
         need(uncertain, robust=True, probability=0.95)

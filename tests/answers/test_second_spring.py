@@ -3,7 +3,7 @@
 import pytest
 
 from boulder_sweep import load, need, uncertainty
-from boulder_sweep.answers.printing import need_lines
+from boulder_sweep.answers.need_printing import need_lines
 from boulder_sweep.errors import QuestionError
 
 STAGES = "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.5 m, stiffness: %s}]"
@@ -28,7 +28,7 @@ def test_it_may_be_uncertain_and_what_decides() -> None:
 
 def test_it_is_shown_where_it_varies() -> None:
     front = ["vehicle.second_spring=[4000 kN/m, 20000 kN/m]", "vehicle.second_spring_from=[0.2, 0.3] m"]
-    lines = need_lines(need(load("configs/rwg.yaml", front), both_readings=False))
+    lines = need_lines(need(load("configs/rwg.yaml", front)))
     assert lines[0].split()[:4] == ["spring", "2", "beyond", "depth"]
     shown = [line.split()[:2] for line in lines[3:7]]
     assert shown == [["4e+06", "0.2"], ["4e+06", "0.3"], ["2e+07", "0.2"], ["2e+07", "0.3"]]
@@ -44,7 +44,7 @@ def test_it_is_shown_where_it_varies() -> None:
     ],
 )
 def test_it_is_asked_for_where_the_front_stiffens(question: dict[str, str], low: float, high: float) -> None:
-    found = need(load("configs/rwg.yaml", [STAGES % "9 MN/m"]), both_readings=False, **question)
+    found = need(load("configs/rwg.yaml", [STAGES % "9 MN/m"]), **question)
     row = found.frame.iloc[0]
     assert row.found != "blocked_by_overlap"
     assert low <= row[found.key.name] <= high

@@ -106,7 +106,7 @@ vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN
 
 def test_a_probability_is_asked_for_in_every_named_soil() -> None:
     sweep = load_text(NAMED, Path("named.yaml"))
-    frame = boulder_sweep.need(sweep, probability=0.9, both_readings=False).frame
+    frame = boulder_sweep.need(sweep, probability=0.9).frame
     depth = frame.least_embedment_depth_m.to_numpy().reshape(2, 3)
     assert (np.diff(depth[1]) > 0.0).all(), "the less is known, the deeper"
 

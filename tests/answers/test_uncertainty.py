@@ -25,7 +25,7 @@ UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{
 
 def test_chance_follows_from_the_least_friction_angle() -> None:
     """With one uncertain input the design passes from its least friction angle on, and the chance is known."""
-    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle", both_readings=False).frame.passes_at[0]
+    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
     exact = ndtr((38.0 - least) / 3.0)
     found = uncertainty(site(**UNCERTAIN), half_width=0.002, confidence=0.99).frame.iloc[0]
     assert found.p_pass_low - 5e-4 <= exact <= found.p_pass_high + 5e-4  # 0.01 deg of the lattice is 0.1 %
@@ -34,7 +34,7 @@ def test_chance_follows_from_the_least_friction_angle() -> None:
 
 
 def test_rare_failures_by_subset_simulation() -> None:
-    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle", both_readings=False).frame.passes_at[0]
+    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
     spread = (43.0 - least) / -ndtri(1e-6)
     sweep = site(**UNCERTAIN | {"friction": f"{{mean: 43 deg, sd: {spread:.6f} deg}}"})
     found = uncertainty(sweep, rare=True).frame.iloc[0]
@@ -44,7 +44,7 @@ def test_rare_failures_by_subset_simulation() -> None:
 
 
 def test_rare_passes_by_subset_simulation() -> None:
-    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle", both_readings=False).frame.passes_at[0]
+    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
     spread = (least - 33.0) / -ndtri(1e-5)
     sweep = site(**UNCERTAIN | {"friction": f"{{mean: 33 deg, sd: {spread:.6f} deg}}"})
     found = uncertainty(sweep, rare=True).frame.iloc[0]
@@ -81,9 +81,7 @@ def test_failures_by_too_little_overlap(friction: str, depth: float, sd: float, 
 def test_failures_by_too_much_crush() -> None:
     text = SITE.replace("speed: 30 mph", "speed: {speed}, bed_offset: 0.5 m")
     plain = DEFAULTS | UNCERTAIN | {"friction": "46 deg"}
-    fast = need(
-        load_text(text.format(**plain, speed="9 m/s"), Path("site.yaml")), most="speed", both_readings=False
-    ).frame.passes_at[0]
+    fast = need(load_text(text.format(**plain, speed="9 m/s"), Path("site.yaml")), most="speed").frame.passes_at[0]
     uncertain = text.format(**plain, speed=f"{{mean: {fast - 2.0} m/s, sd: 0.5 m/s}}")
     found = uncertainty(load_text(uncertain, Path("site.yaml")), rare=True).frame.iloc[0]
     assert found.p_fail_by == "subset"
@@ -152,13 +150,13 @@ def test_indices_name_what_decides() -> None:
 
 def test_depth_for_a_probability() -> None:
     sweep = site(**UNCERTAIN)
-    row = need(sweep, "embedment_depth", probability="95 %", both_readings=False).frame.iloc[0]
+    row = need(sweep, "embedment_depth", probability="95 %").frame.iloc[0]
     assert row.found == "found"
     assert row.p_pass >= 0.95 > row.p_pass_low
     depth = f"embedment_depth: {row.passes_at} m"
     there = uncertainty(site(**UNCERTAIN | {"site": depth}), half_width=0.003, seed=7).frame.iloc[0]
     assert there.p_pass == pytest.approx(0.95, abs=0.006)
-    certain = need(site(**UNCERTAIN | {"friction": "38 deg"}), both_readings=False).frame.passes_at[0]
+    certain = need(site(**UNCERTAIN | {"friction": "38 deg"})).frame.passes_at[0]
     assert row.passes_at > certain
 
 

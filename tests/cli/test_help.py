@@ -51,6 +51,24 @@ def test_help_names_every_command_and_the_exit_codes(sweep):
         assert meaning in out
 
 
+def test_help_groups_the_commands(sweep):
+    out = sweep("--help")[1]
+    headings = re.findall(r"^(\w+):$", out, re.MULTILINE)
+    assert headings == ["Options", "Ask", "Tables", "Share", "Model"]
+    ask = out[out.index("Ask:") : out.index("Tables:")]
+    assert re.findall(r"^  (\S+)", ask, re.MULTILINE) == [
+        "new",
+        "check",
+        "need",
+        "uncertainty",
+        "capacity",
+        "simulate",
+        "explore",
+    ]
+    assert "which" not in re.findall(r"^  (\S+)", out, re.MULTILINE)
+    assert "..." not in out.replace("[ARGS]...", "")
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself_by_example(sweep, command):
     code, out, _ = sweep(command, "--help")

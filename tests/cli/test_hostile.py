@@ -54,7 +54,7 @@ def test_from_the_file_to_every_place_that_shows_it(sweep, hostile):
         ["status", f"{folder}/out.sweep", "--verify"],
         ["explain", f"{folder}/out.sweep", "0"],
         ["capacity", f"{folder}/grid.yaml"],
-        ["need", f"{folder}/grid.yaml", "--own-readings"],
+        ["need", f"{folder}/grid.yaml"],
         ["plot", f"{folder}/out.sweep", "-o", f"{folder}/map.svg"],
         ["simulate", f"{folder}/grid.yaml", "--plot", f"{folder}/one.svg"],
         ["report", f"{folder}/out.sweep", "-o", f"{folder}/page.html"],

@@ -22,7 +22,7 @@ def test_the_file_is_valid_without_notes(tmp_path, vehicle, units):
     sweep = load(path)
     assert sweep.notes == ()
     assert sweep.n_designs > 100
-    assert sweep.constants["impact_speed_m_s"] == pytest.approx(int(vehicle[1:]) * 0.44704)
+    assert sweep.constants["impact_speed_m_s"] == pytest.approx(int(vehicle[1:]) * 0.44704, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_other_vehicles_have_mass_and_speed_and_ask_for_what_is_not_published(tm
     sweep = load(path, ["vehicle.spring=3 MN/m", "vehicle.damper=1 MN*s/m", "vehicle.bed_offset=1 m"])
     code, mph = CLASSES[vehicle]
     assert vehicle == f"{code}{mph}"
-    assert sweep.constants["impact_speed_m_s"] == pytest.approx(mph * 0.44704)
+    assert sweep.constants["impact_speed_m_s"] == pytest.approx(mph * 0.44704, rel=1e-4)
     masses_kg = {"SC": 1100, "FS": 2100, "PU": 2300, "C7": 7200, "H": 29500}
     assert sweep.constants["vehicle_mass_kg"] == pytest.approx(masses_kg[code], rel=3e-3)
 
@@ -139,17 +139,73 @@ def test_the_end_of_input_interrupts_it(sweep, tmp_path, monkeypatch, end):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_it_says_what_to_fill_in_for_a_vehicle_without_published_values(sweep, tmp_path, monkeypatch):
+def test_options_take_the_place_of_the_questions(sweep, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    answers = iter(["harbour", "H50", "si"])
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
-    monkeypatch.setattr("click.prompt", lambda text, **_: next(answers))
-    code, out, err = sweep("new", "h.yaml")
+    monkeypatch.setattr("click.prompt", lambda *_, **__: pytest.fail("asked"))
+    code, out, err = sweep("new", "--class", "m40", "--units", "us", "-o", "site.yaml")
     assert (code, err) == (0, "")
-    assert out.startswith(
-        "h.yaml: fill in vehicle.spring, vehicle.damper, vehicle.bed_offset;\nnone is published for H50"
-    )
-    assert "  mass: 29500 kg " in (tmp_path / "h.yaml").read_text()
+    assert re.fullmatch(r"site.yaml: \d+ designs. Edit it, then: sweep need site.yaml\n", out)
+    text = (tmp_path / "site.yaml").read_text()
+    assert text.splitlines()[0].startswith("# site: ")
+    assert "  speed: 40 mph " in text
+    assert sweep("new", "--units", "us", "m30.yaml")[0] == 0
+    assert load("m30.yaml").constants["impact_speed_m_s"] == pytest.approx(13.4112)
+
+
+def test_a_class_or_a_file_that_there_is_not(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = sweep("new", "--class", "H55")
+    assert code == 2
+    assert "--class H55 is not a class of ASTM F2656; there are M30, M40, M50, SC30" in err
+    code, _, err = sweep("new", "a.yaml", "-o", "b.yaml")
+    assert code == 2
+    assert "two files are named, a.yaml and b.yaml; name one" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("vehicle", ["M40", "H50"])
+@pytest.mark.parametrize("units", UNITS)
+def test_values_are_in_the_units_asked_for(vehicle, units):
+    own = {
+        "si": {"m", "kg", "kg/m^3", "MN/m^3", "kN/m", "kN*s/m", "kPa", "km/h"},
+        "us": {"ft", "in", "lb", "pcf", "pci", "lb/in", "lb*s/in", "psf", "mph"},
+    }[units] | {"deg", "ms", "s", ""}
+    for line in starter("new", vehicle, units).splitlines():
+        if not (entry := re.match(r"^  (?:# )?[a-z_]+: *(.*?)  +# ", line)):
+            continue
+        found = re.findall(r"[\d.]+(?: ([a-zA-Z][a-zA-Z0-9/*^]*))?", entry[1])
+        assert set(found) <= own, line
+
+
+def test_a_default_in_us_units_is_the_default(tmp_path):
+    path, bare = tmp_path / "new.yaml", tmp_path / "bare.yaml"
+    text = starter("new", units="us")
+    bare.write_text(text)
+    path.write_text(re.sub(r"# (bumper_height|hood_height|bed_offset|min_overlap)", r"\1", text))
+    given, default = load(path), load(bare)
+    for name in ("bumper_height_m", "hood_height_m", "bed_offset_m"):
+        assert given.constants[name] == pytest.approx(default.constants[name], abs=2e-5)
+    assert given.criterion.min_overlap_m == pytest.approx(default.criterion.min_overlap_m, abs=2e-5)
+
+
+@pytest.mark.parametrize(("vehicle", "mass"), [("H50", "65000 lb"), ("SC30", "2430 lb")])
+def test_it_says_what_to_measure_for_a_vehicle_without_published_values(sweep, tmp_path, monkeypatch, vehicle, mass):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = sweep("new", "--class", vehicle, "--units", "us", "h.yaml")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == f"h.yaml: fill in three entries; none is published for {vehicle}."
+    assert "  vehicle.spring, vehicle.damper: from a crash against a rigid wall. Measure the" in lines
+    assert f"    sweep fit-vehicle PULSE.csv --mass '{mass}'" in lines
+    assert lines[-1] == "Then: sweep check h.yaml"
+    assert all(len(line) <= 80 for line in lines)
+    text = (tmp_path / "h.yaml").read_text()
+    for name in ("spring", "damper", "bed_offset"):
+        assert re.search(rf"^  {name}: +# fill in: ", text, re.MULTILINE)
+    code, _, err = sweep("check", "h.yaml")
+    assert code == 2
+    assert "vehicle.bed_offset: is empty; a length is needed, such as 2.9 m" in err
 
 
 def _completed(**variables):

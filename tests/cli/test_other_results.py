@@ -79,9 +79,9 @@ def test_a_row_whose_settings_are_of_another_version(sweep, result, part):
 @pytest.mark.parametrize(
     ("place", "words"),
     [
-        ("nowhere.sweep", "there is no nowhere.sweep; the result of a sweep is a folder"),
+        ("nowhere.sweep", "there is no nowhere.sweep; the result of a run is a folder"),
         ("nowhere/at/all", "there is no nowhere/at/all"),
-        ("grid.yaml", "grid.yaml is a file; the result of a sweep is a folder\n"),
+        ("grid.yaml", "grid.yaml is a settings file; run it first: sweep run grid.yaml\n"),
         ("grid.yaml/x", "there is no grid.yaml/x"),
         (".", "is not the result of a sweep"),
     ],
@@ -115,4 +115,34 @@ def test_a_file_of_a_result_in_place_of_its_folder(sweep, result):
     for words in (["status", part], ["explain", part, "3"], ["plot", part]):
         code, out, err = sweep(*words)
         assert (code, out) == (2, "")
-        assert f"is a file; the result of a sweep is a folder: name the folder it lies in, {result}" in err
+        assert f"is a file; the result of a run is a folder: name the folder it lies in, {result}" in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["report"], ["plot"], ["export", "-o", "x.xlsx"], ["compare", RESULT], ["status"], ["explain", "0"]],
+    ids=lambda words: words[0],
+)
+def test_a_settings_file_in_place_of_a_result(sweep, grid, words):
+    name = grid.rename("my grid.yaml").name
+    given = {"export": [name, *words[1:]], "compare": [name, "x"], "explain": [name, "0"]}
+    code, out, err = sweep(words[0], *given.get(words[0], [name]))
+    assert (code, out) == (2, "")
+    assert err == "error: my grid.yaml is a settings file; run it first: sweep run 'my grid.yaml'\n"
+
+
+def test_a_file_of_answers_in_place_of_a_result(sweep, possible_grid):
+    assert sweep("need", possible_grid, "-q", "-o", "depths.parquet", "--tolerance", "1 cm")[0] == 0
+    for words in (["status"], ["plot"], ["explain", "0"]):
+        code, out, err = sweep(words[0], "depths.parquet", *words[1:])
+        assert (code, out) == (2, "")
+        assert err == (
+            "error: depths.parquet is a file; the result of a run is a folder; `sweep export` takes a file of answers, "
+            "`sweep report` one of `sweep uncertainty`\n"
+        )
+    code, _, err = sweep("report", "depths.parquet")
+    assert code == 2
+    assert err == (
+        "error: depths.parquet is neither the folder of a run nor a file that `sweep uncertainty` wrote; `sweep "
+        "export` takes it\n"
+    )

@@ -135,8 +135,32 @@ def test_a_result_is_exported_and_compared(sweep, possible_grid):
     )
     code, out, err = sweep("compare", "small-grid.sweep", "small-grid.sweep")
     assert (code, err) == (0, "")
-    assert out.startswith("18 designs in both; 0 only before, 0 only after\n0 verdicts changed\n")
+    assert out.startswith("18 designs in both; 0 only before, 0 only after\n0 of ")
+    assert "\n0 verdicts changed\n" in out
+    assert "differs" not in out
     code, out, _ = sweep("compare", "small-grid.sweep", "fast.sweep", "--json")
     found = json.loads(out)
-    assert (code, found["matched"], found["only_before"], found["only_after"]) == (0, 0, 18, 18)
+    assert (code, found["matched"], found["only_before"], found["only_after"]) == (0, 18, 0, 0)
+    assert found["differ"] == ["impact_speed_m_s"]
     assert any("impact_speed_m_s" in line for line in found["changed"])
+
+
+def test_the_passes_that_are_lost_are_counted_and_listed_with_their_inputs(sweep, grid):
+    site = Path(__file__).parents[2] / "configs" / "site.yaml"
+    sweep("run", site, "-q", "-o", "a.sweep", "--set", "soil.friction_angle=40 deg")
+    sweep("run", site, "-q", "-o", "b.sweep", "--set", "soil.friction_angle=34 deg")
+    code, out, err = sweep("compare", "a.sweep", "b.sweep", "--units", "us")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert "differs  friction angle φ′: 40 -> 34 deg" in lines
+    assert "2 of 2 passes in a.sweep do not pass in b.sweep" in lines
+    at = lines.index("  design 5 -> 5: pass -> fail, 17.13 -> 20 deg")
+    assert lines[at + 1] == "    height 11.811 ft"
+
+
+def test_results_with_nothing_in_common_are_not_compared(sweep, possible_grid):
+    sweep("run", possible_grid, "-q", "-o", "a.sweep")
+    sweep("run", possible_grid, "-q", "-o", "b.sweep", "--set", "boulder.height=[1.7, 2.7] m")
+    code, out, err = sweep("compare", "a.sweep", "b.sweep")
+    assert (code, out) == (2, "")
+    assert err.startswith("error: a.sweep and b.sweep have no design in common: boulder height has 3 values")

@@ -106,8 +106,11 @@ def test_an_output_that_exists(sweep, possible_grid):
     assert sweep("run", possible_grid)[0] == 0
     code, out, err = sweep("run", possible_grid)
     assert (code, out) == (4, "")
-    assert "--resume" in err
-    assert "--overwrite" in err
+    assert err.endswith(
+        "error: small-grid.sweep exists and is finished: see it with `sweep report small-grid.sweep`, or use "
+        "--overwrite to start again\n"
+    )
+    assert "--resume" not in err
     assert sweep("run", possible_grid, "--resume")[0] == 0
     assert sweep("run", possible_grid, "--overwrite")[0] == 0
     code, _, err = sweep("run", possible_grid, "--resume", "--set", "vehicle.speed=20 mph")

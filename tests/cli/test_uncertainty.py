@@ -33,7 +33,7 @@ def test_json_and_files(sweep, tmp_path):
 
 
 def test_need_with_a_probability(sweep):
-    code, out, _ = sweep("need", CONFIG, "--probability", "0.9", "--own-readings", "-q")
+    code, out, _ = sweep("need", CONFIG, "--probability", "0.9", "-q")
     assert code == 0
     assert "P(pass)" in out.splitlines()[0]
     code, _, err = sweep("need", CONFIG)

@@ -37,7 +37,7 @@ def test_a_url_with_credentials_is_refused_before_anything_is_done(sweep, possib
 
 
 def test_answers_are_written_to_a_url(sweep, possible_grid):
-    need = ("need", possible_grid, "-q", "--own-readings", "-o")
+    need = ("need", possible_grid, "-q", "-o")
     assert sweep(*need, "memory://answers/least.parquet")[0] == 0
     assert sweep(*need, "least.parquet")[0] == 0
     assert location_of("memory://answers/least.parquet").read_bytes() == Path("least.parquet").read_bytes()

@@ -49,7 +49,7 @@ def compiled():
     [
         ("run", SITE, *ONE),
         ("simulate", SITE, *ONE),
-        ("need", SITE, *ONE, "--own-readings"),
+        ("need", SITE, *ONE),
         ("capacity", SITE, *ONE),
         ("uncertainty", SITE, *ONE, "--half-width", "0.2", "--set", "vehicle.speed={mean: 30 mph, cov: 5 %}"),
         ("tradeoff", SITE, *ONE, "--seconds", "0"),

@@ -88,7 +88,7 @@ def test_no_design_may_be_safe(tmp_path: Path) -> None:
 
 
 def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
-    boulder_sweep.need(site(height="3.4 m"), both_readings=False).write(tmp_path / "need.parquet")
+    boulder_sweep.need(site(height="3.4 m")).write(tmp_path / "need.parquet")
     with pytest.raises(ReportError, match="nor a file that `sweep uncertainty` wrote"):
         write_report(tmp_path / "need.parquet", tmp_path / "page.html")
     (tmp_path / "text.parquet").write_text("text")

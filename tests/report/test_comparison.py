@@ -1,10 +1,12 @@
 """Two results laid side by side: designs matched by inputs, verdicts that changed, what differs."""
 
+import numpy as np
 import pytest
 
 import boulder_sweep
+from boulder_sweep.errors import ReportError
 from boulder_sweep.report.comparison import compare
-from tests.report.conftest import GRID
+from tests.report.conftest import GRID, SETS
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +63,81 @@ def test_least_mass_and_depth_before_and_after(result, slower):
         mass = table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")
         assert found.least["mass_kg"][place] == mass.min()
         assert found.least["depth_m"][place] == table.embedment_depth_m.min()
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Return a function that runs a file with changes and returns the folder."""
+
+    def made(text, *overrides):
+        out = tmp_path / f"out-{len(list(tmp_path.iterdir()))}"
+        file = tmp_path / f"{out.name}.yaml"
+        file.write_text(text)
+        boulder_sweep.run(boulder_sweep.load(file, overrides), out)
+        return out
+
+    return made
+
+
+def test_designs_of_two_soils_are_paired_by_what_they_share(result, made):
+    weaker = made(GRID, "soil.friction_angle=[34, 38] deg")
+    found = compare(result, weaker)
+    assert (len(found.matched), found.only_before, found.only_after) == (252, 0, 0)
+    assert found.differ == ("friction_angle_deg",)
+    assert found.values("friction_angle_deg") == [(36.0, 34.0), (40.0, 38.0)]
+    assert set(found.varying) == {"boulder_width_m", "boulder_height_m", "embedment_ratio", "friction_angle_deg"}
+    before, after = boulder_sweep.read(result), boulder_sweep.read(weaker)
+    assert found.turned()["passes"] == (before.verdict == "pass").sum()
+    lost = (before.verdict == "pass") & (after.verdict != "pass")  # both grids have one order
+    assert found.turned()["passes_lost"] == lost.sum() > 5
+    assert found.turned()["passes_gained"] == 0
+    assert found.to_dict()["differ"] == ["friction_angle_deg"]
+    for row in found.matched.itertuples():
+        assert row.friction_angle_deg_before == row.friction_angle_deg_after + 2.0
+        assert after.boulder_height_m[row.design_id_after] == row.boulder_height_m
+
+
+def test_depths_given_as_ratios_are_paired_by_their_ratio(result, made):
+    higher = made(GRID, "boulder.height={from: 2.05 m, to: 3.65 m, count: 9}")
+    found = compare(result, higher)
+    assert found.differ == ("boulder_height_m",)
+    assert len(found.matched) == 252
+    m = found.matched
+    for when in ("before", "after"):
+        assert np.allclose(
+            m[f"embedment_depth_m_{when}"] / m[f"boulder_height_m_{when}"], m.embedment_ratio, rtol=1e-11
+        )
+
+
+def test_named_soils_are_paired_as_wholes(made):
+    one, other = made(SETS), made(SETS.replace("32 deg", "31 deg").replace("42 deg", "41 deg"))
+    found = compare(one, other)
+    assert (len(found.matched), found.differ) == (12, ("friction_angle_deg",))
+    assert found.values("friction_angle_deg") == [(32.0, 31.0), (42.0, 41.0)]
+    assert set(found.matched.soil_density_kg_m3) == {1700.0, 1900.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (
+            "soil.friction_angle=[30, 34, 38] deg",
+            "friction angle φ′ has 2 values (36 to 40 deg) in one and 3 values (30 to 38 deg) in the other. Values "
+            "that differ are paired in order, so give both as many of them, or one value in common",
+        ),
+        ("boulder.width=1.2 m", "boulder width has 2 values (1.5 to 1.9 m) in one and 1 value (1.2 to 1.2 m) in the"),
+    ],
+)
+def test_nothing_in_common_is_refused_with_a_way_out(result, made, change, why):
+    with pytest.raises(ReportError, match="have no design in common: ") as refused:
+        compare(result, made(GRID, change))
+    assert why in str(refused.value)
+
+
+def test_values_in_common_and_no_combination(made):
+    one, other = (
+        made(SETS),
+        made(SETS.replace("32 deg", "0 deg").replace("42 deg", "32 deg").replace("0 deg", "42 deg")),
+    )
+    with pytest.raises(ReportError, match="every single value occurs in both, but no combination does"):
+        compare(one, other)

@@ -5,6 +5,7 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import openpyxl
@@ -13,13 +14,15 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
+from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import export as module
 from boulder_sweep.report import write_explorer, write_report, writing
 from boulder_sweep.report.export import export
 from boulder_sweep.report.page import ASSETS, SCRIPTS
-from boulder_sweep.settings.shown_units import shown_column
+from boulder_sweep.settings import load_text
+from boulder_sweep.settings.shown_units import shown_column, shown_settings, shown_unit
 from boulder_sweep.settings.units import factor
 
 US = {
@@ -80,6 +83,70 @@ def test_a_spreadsheet_tells_units_settings_and_that_it_is_no_test(result, tmp_p
     assert any(line[0] == "hash of the kernels" for line in lines)
 
 
+@pytest.mark.parametrize("units", ["si", "us"])
+def test_a_spreadsheet_is_ready_to_be_read(result, tmp_path, units):
+    rows = export(result, tmp_path / "designs.xlsx", units=units)
+    sheet = openpyxl.load_workbook(tmp_path / "designs.xlsx")["designs"]
+    assert sheet.freeze_panes == "B2"
+    assert sheet.auto_filter.ref == f"A1:{openpyxl.utils.get_column_letter(sheet.max_column)}{rows + 1}"
+    formats = {}
+    for cell in sheet[1]:
+        assert cell.font.bold
+        assert sheet.column_dimensions[cell.column_letter].width >= len(cell.value) + 2, "and an arrow of the filter"
+        below = [one for one in sheet[cell.column_letter][1:] if one.value is not None]
+        formats[cell.value] = {one.number_format for one in below}
+    assert formats["design_id"] == {"General"}
+    assert formats["verdict"] == {"General"}
+    expected = {
+        "si": {"boulder_length_m": "0.000", "vehicle_mass_kg": "#,##0", "peak_force_kN": "#,##0.0"},
+        "us": {"boulder_length_ft": "0.000", "impact_speed_mph": "0.0", "soil_density_pcf": "0.0"},
+    }[units]
+    for name, format_ in {**expected, "friction_angle_deg": "0.00", "rotation_error_deg": "0.0E+00"}.items():
+        assert formats[name] == {format_}
+
+
+def test_every_unit_of_a_table_has_a_number_format():
+    for spec in COLUMNS:
+        for units in ("si", "us"):
+            unit = shown_column(spec.name, units).unit
+            assert unit in module.NUMBER_FORMATS or not unit or spec.type in ("dictionary", "int64"), spec.name
+
+
+def test_settings_are_in_the_units_asked_for(result, tmp_path):
+    export(result, tmp_path / "us.xlsx", units="us")
+    texts = [row[0] for row in openpyxl.load_workbook(tmp_path / "us.xlsx")["about"].iter_rows(values_only=True)]
+    assert f"  boulder_length_ft: {1.65 / 0.3048:.12g}" in texts
+    assert f"  boulder_width_ft: {1.5 / 0.3048:.12g}, {1.9 / 0.3048:.12g}" in texts
+    assert "  vehicle_mass_lb: 15000" in texts
+    assert "  impact_speed_mph: 30" in texts
+    assert f"  min_overlap_ft: {0.25 / 0.3048:.12g}" in texts
+    assert "  horizon_s: 1" in texts
+    assert not [text for text in texts if text and text.split(":")[0].endswith(("_m", "_kg", "_m_s", "_kN"))]
+
+
+def test_distributions_layers_and_long_axes_are_in_the_units_asked_for():
+    spread = {"kind": "normal", "sd": 60.0, "cov": 0.05, "low": 0.0}
+    settings = {
+        "distributions": {"soil_density_kg_m3": spread, "friction_angle_deg": {"sd": 3.0}},
+        "model": {"ground": {"layers": [{"from_m": 1.2, "cohesion_kPa": 5.0}], "water_table_m": None}},
+        "inputs": {"boulder_height_m": {"count": 20, "first": 1.0, "last": 2.0, "sha256": "ab"}},
+    }
+    assert shown_settings(settings, "si") == settings
+    found = shown_settings(settings, "us")
+    pcf = float(factor("pcf", "kg/m^3"))
+    assert found["distributions"]["soil_density_pcf"] == {**spread, "sd": 60.0 / pcf}
+    assert found["distributions"]["friction_angle_deg"] == {"sd": 3.0}
+    (layer,) = found["model"]["ground"]["layers"]
+    assert layer == {"from_ft": 1.2 / 0.3048, "cohesion_psf": pytest.approx(104.427, abs=1e-3)}
+    assert found["model"]["ground"]["water_table_ft"] is None
+    assert found["inputs"]["boulder_height_ft"] == {
+        "count": 20,
+        "first": 1 / 0.3048,
+        "last": 2 / 0.3048,
+        "sha256": "ab",
+    }
+
+
 def test_parquet_keeps_units_and_meanings(result, tmp_path):
     export(result, tmp_path / "designs.parquet", units="us")
     schema = pq.read_schema(tmp_path / "designs.parquet")
@@ -112,7 +179,7 @@ def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
 @pytest.mark.parametrize("sign", [*module.FORMULA_SIGNS, "\x00", "\x1b[31m"])
 def test_a_text_about_the_table_is_no_formula_either(result, tmp_path, monkeypatch, sign):
     """Settings, versions and names come from a file that anybody may have made."""
-    monkeypatch.setattr(module, "about", lambda finished, columns: iter([(f"{sign}cmd", "x", f"{sign}cmd")]))
+    monkeypatch.setattr(module, "about", lambda finished, columns, units: iter([(f"{sign}cmd", "x", f"{sign}cmd")]))
     export(result, tmp_path / "out.xlsx")
     (cells,) = openpyxl.load_workbook(tmp_path / "out.xlsx")["about"].iter_rows()
     assert [cell.data_type for cell in cells] == ["s", "s", "s"]
@@ -190,3 +257,71 @@ def test_a_page_holds_its_scripts_whatever_the_locale(tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     for script in SCRIPTS:
         assert (ASSETS / f"{script}.js").read_text(encoding="utf-8").strip() in page
+
+
+ONE_SITE = """\
+name: one site
+boulder: {length: 1.65 m, width: 1.68 m, height: [2.6, 3.2, 3.4] m, density: 2600 kg/m^3}
+site: {embedment_depth: 2 m}
+soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: SPEED, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    """Files of answers: name to file and table."""
+    folder = tmp_path_factory.mktemp("answers")
+    plain = load_text(ONE_SITE.replace("SPEED", "30 mph"), Path("one.yaml"))
+    uncertain = load_text(ONE_SITE.replace("SPEED", "{mean: 13.4 m/s, cov: 5 %}"), Path("one.yaml"))
+    found = {
+        "need": boulder_sweep.need(plain),
+        "capacity": reserves(plain),
+        "uncertainty": boulder_sweep.uncertainty(uncertain, half_width=0.1),
+    }
+    for name, one in found.items():
+        one.write(folder / f"{name}.parquet")
+    history = boulder_sweep.simulate(plain, 2)
+    history.to_parquet(folder / "simulate.parquet")
+    return {name: (folder / f"{name}.parquet", one.arrow) for name, one in found.items()} | {
+        "simulate": (folder / "simulate.parquet", history.to_arrow())
+    }
+
+
+@pytest.mark.parametrize("name", ["need", "capacity", "uncertainty", "simulate"])
+@pytest.mark.parametrize("kind", ["csv", "xlsx", "parquet"])
+def test_files_of_answers_are_exported_like_results(answers, tmp_path, name, kind):
+    file, table = answers[name]
+    target = tmp_path / f"out.{kind}"
+    assert export(file, target, units="us") == len(table)
+    read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "xlsx": lambda file: pd.read_excel(file, "designs")}[kind]
+    found = read(target)
+    assert len(found.columns) == len(table.column_names)
+    for place, field in enumerate(table.schema):
+        shown, own = found.columns[place], table.column(place).to_pylist()
+        unit = field.metadata[b"unit"].decode() if field.metadata else ""
+        size = shown_unit(unit, "us").size if unit and field.name != "passes_within" else 1.0
+        there = [None if pd.isna(value) or value == "" else value for value in found[shown]]
+        for one, other in zip(there, own, strict=True):
+            if isinstance(other, float):
+                assert one == pytest.approx(other / size, rel=1e-12)
+            else:
+                assert (one or "") == (other or ""), shown
+        assert (shown == field.name) == (size == 1.0)
+
+
+def test_answers_keep_their_meanings_and_units(answers, tmp_path):
+    export(answers["need"][0], tmp_path / "need.xlsx", units="us")
+    lines = list(openpyxl.load_workbook(tmp_path / "need.xlsx")["about"].iter_rows(values_only=True))
+    meaning = next(line for line in lines if line[0] == "least_embedment_depth_ft")
+    assert meaning[1:] == ("ft", "smallest value of site.embedment_depth that passes; null where none does")
+    assert any(line[0] == "fails_at_ft" for line in lines)
+    sheet = openpyxl.load_workbook(tmp_path / "need.xlsx")["designs"]
+    (cell,) = [cell for cell in sheet[1] if cell.value == "least_embedment_depth_ft"]
+    assert sheet.cell(3, cell.column).number_format == "0.000"
+
+
+def test_a_parquet_file_of_somebody_else_is_refused(tmp_path):
+    pd.DataFrame({"x": [1.0]}).to_parquet(tmp_path / "other.parquet")
+    with pytest.raises(ReportError, match="is neither the folder of a run nor a file that `sweep` wrote"):
+        export(tmp_path / "other.parquet", tmp_path / "out.csv")

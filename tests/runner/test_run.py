@@ -183,7 +183,7 @@ def test_a_progress_function_that_raises_stops_the_run_and_lets_the_folder_go(tm
 def test_output_that_exists_is_refused_unless_told(finished):
     out, _ = finished
     before = part_files(out)
-    with pytest.raises(OutputExistsError, match=r"is finished.*--resume.*--overwrite") as refused:
+    with pytest.raises(OutputExistsError, match=r"is finished: see it with .*--overwrite") as refused:
         run(grid(), out)
     assert refused.value.exit_code == 4
     with pytest.raises(StoreError, match="cannot be used together"):

@@ -11,11 +11,20 @@ import pytest
         ("vehicle.speed=[30, 40] mph", "impact_speed_m_s", [13.4112, 17.8816]),
         ("vehicle.speed={from: 10, to: 12, step: 1}", "impact_speed_m_s", [10.0, 11.0, 12.0]),
         ("vehicle.bumper_height=0.6", "bumper_height_m", [0.6]),
+        ("speed=[30, 40] mph", "impact_speed_m_s", [13.4112, 17.8816]),
+        ("impact_speed_m_s=20", "impact_speed_m_s", [20.0]),
+        ("friction_angle=38 deg", "friction_angle_deg", [38.0]),
     ],
 )
 def test_values(load_with, override, column, expected):
     sweep = load_with(override)
     assert sweep.block(0, sweep.n_designs).columns[column].to_numpy().tolist() == expected
+
+
+def test_settings_have_short_names_too(load_with):
+    sweep = load_with("max_rotation=15 deg", "accuracy=fast", "readings=as_printed")
+    assert (sweep.criterion.max_rotation_deg, sweep.solver.accuracy) == (15.0, "fast")
+    assert sweep.model.preset == "as_printed"
 
 
 def test_the_last_of_two_holds(load_with):
@@ -88,6 +97,10 @@ def test_blocks_that_the_file_lacks_are_opened(load_with):
         ("vehicle.speed=" + "[" * 3000, "nested more than 20 deep"),
         ("vehicle.sped=3", "did you mean speed?"),
         ("boulder=3", "must be a block of keys"),
+        ("widht=3", "is not an entry of the file; did you mean width?"),
+        ("velocity=3", "is not an entry of the file; did you mean speed?"),
+        ("density=3", "is ambiguous; use boulder.density or soil.density"),
+        ("mass=3", "is ambiguous; use vehicle.mass or boulder.mass"),
     ],
 )
 def test_mistakes_point_at_the_option(problems_of, minimal, override, words):

@@ -277,7 +277,9 @@ def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str]) -> N
         (["--at", "subgrade_reaction_MN_m3=nan"], "with a finite number in the column's unit"),
         (["--at", "subgrade_reaction_MN_m3=1e400"], "with a finite number in the column's unit"),
         (["--at", "subgrade_reaction_MN_m3=60", "--at", "subgrade_reaction_MN_m3 = 95"], "is given twice"),
-        (["--across", "weight"], "is not an input column"),
+        (["--across", "weight"], "--across 'weight' is not an input; did you mean vehicle.mass?"),
+        (["--at", "subgrade=95"], "--at 'subgrade' is not an input; did you mean subgrade_reaction?"),
+        (["--up", "boulder.mass"], "boulder_mass_kg is not an input column"),
         (["-o", "map.jpeg"], "must end in .png"),
     ],
 )
@@ -286,6 +288,13 @@ def test_command_refuses_wrong_use(
 ) -> None:
     assert execute(["plot", str(out), *words]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["soil.subgrade_reaction", "subgrade_reaction", "subgrade_reaction_MN_m3"])
+def test_command_takes_every_name_of_an_input(out: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert execute(["plot", str(out), "--at", f"{name}=95"]) == 0
+    assert "18 of 36 designs" in capsys.readouterr().out
+    assert execute(["plot", str(out), "--columns", name, "--rows", "friction_angle"]) == 0
 
 
 def test_command_says_where_there_is_no_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -383,7 +392,7 @@ def test_a_map_in_us_units(named_soils: str) -> None:
 
 def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None:
     sweep = load_text(NAMED, tmp_path / "named.yaml")
-    found = boulder_sweep.need(sweep, both_readings=False)
+    found = boulder_sweep.need(sweep)
     found.plot(tmp_path / "chart.svg", units="us")
     drawn = (tmp_path / "chart.svg").read_text()
     assert all(f"<!-- {name} -->" in drawn for name in ("loose", "dense", "gravel"))

@@ -1,0 +1,293 @@
+"""Answers of ``sweep need`` as lines for a terminal of 80 columns: a table, or many of them boulder by soil."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import textwrap
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from boulder_sweep.answers.keys import BOULDER_MASS, sweep_ranges
+from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO, SIDES
+from boulder_sweep.answers.printing import (
+    GRADE,
+    HEADS,
+    WIDTH,
+    Cell,
+    Column,
+    Row,
+    grade_lines,
+    head_of,
+    leading,
+    number_of,
+    rows_of,
+    table_lines,
+    table_texts,
+    varies,
+    word_of,
+)
+from boulder_sweep.columns import GRADES
+from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.text import counted
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from boulder_sweep.answers.keys import Key
+    from boulder_sweep.answers.need import Need
+
+MOST_LINES = 40
+"""Most rows of a plain table; more are shown boulder by soil."""
+MOST_IN_ALL = 1000
+"""Most lines of tables; of more, whole tables are left out."""
+SOIL = "soil"
+NEAR_M = 1.5e-3
+"""How near to an end of a range a side or depth is at it: both are whole millimetres [m]."""
+NOTES = {
+    "always": "≤, ≥: passes throughout the searched range, up to this end of it",
+    "never": "never: passes nowhere in the searched range",
+    "not_monotone": "*: fails again further on; column passes_within (-o) lists all passing ranges",
+    "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
+}
+SHORT = {"as_printed": "printed", "corrected": "corrected"}
+"""Heads of the columns of other readings."""
+OTHER = {
+    "as_printed": "printed: by the equations as the paper prints them, misprints included (docs/readings.md)",
+    "corrected": "corrected: by the equations with their misprints corrected (docs/readings.md)",
+}
+
+
+def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "GRID.yaml") -> list[str]:
+    """Return the answers as lines.
+
+    Parameters
+    ----------
+    need
+        The answers.
+    width
+        Width of the terminal; columns that do not fit are left out, the least important first.
+    units
+        ``si`` or ``us``.
+    file
+        The settings file, for the command that asks further.
+
+    Returns
+    -------
+    list of str
+        Header, one line for each row, or tables with a line for each boulder and a column for each soil; then a
+        legend, how often nothing passes, and the flags of what passes.
+    """
+    rows = rows_of(_shown_part(need), units)
+    by_soil = _by_soil(need, rows, width, units) if len(rows) > MOST_LINES else []
+    tables = by_soil or [table_lines(need_columns(need, units), rows[:MOST_IN_ALL], width)]
+    kept = tables[: max(1, MOST_IN_ALL // len(tables[0]))]
+    lines = [line for place, table in enumerate(kept) for line in ([""] * (place > 0) + table)]
+    if len(kept) < len(tables):
+        lines.append(f"(the first {len(kept)} of {len(tables)} tables; -o writes all {len(rows):,} rows)")
+    elif not by_soil and len(rows) > MOST_IN_ALL:
+        lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} rows; -o writes them all)")
+    if by_soil and need.others:
+        lines.append("(by the readings of the file; -o writes those by the others as well)")
+    remarks = [*_legend(need, file), *_grades(need), *_outside(need)]
+    if need.key.name == BOULDER_MASS.name:
+        remarks += _edges(need, units, file)
+    return [*lines, *(part for line in remarks for part in textwrap.wrap(line, width, subsequent_indent="  "))]
+
+
+def _shown_part(need: Need) -> pa.Table:
+    """Return the columns that lines are made of: rows of all would take longer to make than to search."""
+    needed = {
+        *HEADS,
+        *need.sweep.plan.labels,
+        "design_id",
+        "boulder_mass_kg",
+        "passes_at",
+        "margin",
+        "p_pass",
+        "robustness",
+    }
+    answers = (need.key.answer, "found")
+    return need.arrow.select([n for n in need.arrow.column_names if n in needed or n.startswith(answers)])
+
+
+def _by_soil(need: Need, rows: Sequence[Row], width: int, units: str) -> list[list[str]]:
+    """Return tables with a line for each boulder and a column for each soil, as many columns as fit.
+
+    None for the lightest boulder, which differs by soil, for a list of designs, or where no soil varies.
+    """
+    key, open_ = need.key, (need.key.name, *need.derived)
+    names = [name for name in HEADS if name not in open_ and varies(need.sweep, need.arrow, name)]
+    labels = [name for name in need.sweep.plan.labels if name in need.arrow.column_names]
+    soils = [((name, ""), word_of(name)) for name in labels if name == SOIL]
+    soils += [(head_of(name, units), number_of(name)) for name in names if BY_NAME[name].section == SOIL]
+    if not soils or need.sweep.table is not None or key.name == BOULDER_MASS.name:
+        return []
+    others = [((name, ""), word_of(name)) for name in labels if name != SOIL]
+    others += [(head_of(name, units), number_of(name)) for name in names if BY_NAME[name].section != SOIL]
+    others += [] if key.name.startswith("boulder_") else [_mass(units)]
+    answer = _answer(key, "", 1.0 if units == "si" else shown_unit(key.field.unit, units).size)
+    found: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
+    for row in rows:
+        own = found.setdefault(tuple(cell(row) for _, cell in others), {})
+        own[tuple(cell(row) for _, cell in soils)] = answer(row)
+    heads = list(dict.fromkeys(soil for own in found.values() for soil in own))
+    titles = [" ".join(head).strip() for head, _ in soils]
+    edge = [[*head, *texts] for (head, _), texts in zip(others, zip(*found, strict=True), strict=True)]
+    left = table_texts(edge) if edge else ["", "", *[""] * len(found)]
+    left = [text.rjust(max(len(left[0]), *map(len, titles))) for text in left]
+    columns = [[*soil, "", "", *(own.get(soil, "") for own in found.values())] for soil in heads]
+    each = max(len(text) for column in columns for text in column) + 2
+    most = max(1, (width - len(left[0])) // each)
+    word, unit = head_of(key.name, units)
+    title = f"{'largest' if key.most else 'least'} {word}{f' [{unit}]' if unit else ''} by boulder and soil"
+    tables = []
+    for start in range(0, len(columns), most):
+        part = columns[start : start + most]
+        lines = [title.rjust(len(left[0]))] * (start == 0)
+        for place, edge_text in enumerate([*(text.rjust(len(left[0])) for text in titles), *left]):
+            lines.append((edge_text + "".join(column[place].rjust(each) for column in part)).rstrip())
+            if place == len(titles) + 1:
+                lines.append("─" * (len(left[0]) + each * len(part)))
+        tables.append(lines)
+    return tables
+
+
+def _legend(need: Need, file: str) -> list[str]:
+    """Return what the words of the answers mean, how many rows have each, and what to ask next."""
+    own = need.counts()
+    occurring = {*own, *(word for name in need.others for word in need.arrow[f"found_{name}"].unique().to_pylist())}
+    lines = [
+        f"{note} ({counted(own[word], 'row')})" if word in own else note
+        for word, note in NOTES.items()
+        if word in occurring
+    ]
+    if "never" in own or "blocked_by_overlap" in own:
+        if need.key.name == BOULDER_MASS.name:
+            lines.append(f"next: wider ranges for the sides and the embedment in {file}")
+        else:
+            lines.append(f"next: another boulder: sweep need {shlex.quote(file)} --least mass")
+    return [*lines, *(OTHER[name] for name in need.others)]
+
+
+def _grades(need: Need) -> list[str]:
+    """Return how many answers have each grade, where they are more than one, and what these mean."""
+    grades = need.arrow.filter(need.arrow["passes_at"].is_valid())["robustness"].to_pylist()
+    counts = {grade: grades.count(grade) for grade in GRADES if grade in grades}
+    told = ", ".join(f"{count:,} {grade}" for grade, count in counts.items())
+    return [f"second opinion: {told}", *grade_lines(grades)] if len(grades) > 1 else grade_lines(grades)
+
+
+def _outside(need: Need) -> list[str]:
+    """Return what a pass is, and how many answers lie outside what the model was tested on."""
+    passing = need.arrow.filter(need.arrow["passes_at"].is_valid())
+    if not len(passing):
+        return []
+    count = len(passing)
+    flags = flag_counts(Counter(passing["validity"].to_pylist()).items())
+    named = ", ".join(f"{name} {own:,}" for name, own in flags.items() if name)
+    inside = f"flags: {flags.get('', 0):,} of {counted(count, 'answer')} inside what the model was tested on"
+    return [f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/validity.md)"]
+
+
+def _edges(need: Need, units: str, file: str) -> list[str]:
+    """Return at which ends of the ranges in the file the lightest boulders lie."""
+    passing = need.arrow.filter(need.arrow["passes_at"].is_valid())
+    if not len(passing):
+        return []
+    value = {name: passing[name].to_numpy() for name in (*SIDES, DEPTH, "bumper_height_m")}
+    bounds = sweep_ranges(need.sweep)
+    unit, metre = shown_unit("m", units)
+    found = {}
+    for name in (*SIDES, DEPTH, RATIO):
+        low, high = bounds.get(name, (0.0, 0.0))
+        for which, end in (("least", low), ("largest", high)) if low < high else ():
+            if name == RATIO:
+                found[f"d/H is the {which}, {end:g}"] = value[DEPTH] - end * value[HEIGHT]
+            else:
+                found[f"{HEADS[name][0]} is the {which}, {end / metre:.4g} {unit}"] = value[name] - end
+    overlap = value[HEIGHT] - value["bumper_height_m"] - value[DEPTH]
+    found["the depth is the largest that overlaps the bumper enough"] = overlap - need.sweep.criterion.min_overlap_m
+    counts = {words: int((abs(off) < NEAR_M).sum()) for words, off in found.items()}
+    ends = {words: count for words, count in counts.items() if count}
+    if not ends:
+        return ["edges: the lightest boulders lie within the ranges of the file, at no end of one"]
+    told = "; ".join(f"{words} ({count} of {len(passing)})" for words, count in ends.items())
+    return [f"edges: {told}. Wider ranges in {file} may hold a lighter boulder"]
+
+
+def need_columns(need: Need, units: str = "si") -> list[Column]:
+    """Return the columns of a terminal table: varying inputs, the answer, and what follows from it."""
+    key = need.key
+    open_ = (key.name, *need.derived)
+    unit, size = (key.field.unit, 1.0) if units == "si" else shown_unit(key.field.unit, units)
+    columns = leading(need.sweep, need.arrow, [name for name in HEADS if name not in open_], units)
+    if key.name == BOULDER_MASS.name:
+        columns.append((("mass", unit), _answer(key, "", size)))
+        columns += [(head_of(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]
+        columns += [_margin_or_chance(need), _GRADE]
+        return columns + [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
+    columns.append((head_of(key.name, units), _answer(key, "", size)))
+    if key.name == "embedment_depth_m":
+        columns.append((("ratio", "d/H"), _ratio))
+        columns.append((("above", unit), _above_ground))
+    columns += [_mass(units), _margin_or_chance(need), _GRADE]
+    columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
+    return columns
+
+
+_GRADE: Column = (GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-")
+
+
+def _size(name: str) -> Cell:
+    """Return a formatter for a side of the boulder or its depth."""
+    return lambda row: "" if row["passes_at"] is None else f"{row[name]:.3f}"
+
+
+def _answer(key: Key, suffix: str, size: float) -> Cell:
+    """Return a formatter for the answer by some readings."""
+    decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
+    name, found = f"{key.answer}{suffix}", f"found{suffix}"
+
+    def cell(row: Row) -> str:
+        if row[name] is None:
+            return "blocked" if row[found] == "blocked_by_overlap" else str(row[found])
+        before = {"always": "≥" if key.most else "≤"}.get(row[found], "")
+        return f"{before}{row[name]:.{decimals}f}{'*' if row[found] == 'not_monotone' else ''}"
+
+    return cell
+
+
+def _ratio(row: Row) -> str:
+    if row["passes_at"] is None:
+        return ""
+    return f"{row['embedment_depth_m'] / row['boulder_height_m']:.3f}"
+
+
+def _above_ground(row: Row) -> str:
+    if row["passes_at"] is None:
+        return ""
+    return f"{row['boulder_height_m'] - row['embedment_depth_m']:.2f}"
+
+
+def _mass(units: str) -> Column:
+    """Return the column of the mass of the boulder: tonnes, or pounds."""
+    if units == "us":
+        return ("mass", "lb"), lambda row: f"{row['boulder_mass_kg']:.0f}"
+    return ("mass", "t"), lambda row: f"{row['boulder_mass_kg'] / 1000:.1f}"
+
+
+def _margin_or_chance(need: Need) -> Column:
+    """Return the column of the margin at the answer, or of the probability of passing if one is asked for."""
+    if "p_pass" in need.arrow.column_names:
+        return ("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}"
+    return ("margin", ""), _margin
+
+
+def _margin(row: Row) -> str:
+    if row["margin"] is None or row["passes_at"] is None:
+        return ""
+    return f"{row['margin']:.1%}"

@@ -1,0 +1,64 @@
+"""What an option calls an entry: ``boulder.width`` as in the file, ``width`` alone, or its column of the table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from boulder_sweep.settings.fields import INPUTS, Field
+from boulder_sweep.settings.problems import did_you_mean, shorten
+
+BOULDER_MASS = Field("boulder", "mass", "boulder_mass_kg", "kg", "mass of the boulder")
+"""The mass of the boulder, which is not an input but follows from four inputs."""
+
+
+class UnknownNameError(ValueError):
+    """A word names no entry, or several.
+
+    Parameters
+    ----------
+    word
+        The word.
+    what
+        What is wrong with it, and which entries there are.
+    """
+
+    def __init__(self, word: str, what: str):
+        super().__init__(word, what)
+        self.word, self.what = word, what
+
+    def __str__(self) -> str:
+        return f"'{shorten(self.word)}' {self.what}"
+
+
+def named(word: str, among: Sequence[Field] = (*INPUTS, BOULDER_MASS)) -> Field:
+    """Return the entry that a word names; an input goes before a setting of the same key.
+
+    Parameters
+    ----------
+    word
+        Path of the entry (``boulder.width``), its key (``width``) or its column (``boulder_width_m``).
+    among
+        Entries that may be meant; the inputs and the mass of the boulder by default.
+
+    Raises
+    ------
+    UnknownNameError
+        No entry has this name, or several have this key.
+    """
+    found = [field for field in among if word in (field.path, field.name)]
+    found = found or [field for field in among if word == field.key]
+    found = [field for field in found if field in INPUTS or field == BOULDER_MASS] or found
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise UnknownNameError(word, f"is ambiguous; use {' or '.join(field.path for field in found)}")
+    keys = [field.key for field in among]
+    short = [field.path if keys.count(field.key) > 1 else field.key for field in among]
+    near = [known for known in short if word.lower() in known] or [
+        known for known, field in zip(short, among, strict=True) if word.lower() in field.also
+    ]
+    every = (*short, *(field.path for field in among), *(field.name for field in among))
+    hint = f"; did you mean {' or '.join(near)}?" if near else did_you_mean(word, every)
+    what = "an input" if all(field in (*INPUTS, BOULDER_MASS) for field in among) else "an entry of the file"
+    known = hint or f" ({', '.join(short)})"
+    raise UnknownNameError(word, f"is not {what}{known}")
