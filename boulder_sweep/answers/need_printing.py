@@ -100,16 +100,8 @@ def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "G
 
 def _shown_part(need: Need) -> pa.Table:
     """Return the columns that lines are made of: rows of all would take longer to make than to search."""
-    needed = {
-        *HEADS,
-        *need.sweep.plan.labels,
-        "design_id",
-        "boulder_mass_kg",
-        "passes_at",
-        "margin",
-        "p_pass",
-        "robustness",
-    }
+    needed = {*HEADS, *need.sweep.plan.labels, "design_id", "boulder_mass_kg", "passes_at", "robustness"}
+    needed |= {"margin", "p_pass"}
     answers = (need.key.answer, "found")
     return need.arrow.select([n for n in need.arrow.column_names if n in needed or n.startswith(answers)])
 
@@ -174,11 +166,11 @@ def _legend(need: Need, file: str) -> list[str]:
 
 
 def _grades(need: Need) -> list[str]:
-    """Return how many answers have each grade, where they are more than one, and what these mean."""
+    """Return how many answers have each grade, where not every one has a line, and what these mean."""
     grades = need.arrow.filter(need.arrow["passes_at"].is_valid())["robustness"].to_pylist()
     counts = {grade: grades.count(grade) for grade in GRADES if grade in grades}
     told = ", ".join(f"{count:,} {grade}" for grade, count in counts.items())
-    return [f"second opinion: {told}", *grade_lines(grades)] if len(grades) > 1 else grade_lines(grades)
+    return [*([f"second opinion: {told}"] if len(need) > MOST_LINES and told else []), *grade_lines(grades)]
 
 
 def _outside(need: Need) -> list[str]:

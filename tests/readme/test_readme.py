@@ -47,9 +47,9 @@ def test_the_first_answer() -> None:
     assert sweep("need", "configs/site.yaml", "--margin", "25%").rstrip() == marked("need")
 
 
-@pytest.mark.parametrize(("block", "option"), [("need-least", "--own-readings"), ("need-robust", "--robust")])
-def test_what_robust_costs(block: str, option: str) -> None:
-    command = ["need", "configs/site.yaml", "--set", "boulder.height=3.4 m", option]
+@pytest.mark.parametrize(("block", "option"), [("need-least", ()), ("need-robust", ("--robust",))])
+def test_what_robust_costs(block: str, option: tuple[str, ...]) -> None:
+    command = ["need", "configs/site.yaml", "--set", "boulder.height=3.4 m", *option]
     assert sweep(*command).rstrip() == marked(block)
 
 
