@@ -131,6 +131,7 @@ def assembled(
         lines=setting_lines(settings),
         readings=reading_words(settings),
         ground=ground_words(settings),
+        uncertain="distributions" in settings,
         law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),
         data=script_data(data),
         style=(ASSETS / "page.css").read_text(encoding="utf-8"),

@@ -3,44 +3,9 @@
 import pytest
 
 import boulder_sweep
-from boulder_sweep.report import write_report
-from boulder_sweep.settings import load_text
-from tests.report.conftest import LIST
+from tests.report.conftest import LIST, SITE, reported
 
-SITE = """\
-name: site
-boulder: {length: 1.65 m, width: 1.68 m, height: 3.4 m, density: 2600 kg/m^3}
-site: {embedment_ratio: 0.6}
-soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
-vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
-"""
 STRIP = SITE.replace("height: 3.4 m", "height: {from: 1.8 m, to: 3.6 m, count: 19}")
-
-
-def reported(text, folder):
-    """Run a file and return the report of the result."""
-    (folder / "site.yaml").write_text(text)
-    boulder_sweep.run(boulder_sweep.load(folder / "site.yaml"), folder / "site.sweep")
-    return write_report(folder / "site.sweep", folder / "site.html")
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("kind", ["run", "uncertainty"])
-def test_the_report_of_one_design_has_a_simulator_and_no_map(kind, tmp_path, opened):
-    if kind == "run":
-        file = reported(SITE, tmp_path)
-    else:
-        uncertain = load_text(SITE.replace("angle: 40 deg", "angle: {mean: 40 deg, cov: 5 %}"), tmp_path / "site.yaml")
-        boulder_sweep.uncertainty(uncertain, half_width=0.2).write(tmp_path / "site.parquet")
-        file = write_report(tmp_path / "site.parquet", tmp_path / "site.html")
-    page = opened(file)
-    assert page.complaints == []
-    assert not page.is_visible("#failure")
-    assert "No input differs between designs, so there is no map." in page.inner_text("main")
-    assert page.inner_text("#verdict") == page.inner_text("#chosen0-verdict")
-    page.fill("#in-embedment_depth_m", "1.2")
-    assert page.inner_text("#verdict").startswith("✘ fail")
-    assert page.complaints == []
 
 
 def test_one_axis_is_a_strip(tmp_path, opened):

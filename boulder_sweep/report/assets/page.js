@@ -167,7 +167,7 @@ class Page {
     this.legend("live", cells);
     const passing = found.filter((one) => one.verdict === "pass").length;
     byId("live-words").textContent =
-      `Of ${AROUND} × ${AROUND} designs within a quarter of this one, ${passing.toLocaleString("en-US")} pass.`;
+      `Of ${AROUND} × ${AROUND} designs within a quarter of this one, ${passes(passing)}.`;
   }
 
   /** Draw the map of the table. */
