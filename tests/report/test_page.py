@@ -173,7 +173,7 @@ def test_the_copied_file_means_the_same_design(tmp_path, explorer, opened):
     sweep = boulder_sweep.load(tmp_path / "copied.yaml")
     block = sweep.block(0, 1)
     for name, value in design.items():
-        assert block.columns[name].to_numpy()[0] == value, name
+        assert block.columns[name].to_numpy()[0] == pytest.approx(value, rel=5e-6), name
     assert sweep.resolved()["solver"] == boulder_sweep.load(explorer.with_name("case.yaml")).resolved()["solver"]
 
 

@@ -21,7 +21,7 @@ class Page {
     this.units = new Units(data.unit, data.units);
     /** @type {Input[]} */
     this.inputs = data.inputs;
-    this.controls = new Controls(data.inputs, this.units, data.face);
+    this.controls = new Controls(data, this.units);
     /** @type {Record<string, number>} the design in the simulator */
     this.design = { ...data.start };
     /** @type {Record<string, number>[]} */
@@ -66,6 +66,11 @@ class Page {
    */
   showMotion(panel, design) {
     const { judged: found, motion, inputs } = this.simulator.whole(design);
+    this.showFound(panel, found, motion, inputs);
+  }
+
+  /** @param {string} panel @param {Judged} found @param {Motion} motion @param {Record<string, number>} inputs */
+  showFound(panel, found, motion, inputs) {
     this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found);
     const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
     table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
@@ -131,14 +136,40 @@ class Page {
 
   /** Simulate the design of the controls, at once; its energy and the designs around it, as soon as the reader pauses. */
   update() {
-    this.showMotion("live", this.design);
-    this.controls.show(this.simulator.completed(this.design).inputs);
-    byId("yaml").value = yamlOf(this.data, this.design);
     clearTimeout(this.waiting);
+    const { refused } = this.controls;
+    const isRefused = Object.keys(refused).length > 0;
+    for (const name of ["add", "copy"]) byId(name).disabled = isRefused;
+    const { inputs, refusal, at } = this.simulator.completed(this.design);
+    this.controls.say(isRefused || refusal === "" ? refused : { [at]: refusal });
+    this.controls.show(inputs);
+    if (isRefused) {
+      this.refuse(refused, inputs);
+      return;
+    }
+    this.showMotion("live", this.design);
+    byId("yaml").value = yamlOf(this.data, this.design, this.units);
     this.waiting = setTimeout(() => {
       this.showEnergy("live");
       this.showAround();
     }, PAUSE);
+  }
+
+  /**
+   * Show nothing but why the values typed are refused.
+   * @param {Record<string, string>} refused by the names of inputs
+   * @param {Record<string, number>} inputs the last ones that were not
+   */
+  refuse(refused, inputs) {
+    const words = this.inputs.filter(({ name }) => name in refused).map(({ name, label }) => `${label}: ${refused[name]}`);
+    const nothing = Object.fromEntries(this.data.outcomes.map((/** @type {any} */ one) => [one.name, null]));
+    const found = /** @type {Judged} */ ({ ...nothing, verdict: "error", reason: words.join("; "), margin: null, rating: null });
+    this.showFound("live", found, this.simulator.motionless(), inputs);
+    this.showEnergy("live");
+    byId("flags").replaceChildren();
+    byId("yaml").value = "";
+    this.showCells([]);
+    byId("live-words").textContent = "";
   }
 
   /** Simulate designs over two inputs around the one of the controls. */
@@ -158,6 +189,15 @@ class Page {
       x, y, margin: found[k].margin, pick: () => ({ [across]: x, [up]: y }),
       name: found[k].reason === "" ? found[k].verdict : `${found[k].verdict}: ${found[k].reason}`,
     }));
+    this.showCells(cells);
+    const passing = found.filter((one) => one.verdict === "pass").length;
+    byId("live-words").textContent =
+      `Of ${AROUND} × ${AROUND} designs within a quarter of this one, ${passes(passing)}.`;
+  }
+
+  /** Draw the map of designs around the one of the controls. @param {Cell[]} cells */
+  showCells(cells) {
+    const { across, up } = this.axes.live;
     this.cells = { ...this.cells, live: cells };
     const of = (/** @type {string} */ name) => /** @type {Input} */ (this.inputs.find((one) => one.name === name));
     const [labels, units] = [{ x: of(across).label, y: of(up).label }, { x: of(across).unit, y: of(up).unit }];
@@ -165,9 +205,6 @@ class Page {
     drawCells(this.plots, "live", cells, labels, units, this.units, this.data.colours, here);
     this.walkers.live.over(cells, labels, units, here);
     this.legend("live", cells);
-    const passing = found.filter((one) => one.verdict === "pass").length;
-    byId("live-words").textContent =
-      `Of ${AROUND} × ${AROUND} designs within a quarter of this one, ${passes(passing)}.`;
   }
 
   /** Draw the map of the table. */
@@ -286,6 +323,7 @@ class Page {
     }
     Object.assign(this.design, inputs);
     if (ratio !== undefined) this.design.embedment_depth_m = ratio * this.design.boulder_height_m;
+    this.controls.refused = {};
     this.update();
   }
 
@@ -297,8 +335,8 @@ class Page {
   /** Let the reader do what there is to do. */
   listen() {
     const { data } = this;
-    this.controls.listen((name, value) => {
-      this.design[name] = value;
+    this.controls.listen((given) => {
+      Object.assign(this.design, given);
       this.update();
     });
     for (const player of Object.values(this.players)) player.listen();
@@ -329,6 +367,7 @@ class Page {
     byId("units").addEventListener("change", () => {
       byId("units").focus(); // a box that is being typed into keeps its text, but not its unit
       this.units.system = byId("units").value;
+      this.controls.refused = {};
       this.refresh();
     });
     byId("theme").addEventListener("change", () => this.paint());
@@ -370,7 +409,7 @@ class Page {
 
   async copy() {
     try {
-      await navigator.clipboard.writeText(yamlOf(this.data, this.design));
+      await navigator.clipboard.writeText(byId("yaml").value);
       byId("copy").textContent = "Copied";
     } catch {
       byId("yaml").closest("details").open = true;
