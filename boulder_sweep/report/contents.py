@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
+from boulder_kernels import Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
@@ -33,8 +33,8 @@ from boulder_sweep.judge.validity import (
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, RULES, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
-from boulder_sweep.report.figures import COLOURS, PARTS
-from boulder_sweep.report.rows import SIZES, Rows, Thinned, label_of
+from boulder_sweep.report.figures import COLOURS, parts_of
+from boulder_sweep.report.rows import MOST_ELEMENTS, SIZES, Rows, Thinned, label_of
 from boulder_sweep.settings.choices import LAYER_FIELDS
 from boulder_sweep.settings.consistency import FLOATS, SLIDES, uppermost_is_wet
 from boulder_sweep.settings.fields import BY_NAME, fields_of
@@ -85,14 +85,14 @@ def page_data(
 ) -> dict[str, Any]:
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
     ground = Ground.of_dict(settings["model"].get("ground", {}))
-    closed = control._replace(elements=0, unloading=ELASTIC)
-    closed = closed._replace(paired=is_paired(readings, closed, layered=not ground.is_proportional))
+    simulated = control._replace(elements=min(control.elements, MOST_ELEMENTS))
+    simulated = simulated._replace(paired=is_paired(readings, simulated, layered=not ground.is_proportional))
     return {
         "title": title,
         "units": units,
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
-        "settings": [float(value) for value in (*readings, *closed)],
+        "settings": [float(value) for value in (*readings, *simulated)],
         "rules": _rules(control.theta_limit, settings),
         "inputs": [
             _input(spec.name, start, settings, ground) for spec in (*INPUTS, *OPTIONAL_INPUTS) if spec.name in start
@@ -123,10 +123,10 @@ def page_data(
                 "paired": float(finer.paired),
                 "step_s": reported_step_s(finer),
             }
-            for finer in finer_controls(closed)
+            for finer in finer_controls(simulated)
             if not finer.last_resort
         ],
-        "parts": list(PARTS),
+        "parts": parts_of(control),
         "colours": COLOURS,
         "yaml": {system: _yaml(settings, ground, system) for system in SYSTEMS},
         "chosen": [dict(one) for one in chosen],
@@ -194,6 +194,8 @@ def _layout() -> dict[str, Any]:
         "rulings": verdicts.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": entry_points.LAYER_ROOM,
+        "element_room": entry_points.ELEMENT_ROOM,
+        "memory_room": entry_points.MEMORY_ROOM,
         "columns": {**SOURCES, **dict(zip(SecondSpring._fields, OPTIONAL_COLUMNS, strict=True))},
     }
 

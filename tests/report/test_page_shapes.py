@@ -29,6 +29,12 @@ RUNS = {
         "vehicle.speed=[25, 30] mph",
     ),
     "water": (RATIOS, "soil.water_table=0.8 m"),
+    "soil elements": (RATIOS, "model.soil={elements: 50}"),
+    "plastic": (RATIOS, "model.unloading=plastic", "model.soil={elements: 50}"),
+    "plastic with a gap, layers, water": (
+        *(RATIOS, "model.unloading=plastic_with_gap", "model.soil={elements: 50}"),
+        *(f"soil.layers=[{LAYER}]", "soil.water_table=1 m"),
+    ),
     "layers and cohesion": (RATIOS, f"soil.layers=[{LAYER}]", "soil.cohesion=4 kPa"),
 }
 UNCERTAIN = {
@@ -36,7 +42,7 @@ UNCERTAIN = {
     "uncertainty, 1 axis": SITE.replace("angle: 40 deg", "angle: {mean: [36, 40] deg, cov: 5 %}"),
     "uncertainty, shipped": Path("configs/uncertain_site.yaml").read_text(),
 }
-IN_EVERY_RUN = ("no axis", "1 axis", "uncertainty, no axis")
+IN_EVERY_RUN = ("no axis", "1 axis", "uncertainty, no axis", "plastic")
 
 
 def made(shape, folder):

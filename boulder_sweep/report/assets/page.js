@@ -1,7 +1,9 @@
 // @ts-check
 "use strict";
 
+/** Designs along each side of the map around a design, and where each of them takes long. */
 const AROUND = 40;
+const FEW_AROUND = 12;
 const SPREAD = 0.25;
 /** Time without a change after which the rest of the page follows the controls [ms]. */
 const PAUSE = 150;
@@ -31,6 +33,8 @@ class Page {
     /** @type {Record<string, {scene: Scene, motion: Motion}>} */
     this.motions = {};
     this.waiting = 0;
+    /** Of maps around a design; another change makes the one that is being computed the last but one. */
+    this.rounds = 0;
     this.printing = false;
     /** @type {Record<string, Cell[]>} */
     this.cells = {};
@@ -137,6 +141,7 @@ class Page {
   /** Simulate the design of the controls, at once; its energy and the designs around it, as soon as the reader pauses. */
   update() {
     clearTimeout(this.waiting);
+    this.rounds += 1;
     const { refused } = this.controls;
     const isRefused = Object.keys(refused).length > 0;
     for (const name of ["add", "copy"]) byId(name).disabled = isRefused;
@@ -172,27 +177,38 @@ class Page {
     byId("live-words").textContent = "";
   }
 
-  /** Simulate designs over two inputs around the one of the controls. */
-  showAround() {
+  /** Simulate designs over two inputs around the one of the controls; where that takes long, line by line in between. */
+  async showAround() {
+    const round = (this.rounds += 1);
     const { across, up } = this.axes.live;
+    const slow = this.simulator.isSlow;
+    const size = slow ? FEW_AROUND : AROUND;
     /** @param {string} name */
     const line = (name) => {
       const input = /** @type {Input} */ (this.inputs.find((one) => one.name === name));
       const here = this.design[name];
       const [low, high] = [Math.max(here * (1 - SPREAD), input.low), Math.min(here * (1 + SPREAD), input.high)];
-      return Array.from({ length: AROUND }, (_, k) => low + ((high - low) * k) / (AROUND - 1));
+      return Array.from({ length: size }, (_, k) => low + ((high - low) * k) / (size - 1));
     };
     const places = line(across).flatMap((x) => line(up).map((y) => ({ x, y })));
     const designs = places.map(({ x, y }) => ({ ...this.design, [across]: x, [up]: y }));
-    const found = this.simulator.rows(designs);
+    /** @type {Judged[]} */
+    const found = [];
+    const piece = slow ? 1 : designs.length;
+    while (found.length < designs.length) {
+      found.push(...this.simulator.rows(designs.slice(found.length, found.length + piece)));
+      if (!slow) break;
+      byId("live-words").textContent = `Simulating ${found.length} of ${designs.length} designs around this one.`;
+      await new Promise((next) => setTimeout(next));
+      if (round !== this.rounds) return;
+    }
     const cells = places.map(({ x, y }, k) => ({
       x, y, margin: found[k].margin, pick: () => ({ [across]: x, [up]: y }),
       name: found[k].reason === "" ? found[k].verdict : `${found[k].verdict}: ${found[k].reason}`,
     }));
     this.showCells(cells);
     const passing = found.filter((one) => one.verdict === "pass").length;
-    byId("live-words").textContent =
-      `Of ${AROUND} × ${AROUND} designs within a quarter of this one, ${passes(passing)}.`;
+    byId("live-words").textContent = `Of ${size} × ${size} designs within a quarter of this one, ${passes(passing)}.`;
   }
 
   /** Draw the map of designs around the one of the controls. @param {Cell[]} cells */

@@ -135,10 +135,21 @@ class Simulator {
     return { ...design, ...springs, K_epsilon: design.K_epsilon * (ground.is_proportional ? factor : 1) };
   }
 
-  /** @param {KernelDesign} design @returns {number[]} the layers of its soil; none where resistance grows with depth */
+  /**
+   * @param {KernelDesign} design
+   * @returns {number[]} the layers of its soil; none where it is elastic and its resistance grows with depth
+   */
   layers(design) {
     const { resistance, ground, rules } = this.data;
-    return ground.is_proportional ? [] : layersOf(resistance, ground, design, rules.tested.gravity);
+    const g = rules.tested.gravity;
+    if (!ground.is_proportional) return layersOf(resistance, ground, design, g);
+    const { rho_s, phi, beta } = design;
+    return this.data.settings[this.at("unloading")] > 0 ? [Infinity, rho_s, phi, beta, 0, passiveCoefficient(phi) ** 2 * rho_s * g] : [];
+  }
+
+  /** @returns {boolean} whether a design takes a hundred times as long as in the closed form of the soil */
+  get isSlow() {
+    return this.data.settings[this.at("elements")] > 0;
   }
 
   /**
