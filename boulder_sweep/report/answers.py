@@ -75,7 +75,7 @@ def answer_of(rows: Rows) -> Answer:
         commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
         most = "; ".join(f"{count:,} with {_meaning(name)}" for count, name in commonest[:3])
         lie = _verb(flagged, "lie", "lies")
-        often = ", most of all" if len(commonest) > 3 else ":"
+        often = ", most often:" if len(commonest) > 3 else ":"
         sentences.append((f"{flagged:,} of those that pass {lie} outside what the model was tested on{often} {most}.",))
     elif n and not rows.flags:
         sentences.append(("The table does not say which of those that pass lie outside what the model was tested on.",))
