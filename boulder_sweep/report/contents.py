@@ -44,6 +44,7 @@ from boulder_sweep.settings.notes import (
     BEYOND_FRONT,
     FAMILY_FACTOR,
     LEAST_CRUSH,
+    MOST_CRUSH,
     SHORT_OF_FRONT,
     api_curve,
     terzaghi_curve,
@@ -110,7 +111,8 @@ def page_data(
         "refused": {"outside": OUTSIDE, "empty": EMPTY, "not_a_number": NOT_A_NUMBER},
         "front": {
             "calibrated": settings["model"]["calibrated_crush_m"],
-            "least": LEAST_CRUSH * settings["model"]["calibrated_crush_m"],
+            "least": LEAST_CRUSH,
+            "most": MOST_CRUSH,
             "beyond": BEYOND_FRONT,
             "short": SHORT_OF_FRONT,
         },

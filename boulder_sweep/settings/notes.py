@@ -23,8 +23,9 @@ FAMILY_FACTOR = 2.0
 """How far a pair of soil constants may be off the nearer family of data."""
 
 _FRONT = ("vehicle_mass_kg", "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_damper_N_s_m")
-LEAST_CRUSH = 0.5
-"""Spring and damper describe crushes from this part of the calibrated one up to all of it."""
+LEAST_CRUSH, MOST_CRUSH = 0.5, 1.25
+"""Crush at a rigid wall over the calibrated one, between which spring and damper are taken for those of the vehicle. A
+boulder gives way and takes less of the front than a wall: hence more than 1."""
 BEYOND_FRONT = (
     "against a rigid wall the front of this vehicle would be crushed by {crush}; its spring and damper are calibrated "
     "up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
@@ -126,7 +127,7 @@ def _off_front(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarr
     crush = wall_crush(*front)
     found, words = float(crush.max()), BEYOND_FRONT
     up_to = "" if crush.min() == found else "up to "
-    if found <= calibrated:
+    if found <= MOST_CRUSH * calibrated:
         found, words, up_to = float(crush.min()), SHORT_OF_FRONT, ""
         if found >= LEAST_CRUSH * calibrated:
             return ""

@@ -101,7 +101,7 @@ FITTED = ("vehicle.spring=3103.3 kN/m", "vehicle.damper=138.91 kN*s/m", "vehicle
     ("overrides", "words"),
     [
         (("vehicle.speed=30 mph",), ""),
-        (("vehicle.speed=[20, 30] mph",), ""),
+        (("vehicle.speed=[20, 30, 40] mph",), ""),
         (
             ("vehicle.mass=65000 lb", "vehicle.speed=30 mph"),
             "crushed by 2.85 m; its spring and damper are calibrated up",

@@ -10,7 +10,7 @@
  * What is said of the value of an input that a settings file is refused for, and of a vehicle whose front is crushed
  * further, or less far, than its spring and damper were fitted to; written by Python.
  * @typedef {{outside: string, empty: string, not_a_number: string}} Refused
- * @typedef {{calibrated: number, least: number, beyond: string, short: string}} Front
+ * @typedef {{calibrated: number, least: number, most: number, beyond: string, short: string}} Front
  */
 
 /** Values that differ by less are the same in the six digits of a box. */
@@ -155,11 +155,11 @@ class Controls {
   /** @param {Record<string, number>} design @returns {string[]} cautions on its vehicle: `boulder_sweep.settings.notes` */
   cautions(design) {
     if ("vehicle_second_spring_N_m" in design) return [];
-    const { calibrated, least, beyond, short } = this.front;
+    const { calibrated, least, most, beyond, short } = this.front;
     const crush = wallCrush(design);
     const values = { crush: this.units.written(crush, "m", 3), calibrated: this.units.written(calibrated, "m") };
-    if (crush > calibrated) return [filled(beyond, values)];
-    return crush < least ? [filled(short, values)] : [];
+    if (crush > most * calibrated) return [filled(beyond, values)];
+    return crush < least * calibrated ? [filled(short, values)] : [];
   }
 }
 
