@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from boulder_sweep.judge.validity import BY_FLAG
+from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
 from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.text import counted
 from boulder_sweep.views.wording import REASON_WORDS
 
 SAFE = 0.95
@@ -58,21 +59,24 @@ def answer_of(rows: Rows) -> Answer:
     passing = rows.having("pass")
     n = int(passing.sum())
     uncertain = _uncertain(rows)
+    if total == 1:
+        return _of_one(rows, uncertain)
     means = ", at the means of their uncertain inputs" if uncertain else ""
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
-    sentences.append((f"{n:,} of {total:,} designs pass ({_share(n, total)}){means}.",))
+    sentences.append((f"{n:,} of {total:,} designs {_verb(n, 'pass', 'passes')} ({_share(n, total)}){means}.",))
     if NOT_YET in counts:
-        sentences.append((f"The run is not finished: {counts[NOT_YET]:,} designs are not computed yet.",))
-    others = [f"{count:,} {_in_words(name)}" for name, count in counts.items() if name not in ("pass", NOT_YET)]
+        left = f"{counted(counts[NOT_YET], 'design')} {_verb(counts[NOT_YET], 'are', 'is')}"
+        sentences.append((f"The run is not finished: {left} not computed yet.",))
+    others = [f"{count:,} {_in_words(name, count)}" for name, count in counts.items() if name not in ("pass", NOT_YET)]
     if others:
-        sentences.append((f"The others: {'; '.join(others)}.",))
+        sentences.append((f"Of the others, {'; '.join(others)}.",))
     flagged = n - rows.flags.get("", 0) if rows.flags else 0
     if flagged:
         commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
-        most = "; ".join(
-            f"{count:,} with {BY_FLAG[name].meaning if name in BY_FLAG else name}" for count, name in commonest[:3]
-        )
-        sentences.append((f"{flagged:,} of those that pass lie outside what the model was tested on: {most}.",))
+        most = "; ".join(f"{count:,} with {_meaning(name)}" for count, name in commonest[:3])
+        lie = _verb(flagged, "lie", "lies")
+        often = ", most often:" if len(commonest) > 3 else ":"
+        sentences.append((f"{flagged:,} of those that pass {lie} outside what the model was tested on{often} {most}.",))
     elif n and not rows.flags:
         sentences.append(("The table does not say which of those that pass lie outside what the model was tested on.",))
     if n == 0:
@@ -110,7 +114,8 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
         interval = f"{row['p_pass_low']:.1%} to {row['p_pass_high']:.1%}"
         return [((f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}.",), Named("The design", 0))]
     safe = chances >= SAFE
-    first = f"{int(safe.sum()):,} of {len(chances):,} designs pass with a probability of {SAFE:.0%} or more"
+    n = int(safe.sum())
+    first = f"{n:,} of {len(chances):,} designs {_verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"
     if not safe.any():
         best = int(chances.argmax())
         largest = f"{first}; the largest is {chances[best]:.1%} (design {best:,})."
@@ -131,10 +136,44 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
     return [(sentence, Named(f"{title} {_where(rows, kinds)}".rstrip(), number))]
 
 
-def _in_words(name: str) -> str:
-    """Verdict and reason for a sentence."""
+def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answer:
+    """Describe the result of a single design."""
+    row, name = rows.row(0), rows.names[rows.codes[0]]
+    mass, depth = (float(value.flat[0]) for value in (rows.mass(), rows.depth()))
+    margin = "" if row["margin"] is None else f", with a margin of {row['margin']:.1%}"
+    verdict = f"{_in_words(name, 1)}{margin}{', at the means of its uncertain inputs' if uncertain else ''}"
+    sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
+    sentences.append((f"The design {verdict}: ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep."))
+    flags = [flag for flag in (row["validity"] or "").split(SEPARATOR) if flag]
+    if flags:
+        sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))
+    return Answer(tuple(sentences), (Named("The design", 0),))
+
+
+def _meaning(flag: str) -> str:
+    """What a flag says; its name where another version has set it."""
+    return BY_FLAG[flag].meaning if flag in BY_FLAG else flag
+
+
+def _verb(count: int, many: str, one: str) -> str:
+    """The form of a verb that goes with a number."""
+    return one if count == 1 else many
+
+
+VERBS = {
+    "pass": ("pass", "passes"),
+    "fail": ("fail", "fails"),
+    "undecided": ("are undecided", "is undecided"),
+    "error": ("cannot be computed", "cannot be computed"),
+}
+"""Verdicts of many designs and of one in a sentence."""
+
+
+def _in_words(name: str, count: int) -> str:
+    """Verdict and reason of so many designs for a sentence."""
     verdict, _, reason = name.partition(": ")
-    return f"{verdict} ({REASON_WORDS.get(reason, reason)})" if reason else verdict
+    verb = _verb(count, *VERBS[verdict])
+    return f"{verb} ({REASON_WORDS.get(reason, reason)})" if reason else verb
 
 
 def _share(n: int, total: int) -> str:

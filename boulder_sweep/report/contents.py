@@ -6,11 +6,12 @@ import base64
 import gzip
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
+from boulder_kernels import Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
@@ -28,11 +29,23 @@ from boulder_sweep.judge.validity import (
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, RULES, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
-from boulder_sweep.report.figures import COLOURS, PARTS
-from boulder_sweep.report.rows import SIZES, Rows, Thinned, label_of
+from boulder_sweep.report.figures import COLOURS, parts_of
+from boulder_sweep.report.rows import MOST_ELEMENTS, SIZES, Rows, Thinned, label_of
+from boulder_sweep.settings.choices import LAYER_FIELDS
+from boulder_sweep.settings.consistency import FLOATS, SLIDES, uppermost_is_wet
 from boulder_sweep.settings.fields import BY_NAME, fields_of
+from boulder_sweep.settings.leaf import OUTSIDE
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
-from boulder_sweep.settings.notes import FAMILY_FACTOR, api_curve, terzaghi_curve
+from boulder_sweep.settings.notes import (
+    BEYOND_FRONT,
+    FAMILY_FACTOR,
+    LEAST_CRUSH,
+    MOST_CRUSH,
+    SHORT_OF_FRONT,
+    api_curve,
+    terzaghi_curve,
+)
+from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, describe, needed
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.views.wording import REASON_WORDS
 
@@ -51,6 +64,8 @@ OUTCOME_WORDS = {
 """Outcomes of a design that the page shows."""
 
 
+REFUSED_AT = ("", "embedment_depth_m", "hood_height_m", "impact_height_m", "vehicle_second_spring_N_m")
+"""The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`."""
 ANGLES = np.arange(20.0, 61.0)
 """Friction angles [deg] at which the page knows which soil constants belong together."""
 
@@ -67,16 +82,18 @@ def page_data(
 ) -> dict[str, Any]:
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
     ground = Ground.of_dict(settings["model"].get("ground", {}))
-    closed = control._replace(elements=0, unloading=ELASTIC)
-    closed = closed._replace(paired=is_paired(readings, closed, layered=not ground.is_proportional))
+    simulated = control._replace(elements=min(control.elements, MOST_ELEMENTS))
+    simulated = simulated._replace(paired=is_paired(readings, simulated, layered=not ground.is_proportional))
     return {
         "title": title,
         "units": units,
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
-        "settings": [float(value) for value in (*readings, *closed)],
+        "settings": [float(value) for value in (*readings, *simulated)],
         "rules": _rules(control.theta_limit, settings),
-        "inputs": [_input(spec.name, start, settings) for spec in (*INPUTS, *OPTIONAL_INPUTS) if spec.name in start],
+        "inputs": [
+            _input(spec.name, start, settings, ground) for spec in (*INPUTS, *OPTIONAL_INPUTS) if spec.name in start
+        ],
         "outcomes": [
             {"name": spec.name, "unit": spec.unit, "label": OUTCOME_WORDS[spec.name]}
             for spec in OUTCOMES
@@ -86,7 +103,15 @@ def page_data(
         "resistance": settings["model"].get("resistance", RESISTANCES[0]),
         "ground": {**ground.as_dict(), "is_proportional": ground.is_proportional, "water_kg_m3": WATER_KG_M3},
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
-        "refusals": REASONS,
+        "refusals": [*zip(REASONS, REFUSED_AT, strict=True)],
+        "refused": {"outside": OUTSIDE, "empty": EMPTY, "not_a_number": NOT_A_NUMBER},
+        "front": {
+            "calibrated": settings["model"]["calibrated_crush_m"],
+            "least": LEAST_CRUSH,
+            "most": MOST_CRUSH,
+            "beyond": BEYOND_FRONT,
+            "short": SHORT_OF_FRONT,
+        },
         "words": REASON_WORDS,
         "step_s": reported_step_s(control),
         "finer": [
@@ -96,14 +121,12 @@ def page_data(
                 "paired": float(finer.paired),
                 "step_s": reported_step_s(finer),
             }
-            for finer in finer_controls(closed)
+            for finer in finer_controls(simulated)
             if not finer.last_resort
         ],
-        "parts": list(PARTS),
+        "parts": parts_of(control),
         "colours": COLOURS,
-        "yaml": _yaml(settings),
-        "vehicle": [f"calibrated_crush: {settings['model']['calibrated_crush_m']} m"],
-        "soil": _ground_entries(ground),
+        "yaml": {system: _yaml(settings, ground, system) for system in SYSTEMS},
         "chosen": [dict(one) for one in chosen],
         "kernel": base64.b64encode(KERNEL.read_bytes()).decode(),
     }
@@ -169,6 +192,8 @@ def _layout() -> dict[str, Any]:
         "rulings": verdicts.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": entry_points.LAYER_ROOM,
+        "element_room": entry_points.ELEMENT_ROOM,
+        "memory_room": entry_points.MEMORY_ROOM,
         "columns": {**SOURCES, **dict(zip(SecondSpring._fields, OPTIONAL_COLUMNS, strict=True))},
     }
 
@@ -211,7 +236,7 @@ def _units() -> list[str]:
     return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES)} | {"J", "N"})
 
 
-def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -> dict[str, Any]:
+def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any], ground: Ground) -> dict[str, Any]:
     """Description of an input: words, unit, range of its slider, admitted and usual values."""
     field, here, axis = BY_NAME[name], start[name], settings["inputs"].get(name)
     assert field.admitted is not None  # as of every input
@@ -230,30 +255,51 @@ def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any]) -
         "unit": field.unit,
         "low": field.admitted.low,
         "high": field.admitted.high,
-        "from": min(ends),
-        "to": max(ends),
+        "reason": field.admitted.reason,
+        "needed": needed(field.unit),
+        "above": _above(name, ground),
+        "from": max(min(ends), field.admitted.low),
+        "to": min(max(ends), field.admitted.high),
         "usual": field.usual,
     }
 
 
-def _ground_entries(ground: Ground) -> list[str]:
+def _above(name: str, ground: Ground) -> tuple[float, str] | None:
+    """What an input must be more than in this soil, and what is said where it is not; None for no such limit."""
+    if name == "friction_angle_deg" and ground.slope_deg > 0.0:
+        return ground.slope_deg, f"the slope of {ground.slope_deg:g} deg must be less, {SLIDES}"
+    water = ground.water_table_m
+    if name == "soil_density_kg_m3" and water is not None and uppermost_is_wet(ground.layers, water):
+        return WATER_KG_M3, FLOATS
+    return None
+
+
+def _ground_entries(ground: Ground, system: str) -> list[str]:
     """The entries of a settings file for the soil as it lies."""
-    entries = [f"cohesion: {ground.cohesion_kPa} kPa"] if ground.cohesion_kPa else []
-    if ground.water_table_m is not None:
-        entries.append(f"water_table: {ground.water_table_m} m")
-    if ground.slope_deg:
-        entries.append(f"slope: {ground.slope_deg} deg")
+    given = [
+        ("cohesion", ground.cohesion_kPa or None, "kPa"),
+        ("water_table", ground.water_table_m, "m"),
+        ("slope", ground.slope_deg or None, "deg"),
+    ]
+    entries = [f"{key}: {_quantity(value, unit, system)}" for key, value, unit in given if value is not None]
     layers = [
-        f"{{from: {layer.from_m} m, density: {layer.density_kg_m3} kg/m^3, "
-        f"friction_angle: {layer.friction_angle_deg} deg, subgrade_reaction: {layer.subgrade_reaction_MN_m3} MN/m^3, "
-        f"cohesion: {layer.cohesion_kPa} kPa}}"
+        ", ".join(
+            f"{key}: {_quantity(value, field.unit, system)}"
+            for (key, field), value in zip(LAYER_FIELDS.items(), astuple(layer), strict=True)
+        )
         for layer in ground.layers
     ]
-    return [*entries, f"layers: [{', '.join(layers)}]"] if layers else entries
+    return [*entries, f"layers: [{', '.join(f'{{{one}}}' for one in layers)}]"] if layers else entries
 
 
-def _yaml(settings: Mapping[str, Any]) -> list[str]:
-    """The lines of a settings file after the design: criterion, model, solver."""
+def _quantity(value: float, unit: str, system: str) -> str:
+    """A value in a unit of the table with the unit that it is shown in, to six digits."""
+    shown = shown_unit(unit, system)
+    return describe(value / shown.size, shown.unit)
+
+
+def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str, list[str]]:
+    """What a settings file says beside the inputs: more entries of vehicle and soil, and the lines that follow."""
     criterion, model, solver = (settings[name] for name in ("criterion", "model", "solver"))
     soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
     readings = model["preset"]
@@ -261,10 +307,17 @@ def _yaml(settings: Mapping[str, Any]) -> list[str]:
         readings = "{" + ", ".join(f"{name}: {value}" for name, value in model["readings"].items()) + "}"
     asked = solver["accuracy"] or (f"{solver['accuracy_deg']} deg" if solver["accuracy_deg"] is not None else None)
     accuracy = f"step: {solver['step_s']} s" if asked is None else f"accuracy: {asked}"
-    limits = [f"{entry.key}: {criterion[entry.name]} {entry.unit}".rstrip() for entry in fields_of("criterion")]
-    return [
-        f"criterion: {{{', '.join(limits)}}}",
-        f"model: {{readings: {readings}, soil: {soil}, resistance: {model.get('resistance', RESISTANCES[0])}, "
-        f"unloading: {model.get('unloading', UNLOADINGS[0])}}}",
-        f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",
+    limits = [
+        f"{entry.key}: {_quantity(criterion[entry.name], entry.unit, system) if entry.unit else criterion[entry.name]}"
+        for entry in fields_of("criterion")
     ]
+    return {
+        "vehicle": [f"calibrated_crush: {_quantity(model['calibrated_crush_m'], 'm', system)}"],
+        "soil": _ground_entries(ground, system),
+        "lines": [
+            f"criterion: {{{', '.join(limits)}}}",
+            f"model: {{readings: {readings}, soil: {soil}, resistance: {model.get('resistance', RESISTANCES[0])}, "
+            f"unloading: {model.get('unloading', UNLOADINGS[0])}}}",
+            f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",
+        ],
+    }

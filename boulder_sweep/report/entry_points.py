@@ -27,11 +27,13 @@ from boulder_kernels._jit import array_kernel, inlined, when_compiling
 from boulder_kernels.design import design_in
 from boulder_kernels.embedded import step_errors
 from boulder_kernels.impact import STEP_RATIO
-from boulder_kernels.layered import SoilLayers, SoilSums
+from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
+from boulder_kernels.plastic import LAST, PLASTIC_WITH_GAP, Memory, memory_of
 from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.table import SAFETY, SAFETY_CONFIRMED, SAFETY_PRINTED, confirm_error, estimate_error
+from boulder_kernels.unloading import plastic_work, recall
 from boulder_kernels.verdict import VerdictLimits, write_rulings
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
@@ -52,7 +54,7 @@ HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
     *("vehicle_kinetic", "boulder_linear", "boulder_angular", "soil_elastic", "crush_spring"),
-    *("gravity", "soil_drag", "crush_damper", "pull"),
+    *("gravity", "soil_drag", "crush_damper", "pull", "soil_plastic"),
 )
 """Columns of a time history, in this order; m, rad, N, J. The parts of the energy as in `EnergyLedger`."""
 ENERGY = HISTORY.index("vehicle_kinetic")
@@ -79,9 +81,11 @@ def readings_from(s: np.ndarray) -> Readings:
 @inlined
 def control_from(s: np.ndarray, refined: bool) -> Control:
     """Return the control, which follows the readings, with its step or a third of it."""
-    h, yield_located = s[5], s[11] > 0.0
+    # What yields in plastic soil depends on what it remembers.
+    h, yield_located = s[5], s[11] > 0.0 and s[15] == ELASTIC
+    unloading = int(s[15])
     return Control(
-        h, s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, yield_located, refined, s[13], False, ELASTIC, False
+        h, s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, yield_located, refined, s[13], False, unloading, False
     )
 
 
@@ -107,10 +111,27 @@ LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 """Numbers for each layer of the soil of a design: enough for the layers, and once for their sums."""
 
 
+ELEMENT_ROOM, MEMORY_ROOM = 6, LAST + 6
+"""The same for each of N soil elements with what it remembers, and once for all; before them, where a record is kept,
+2 N + 1 for each of its samples."""
+
+
 @inlined
 def layers_from(t: np.ndarray, sums: np.ndarray) -> SoilLayers:
     """Return the rows of an array, and the numbers of another, as the layers of one design."""
     return SoilLayers(t[0], t[1], t[2], t[3], t[4], t[5], sums)
+
+
+@inlined
+def elements_from(room: np.ndarray, n: int) -> SoilElements:
+    """Return the first numbers of an array as n soil elements of one design."""
+    return SoilElements(room[:n], room[n : 2 * n], room[2 * n : 3 * n], room[3 * n : 4 * n])
+
+
+@inlined
+def memory_from(room: np.ndarray, n: int, gap: bool, samples: np.ndarray) -> Memory:
+    """Return the numbers behind n soil elements as what they remember."""
+    return Memory(room[4 * n : 5 * n], room[5 * n : 6 * n], gap, room[6 * n :], samples)
 
 
 @array_kernel
@@ -119,17 +140,28 @@ def solve(
     row: int,
     designs: np.ndarray,
     layers: np.ndarray,
-    soil: SoilLayers,
+    soil_at: Any,
     readings: Readings,
     control: Control,
     record: Record,
 ) -> int:
     """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
     design, spring = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
-    if layers.shape[1] == 0:
+    m, n = layers.shape[1], control.elements
+    room = carray(soil_at, (max(LAYER_ROOM * m, ELEMENT_ROOM * n + MEMORY_ROOM),))
+    if m == 0:
         outcome = simulate(Problem(design, None, spring), readings, control, record)
+    elif n == 0:
+        profile = SoilProfile(layers[row], layers_from(carray(soil_at, (6, m)), room[6 * m :]), None)
+        outcome = simulate(Problem(design, profile, spring), readings, control, record)
+    elif control.unloading == ELASTIC:
+        by_elements = SoilProfile(layers[row], elements_from(room, n), None)
+        outcome = simulate(Problem(design, by_elements, spring), readings, control, record)
     else:
-        outcome = simulate(Problem(design, SoilProfile(layers[row], soil, None), spring), readings, control, record)
+        nothing = carray(soil_at, (0, 2 * n + 1))
+        memory = memory_from(room, n, control.unloading == PLASTIC_WITH_GAP, nothing)
+        plastic = SoilProfile(layers[row], elements_from(room, n), memory)
+        outcome = simulate(Problem(design, plastic, spring), readings, control, record)
     out[:, row] = np.nan
     write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
     second = int(out[SECOND, row])
@@ -152,9 +184,10 @@ def outcomes(
     layers_at
         Layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`.
     m
-        Number of layers; 0 for a uniform soil.
+        Number of layers; 0 for a uniform elastic soil.
     soil_at
-        Room for the layers of one design, shape (LAYER_ROOM, m).
+        Room for the soil of one design: for its layers, LAYER_ROOM m numbers, or for N soil elements ELEMENT_ROOM N +
+        MEMORY_ROOM.
     settings_at
         Settings, shape (len(SETTINGS),).
     fine_at
@@ -165,28 +198,25 @@ def outcomes(
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, estimated, way = readings_from(s), s[9] > 0.0, int(s[PAIRED_AT])
     designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (11, n)), carray(coarse_at, (11, n))
-    layers, soil = (
-        carray(layers_at, (n, m, 6)),
-        layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]),
-    )
+    layers = carray(layers_at, (n, m, 6))
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     for row in range(n):
-        second = solve(finer, row, designs, layers, soil, readings, control_from(s, estimated), record)
+        second = solve(finer, row, designs, layers, soil_at, readings, control_from(s, estimated), record)
         if not estimated or way == ONCE:
             continue
         if way == CHECKED and second == NONE_NEEDED:
             continue
         if way == CHECKED and second == FINER:
-            solve(coarser, row, designs, layers, soil, readings, halved_control_from(s), record)
+            solve(coarser, row, designs, layers, soil_at, readings, halved_control_from(s), record)
             if not np.isnan(coarser[THETA_MAX, row]):
                 confirm_error(fine, coarse, table, SAFETY_CONFIRMED, row)
                 for column in range(11):
                     finer[column, row] = coarser[column, row]
                 continue
-        solve(coarser, row, designs, layers, soil, readings, control_from(s, False), record)
+        solve(coarser, row, designs, layers, soil_at, readings, control_from(s, False), record)
         if way == CHECKED and second == COARSER:
             confirm_error(coarse, fine, table, safety, row)
         else:
@@ -231,10 +261,12 @@ def write_history(
 ) -> None:
     """Evaluate motion, force and energies of a record whose constants are `first` until a second spring takes over."""
     centre[0], centre[1] = first.c_x, first.c_y
+    memory = memory_of(first)
     for i in range(record.times.size):
         y = state_of(record, i)
         if np.isnan(y.x_b):
             break
+        recall(i, memory)
         sample = sample_of(record, i, first, second, design.m_v, readings)
         stored, touching = sample.stored, record.touching[i] > 0.0
         drag, damper, restoring, pull = (
@@ -246,12 +278,14 @@ def write_history(
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = y
         out[6, i] = record.touching[i]
         out[7, i] = -design.m_v * sample.rate.a_v if touching else 0.0
+        before, since = plastic_work(y, first, memory)
         out[8, i], out[9, i], out[10, i], out[11, i] = (
             stored.truck_kinetic,
             stored.boulder_kinetic,
             stored.boulder_rotational,
-            stored.soil_elastic,
+            stored.soil_elastic - since,
         )
+        out[17, i] = before + since
         out[12, i] = stored.crush_elastic
         out[13, i] = stored.gravity if readings.restoring_gravity else restoring
         # What is spent where the second spring takes over is lasting crush, as what the damper takes up.
@@ -281,7 +315,7 @@ def history(
     design_from
         Inputs, shape (len(DESIGN),).
     layers_at, m, soil_at
-        Layers of its soil, as of `outcomes`.
+        Layers of its soil, and room for it, as of `outcomes`; with soil elements for n samples, too.
     settings_at
         Settings, shape (len(SETTINGS),).
     n
@@ -299,22 +333,34 @@ def history(
     readings, control = readings_from(s), control_from(s, s[9] > 0.0)
     given = carray(design_from, (17, 1))
     design, second = design_in(given, 0), SecondSpring(given[15, 0], given[16, 0])
-    out, modes = carray(history_at, (17, n)), carray(modes_at, (2, n))
+    out, modes = carray(history_at, (18, n)), carray(modes_at, (2, n))
     exchanged, offset = carray(exchanged_at, (n, 4)), carray(offset_at, (n,))
     record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
     out[:] = np.nan
     record.states[:] = np.nan
-    layers, soil = (
-        carray(layers_at, (1, m, 6))[0],
-        layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]),
-    )
-    centre = carray(centre_at, (2,))
+    layers = carray(layers_at, (1, m, 6))[0]
+    centre, elements = carray(centre_at, (2,)), control.elements
+    samples, kept = carray(soil_at, (n, 2 * elements + 1)), n * (2 * elements + 1)
+    room = carray(soil_at, (kept + ELEMENT_ROOM * elements + MEMORY_ROOM,))[kept:]
     if m == 0:
         simulate(Problem(design, None, second), readings, control, record)
-        uniform = constants_in(design, readings, control.elements, None)
+        uniform = constants_in(design, readings, elements, None)
         write_history(uniform, design, second, readings, record, out, centre)
-    else:
-        profile = SoilProfile(layers, soil, None)
+    elif elements == 0:
+        profile = SoilProfile(
+            layers, layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]), None
+        )
         simulate(Problem(design, profile, second), readings, control, record)
-        c = constants_in(design, readings, control.elements, profile)
+        c = constants_in(design, readings, 0, profile)
         write_history(c, design, second, readings, record, out, centre)
+    elif control.unloading == ELASTIC:
+        by_elements = SoilProfile(layers, elements_from(room, elements), None)
+        simulate(Problem(design, by_elements, second), readings, control, record)
+        of_elements = constants_in(design, readings, elements, by_elements)
+        write_history(of_elements, design, second, readings, record, out, centre)
+    else:
+        memory = memory_from(room, elements, control.unloading == PLASTIC_WITH_GAP, samples)
+        plastic = SoilProfile(layers, elements_from(room, elements), memory)
+        simulate(Problem(design, plastic, second), readings, control, record)
+        of_plastic = constants_in(design, readings, elements, plastic)
+        write_history(of_plastic, design, second, readings, record, out, centre)

@@ -6,15 +6,19 @@ page's script finds figures and sources by name and sets their data.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
 from bokeh.models.annotations import BoxAnnotation, Legend
 from bokeh.plotting import figure
 
+from boulder_kernels import ELASTIC, Control
 from boulder_sweep.views.figures import VERDICTS
 
 COLOURS = {**VERDICTS, "none": "#BBBBBB"}
 """Colours of verdicts, those of `sweep plot`."""
 LINES = ("#1E88C9", "#D55E00", "#009E73")
+PLASTIC_WORK = "soil_plastic"
 PARTS = {
     "vehicle_kinetic": ("vehicle, moving", "#0072B2"),
     "crush_damper": ("vehicle, crushed for good", "#56B4E9"),
@@ -23,24 +27,32 @@ PARTS = {
     "boulder_angular": ("boulder, turning", "#E69F00"),
     "gravity": ("boulder, lifted", "#F0E442"),
     "soil_elastic": ("soil, pressed", "#009E73"),
+    PLASTIC_WORK: ("soil, pressed for good", "#9A6324"),
     "soil_drag": ("soil, dragged", "#7FCFB5"),
 }
 """Energies in stacking order: word and colour."""
 
 
-def curves(panel: str) -> list[figure]:
+def parts_of(control: Control) -> list[str]:
+    """Return the energies that there are in a soil, in stacking order."""
+    return [part for part in PARTS if part != PLASTIC_WORK or control.unloading != ELASTIC]
+
+
+def curves(panel: str, parts: Sequence[str]) -> list[figure]:
     """Return the figures of one simulated design.
 
     Parameters
     ----------
     panel
         Name of the part of the page; the names of figures and sources begin with it.
+    parts
+        Energies that are drawn, of `PARTS`.
     """
     motion = ColumnDataSource(
         {name: [0.0, 1.0] for name in ("time", "rotation", "limit", "boulder", "vehicle", "force")},
         name=f"{panel}-motion",
     )
-    energies = ColumnDataSource({name: [0.0, 1.0] for name in ("time", *PARTS)}, name=f"{panel}-energies")
+    energies = ColumnDataSource({name: [0.0, 1.0] for name in ("time", *parts)}, name=f"{panel}-energies")
     rotation = _plot(panel, "rotation", [("time", "@time{0.000} s"), ("rotation", "@rotation{0.00}")])
     rotation.line("time", "rotation", source=motion, line_width=2, color=LINES[0])
     rotation.line("time", "limit", source=motion, line_width=2, color=LINES[1], line_dash="dashed")
@@ -57,11 +69,11 @@ def curves(panel: str) -> list[figure]:
     force.line("time", "force", source=motion, line_width=2, color=LINES[0])
     energy = _plot(panel, "energy", [])
     energy.varea_stack(
-        list(PARTS),
+        list(parts),
         x="time",
         source=energies,
-        color=[colour for _, colour in PARTS.values()],
-        legend_label=[word for word, _ in PARTS.values()],
+        color=[PARTS[part][1] for part in parts],
+        legend_label=[PARTS[part][0] for part in parts],
     )
     for plot in (displacement, energy):
         beside = plot.legend[0]

@@ -15,7 +15,7 @@ from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
-from boulder_sweep.report.figures import curves, verdict_map
+from boulder_sweep.report.figures import curves, parts_of, verdict_map
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
@@ -89,7 +89,7 @@ def assembled(
     """
     panels = ["live", *(f"chosen{place}" for place in range(len(chosen)))]
     document = Document()
-    for plot in [*(plot for panel in panels for plot in curves(panel)), verdict_map("live")]:
+    for plot in [*(plot for panel in panels for plot in curves(panel, parts_of(control))), verdict_map("live")]:
         document.add_root(plot)
     table = None if rows is None or kept is None else table_data(rows, kept)
     if table is not None and table["mapped"]:
@@ -131,6 +131,7 @@ def assembled(
         lines=setting_lines(settings),
         readings=reading_words(settings),
         ground=ground_words(settings),
+        uncertain="distributions" in settings,
         law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),
         data=script_data(data),
         style=(ASSETS / "page.css").read_text(encoding="utf-8"),

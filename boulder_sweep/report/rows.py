@@ -86,6 +86,9 @@ out."""
 MOST_POINTS = 20_000
 """The same for a list of designs, each of which carries its inputs."""
 
+MOST_ELEMENTS = 5000
+"""Most soil elements that the page simulates with; the paper has as many."""
+
 
 def condition_of(name: str) -> str:
     """Return which of the conditions an axis or a column belongs to; empty for what the designer chooses."""

@@ -15,7 +15,7 @@ from boulder_sweep.judge.evaluation import control_of, known_control, readings_o
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import Named, answer_of
-from boulder_sweep.report.rows import read_rows, thinned
+from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system
@@ -209,14 +209,11 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
     if not control.error_estimate:
         notes.append("Numerical errors are those of one solution: a verdict nearer to a limit than that is undecided.")
     if control.unloading:
+        notes.append(f"The soil is plastic ({UNLOADING_WORDS[control.unloading]}).")
+    if control.elements > MOST_ELEMENTS:
         notes.append(
-            f"The table was computed with plastic soil ({UNLOADING_WORDS[control.unloading]}); what is simulated in "
-            "this page uses elastic soil."
-        )
-    if control.elements:
-        notes.append(
-            f"The table was computed with {control.elements:,} soil elements; what is simulated in this page uses the "
-            "closed form, the limit of ever more elements."
+            f"The settings ask for {control.elements:,} soil elements; what is simulated in this page uses "
+            f"{MOST_ELEMENTS:,}, which differ little from more."
         )
     return notes
 

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
-from boulder_sweep.settings.model import WATER_KG_M3, SolverSettings
+from boulder_sweep.settings.model import WATER_KG_M3, Layer, SolverSettings
+
+SLIDES = "or the ground slides"
+"""What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""
+FLOATS = "soil of {value} would float; give the density of the saturated soil below it"
+"""Why a density is refused below the water table; the page of a report says the same."""
 
 
 def check_complete(entries: Entries) -> None:
@@ -104,6 +110,11 @@ def _check_uncertain(entries: Entries) -> None:
         entries.problems.add(position, "partial_factor.friction_angle", message)
 
 
+def uppermost_is_wet(layers: Sequence[Layer], water_table_m: float) -> bool:
+    """Return whether the water table lies in the uppermost layer of the soil, which `layers` leaves out."""
+    return not layers or layers[0].from_m > water_table_m
+
+
 def _check_ground(entries: Entries) -> None:
     """Report ground that falls as steeply as its friction angle, and soil that would float below the water table."""
     layers = entries.settings.get("layers", ())
@@ -113,13 +124,13 @@ def _check_ground(entries: Entries) -> None:
         angles = [*entries.values("friction_angle_deg"), *(layer.friction_angle_deg for layer in layers)]
         least = math.degrees(math.atan(math.tan(math.radians(min(angles))) / factor)) if len(angles) else math.inf
         if slope >= least:
-            message = f"must be less than every friction angle (the least is {least:.4g} deg), or the ground slides"
+            message = f"must be less than every friction angle (the least is {least:.4g} deg), {SLIDES}"
             entries.problems.add(entries.key_position("soil", "slope"), "soil.slope", message)
     if water is not None:
-        top_is_wet = not layers or layers[0].from_m > water
+        top_is_wet = uppermost_is_wet(layers, water)
         bottoms = [*(layer.from_m for layer in layers[1:]), math.inf]
         densities = [layer.density_kg_m3 for layer, bottom in zip(layers, bottoms, strict=False) if bottom > water]
         densities += [*entries.values("soil_density_kg_m3")] if top_is_wet else []
         if densities and min(densities) <= WATER_KG_M3:
-            message = f"soil of {min(densities):g} kg/m^3 would float; give the density of the saturated soil below it"
+            message = FLOATS.format(value=f"{min(densities):g} kg/m^3")
             entries.problems.add(entries.key_position("soil", "water_table"), "soil.water_table", message)

@@ -18,6 +18,9 @@ from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 MAX_AXIS = 1_000_000
 """Most values on one axis."""
 
+OUTSIDE = "{value} is outside the admitted range of {low} to {high} ({reason})"
+"""Why a value is not admitted; the page of a report says the same."""
+
 _RANGE_KEYS = ("from", "to", "count", "step")
 _TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
 
@@ -122,10 +125,8 @@ def outside(value: float, field: Field) -> str:
     bound = field.admitted
     if bound is None or bound.low <= value <= bound.high:
         return ""
-    return (
-        f"{describe(value, field.unit)} is outside the admitted range of "
-        f"{bound.low:g} to {describe(bound.high, field.unit)} ({bound.reason})"
-    )
+    high = describe(bound.high, field.unit)
+    return OUTSIDE.format(value=describe(value, field.unit), low=f"{bound.low:g}", high=high, reason=bound.reason)
 
 
 def _unfold_text_list(node: Node) -> Node:

@@ -22,6 +22,20 @@ _TERZAGHI_ANGLES, _TERZAGHI = np.array([30.0, 35.0, 40.0]), np.array([2.2, 6.6, 
 FAMILY_FACTOR = 2.0
 """How far a pair of soil constants may be off the nearer family of data."""
 
+_FRONT = ("vehicle_mass_kg", "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_damper_N_s_m")
+LEAST_CRUSH, MOST_CRUSH = 0.5, 1.25
+"""Crush at a rigid wall over the calibrated one, between which spring and damper are taken for those of the vehicle. A
+boulder gives way and takes less of the front than a wall: hence more than 1."""
+BEYOND_FRONT = (
+    "against a rigid wall the front of this vehicle would be crushed by {crush}; its spring and damper are calibrated "
+    "up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
+)
+SHORT_OF_FRONT = (
+    "against a rigid wall the front of this vehicle would be crushed by only {crush}; its spring and damper are "
+    "calibrated up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
+)
+"""Cautions where a vehicle is far from the one its spring and damper were fitted to; a report's page says the same."""
+
 
 def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Problem]:
     """Yield a note for every unusual value and for data that do not belong together.
@@ -51,6 +65,9 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Proble
         if off.any():
             message = _unusual("embedment_ratio", ratio[off])
             yield _note(positions["embedment_depth_m"], "site.embedment_depth", f"depth over height: {message}")
+    message = _off_front(values, groups, sweep.model.calibrated_crush_m)
+    if message:
+        yield _note(positions["vehicle_spring_N_m"], "vehicle.spring", message)
     limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
     if usual is not None and limit > usual.high:
         yield _note(Position(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}")
@@ -74,6 +91,47 @@ def _pairs(
             return group[one], group[other]
     ones, others = np.meshgrid(_thinned(values[one]), _thinned(values[other]))
     return ones, others
+
+
+def wall_crush(mass: np.ndarray, speed: np.ndarray, spring: np.ndarray, damper: np.ndarray) -> np.ndarray:
+    """Return by how much the front of a vehicle is crushed against a rigid wall (Eqs 49 to 51) [m].
+
+    Parameters
+    ----------
+    mass, speed, spring, damper : ndarray
+        Of vehicles, in SI units, in shapes that broadcast against each other.
+    """
+    by_damper = mass * speed / damper
+    decay, squared = -0.5 * spring / damper, spring / mass - (0.5 * spring / damper) ** 2
+    b = np.sqrt(np.maximum(squared, 0.0))
+    # An over-damped vehicle only comes to rest with its spring released.
+    stops = np.arctan2(b, decay)
+    by_spring = speed * np.exp(decay * stops / np.where(b > 0.0, b, np.inf)) * np.sin(stops)
+    return by_damper + np.where(b > 0.0, by_spring / np.where(b > 0.0, b, 1.0), 0.0)
+
+
+def _off_front(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], calibrated: float) -> str:
+    """Return a caution if a vehicle's front would be crushed far from what spring and damper were fitted to.
+
+    The crush grows with mass and speed, and falls with spring and damper, so the ends of axes suffice.
+    """
+    if "vehicle_second_spring_N_m" in values:
+        return ""  # its front is no single spring and damper
+    listed = [group for group in groups if len(group) > 1 and set(group) & set(_FRONT)]
+    front = []
+    for name in _FRONT:
+        place = next((k for k, group in enumerate(listed) if name in group), None)
+        own = values[name] if place is not None else np.array([values[name].min(), values[name].max()])
+        dimension = _FRONT.index(name) if place is None else len(_FRONT) + place
+        front.append(own.reshape([-1 if k == dimension else 1 for k in range(len(_FRONT) + len(listed))]))
+    crush = wall_crush(*front)
+    found, words = float(crush.max()), BEYOND_FRONT
+    up_to = "" if crush.min() == found else "up to "
+    if found <= MOST_CRUSH * calibrated:
+        found, words, up_to = float(crush.min()), SHORT_OF_FRONT, ""
+        if found >= LEAST_CRUSH * calibrated:
+            return ""
+    return words.format(crush=f"{up_to}{found:.3g} m", calibrated=f"{calibrated:g} m")
 
 
 def _without_partner(off: np.ndarray) -> np.ndarray:

@@ -17,6 +17,8 @@ _NUMBER = re.compile(r"([+-]?)(\d*)(?:\.(\d*))?(?:[eE]([+-]?\d+))?", re.ASCII)
 _YES_NO = frozenset({"true", "false", "yes", "no", "on", "off", "y", "n"})
 _NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)\b.*", re.IGNORECASE)
 _FEET_AND_INCHES = re.compile(r"[+-]?[\d.]+\s*['′](?!\d{3}).*|[+-]?[\d.]+\s*(\"|″|'')")
+EMPTY, NOT_A_NUMBER = "is empty", "is not a number"
+"""What may be wrong with a number; the page of a report says the same."""
 _MAX_DIGITS = 40
 _MAX_EXPONENT = 300
 
@@ -80,20 +82,20 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
     """
     stripped = text.strip().replace("−", "-")
     quoted = f"'{shorten(text)}'"
-    needed = _needed(unit, sample)
+    words = needed(unit, sample)
     if not stripped or stripped in ("~", "null", "Null", "NULL"):
-        raise NumberError(f"is empty; {needed}")
+        raise NumberError(f"{EMPTY}; {words}")
     if stripped.lower() in _YES_NO:
-        raise NumberError(f"{quoted} is a yes/no value; {needed}")
+        raise NumberError(f"{quoted} is a yes/no value; {words}")
     if _NOT_FINITE.fullmatch(stripped):
-        raise NumberError(f"{quoted} is not a finite number; {needed}")
+        raise NumberError(f"{quoted} is not a finite number; {words}")
     match = _NUMBER.match(stripped)
     sign, whole, decimals, exponent = match.groups() if match else ("", "", None, None)
     rest = stripped[match.end() :] if match else stripped
     if not (whole or decimals):
-        raise NumberError(f"{quoted} is not a number; {needed}")
+        raise NumberError(f"{quoted} {NOT_A_NUMBER}; {words}")
     if whole == "0" and rest[:1].lower() in ("x", "o", "b"):
-        raise NumberError(f"{quoted} is not a decimal number; {needed}")
+        raise NumberError(f"{quoted} is not a decimal number; {words}")
     if len(whole) > 1 and whole.startswith("0"):
         raise NumberError(f"{quoted} begins with a zero, which some programs read as octal; remove the zero")
     if _FEET_AND_INCHES.fullmatch(stripped):
@@ -105,7 +107,7 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
             f"{quoted} is not a plain number; use a decimal point and no thousands separators, as in 6800.5"
         )
     if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
-        raise NumberError(f"{quoted} is not one number; {needed}, or a range {{from: ..., to: ..., count: ...}}")
+        raise NumberError(f"{quoted} is not one number; {words}, or a range {{from: ..., to: ..., count: ...}}")
     digits = whole + (decimals or "")
     power = _MAX_EXPONENT + 1 if len(exponent or "") > 9 else int(exponent or 0)
     if len(digits) > _MAX_DIGITS or abs(power) > _MAX_EXPONENT:
@@ -135,7 +137,8 @@ def describe(value: float, unit: str) -> str:
     return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
 
 
-def _needed(unit: str, sample: str) -> str:
+def needed(unit: str, sample: str = "") -> str:
+    """Return what an entry takes whose bare numbers are in a unit of the table, with an example."""
     expected = EXPECTED[unit]
     if unit == "1":
         return "a number is needed"

@@ -19,7 +19,7 @@ from docs.studies.readings import ReadingsStudy, readings_study
 from docs.studies.settings_tables import choices_table, columns_table, entries_table
 from docs.studies.validity import crush_words, flags_of_grids, flags_table
 from docs.studies.wild import wild_table
-from docs.studies.wording import balance_words, convergence_words, fit_text, readings_words
+from docs.studies.wording import balance_words, caution_text, convergence_words, fit_text, readings_words
 
 GRID = Path("configs/m30_sizing.yaml")
 EVERY = 7
@@ -220,6 +220,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "energy-words": _balance_words,
     "energy-audit": _audit,
     "vehicle-fit": _fit,
+    "vehicle-caution": caution_text,
     "coverage": _coverage,
     "knife-edge": _knife_edge,
     "admitted-box": _admitted_box,

@@ -16,11 +16,11 @@ OF_THE_PAPER = [vehicle for vehicle, (code, _) in CLASSES.items() if code == "M"
 
 @pytest.mark.parametrize("vehicle", OF_THE_PAPER)
 @pytest.mark.parametrize("units", UNITS)
-def test_the_file_is_valid_without_notes(tmp_path, vehicle, units):
+def test_the_file_is_valid_and_only_the_speed_beyond_the_fitted_one_has_a_note(tmp_path, vehicle, units):
     path = tmp_path / "new.yaml"
     path.write_text(starter("new", vehicle, units))
     sweep = load(path)
-    assert sweep.notes == ()
+    assert [note.key for note in sweep.notes] == (["vehicle.spring"] if vehicle == "M50" else [])
     assert sweep.n_designs > 100
     assert sweep.constants["impact_speed_m_s"] == pytest.approx(int(vehicle[1:]) * 0.44704, rel=1e-4)
 

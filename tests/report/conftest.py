@@ -13,6 +13,13 @@ site: {embedment_ratio: {from: 0.45, to: 0.75, count: 7}}
 soil: {density: 1860 kg/m^3, friction_angle: [36, 40] deg, subgrade_reaction: 60 MN/m^3}
 vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
 """
+SITE = """\
+name: site
+boulder: {length: 1.65 m, width: 1.68 m, height: 3.4 m, density: 2600 kg/m^3}
+site: {embedment_ratio: 0.6}
+soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
 SETS = """\
 name: sites
 boulder: {length: 1.65 m, width: 1.68 m, height: [2.4, 3.4] m, density: 2596 kg/m^3}
@@ -39,6 +46,13 @@ def result(tmp_path_factory):
     out = folder / "sizing.sweep"
     boulder_sweep.run(boulder_sweep.load(folder / "grid.yaml"), out)
     return out
+
+
+def reported(text, folder, overrides=()):
+    """Run a file and return the report of the result."""
+    (folder / "site.yaml").write_text(text)
+    boulder_sweep.run(boulder_sweep.load(folder / "site.yaml", overrides), folder / "site.sweep")
+    return write_report(folder / "site.sweep", folder / "site.html")
 
 
 @pytest.fixture(scope="session")

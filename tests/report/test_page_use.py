@@ -1,46 +1,17 @@
 """What a reader does with the page: chooses axes, types numbers, plays, prints, reads it on a phone."""
 
+import re
+from dataclasses import astuple
+
 import pytest
 
 import boulder_sweep
-from boulder_sweep.report import write_report
-from boulder_sweep.settings import load_text
-from tests.report.conftest import LIST
+from boulder_sweep.report import write_explorer
+from boulder_sweep.settings.problems import SettingsError
+from tests.report.conftest import LIST, SITE, reported
+from tests.soils.test_ground import IN_FILE
 
-SITE = """\
-name: site
-boulder: {length: 1.65 m, width: 1.68 m, height: 3.4 m, density: 2600 kg/m^3}
-site: {embedment_ratio: 0.6}
-soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
-vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
-"""
 STRIP = SITE.replace("height: 3.4 m", "height: {from: 1.8 m, to: 3.6 m, count: 19}")
-
-
-def reported(text, folder):
-    """Run a file and return the report of the result."""
-    (folder / "site.yaml").write_text(text)
-    boulder_sweep.run(boulder_sweep.load(folder / "site.yaml"), folder / "site.sweep")
-    return write_report(folder / "site.sweep", folder / "site.html")
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("kind", ["run", "uncertainty"])
-def test_the_report_of_one_design_has_a_simulator_and_no_map(kind, tmp_path, opened):
-    if kind == "run":
-        file = reported(SITE, tmp_path)
-    else:
-        uncertain = load_text(SITE.replace("angle: 40 deg", "angle: {mean: 40 deg, cov: 5 %}"), tmp_path / "site.yaml")
-        boulder_sweep.uncertainty(uncertain, half_width=0.2).write(tmp_path / "site.parquet")
-        file = write_report(tmp_path / "site.parquet", tmp_path / "site.html")
-    page = opened(file)
-    assert page.complaints == []
-    assert not page.is_visible("#failure")
-    assert "No input differs between designs, so there is no map." in page.inner_text("main")
-    assert page.inner_text("#verdict") == page.inner_text("#chosen0-verdict")
-    page.fill("#in-embedment_depth_m", "1.2")
-    assert page.inner_text("#verdict").startswith("✘ fail")
-    assert page.complaints == []
 
 
 def test_one_axis_is_a_strip(tmp_path, opened):
@@ -107,28 +78,136 @@ def test_designs_of_a_list_at_one_place_show_the_worst_of_them(tmp_path, opened)
     assert "the map has 6 places" in page.inner_text("#sweep-words")
 
 
+def said_by_the_command(key, value, *more):
+    """Return what the command says of a value that it refuses."""
+    with pytest.raises(SettingsError) as refused:
+        boulder_sweep.load("configs/rwg.yaml", [*more, f"{key}={value}"])
+    return str(refused.value).split(f"{key}: ", 1)[1]
+
+
+REFUSED = (
+    ("friction_angle_deg", "432", "soil.friction_angle", "432"),
+    ("friction_angle_deg", "-5", "soil.friction_angle", "-5 deg"),
+    ("boulder_length_m", "0", "boulder.length", "0 m"),
+    ("impact_speed_m_s", "4469.95", "vehicle.speed", "4469.95"),
+    ("vehicle_mass_kg", "1e12", "vehicle.mass", "1e12 kg"),
+    ("embedment_depth_m", "", "site.embedment_depth", "''"),
+    ("strain_rate_factor", "", "soil.strain_rate_factor", "''"),
+)
+
+
+@pytest.fixture(scope="module")
+def explorer(tmp_path_factory):
+    """Page for the design of a file, whose impact height is given."""
+    return write_explorer(boulder_sweep.load("configs/rwg.yaml"), 0, tmp_path_factory.mktemp("page") / "rwg.html")
+
+
+def test_what_the_command_refuses_the_page_refuses_in_the_same_words(explorer, opened):
+    page = opened(explorer)
+    page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    before, found = page.input_value("#yaml"), page.inner_text("#verdict")
+    assert page.evaluate("page.cells.live.length") > 0 or page.wait_until_it_is_true("page.cells.live?.length > 0")
+    for name, typed, key, value in REFUSED:
+        page.fill(f"#in-{name}", typed)
+        page.press(f"#in-{name}", "Tab")
+        words = said_by_the_command(key, value)
+        assert page.inner_text(f"#refused-{name}") == words, name
+        assert page.input_value(f"#in-{name}") == typed
+        assert page.get_attribute(f"#in-{name}", "aria-invalid") == "true"
+        assert page.inner_text("#verdict").startswith("! error: ")
+        assert page.inner_text("#verdict").endswith(words)
+        assert page.input_value("#yaml") == ""
+        assert page.evaluate("page.cells.live.length") == 0
+        assert page.is_disabled("#copy")
+        page.click("#reset")
+        assert page.inner_text(f"#refused-{name}") == ""
+    assert (page.input_value("#yaml"), page.inner_text("#verdict")) == (before, found)
+    assert not page.is_disabled("#copy")
+    assert page.complaints == []
+
+
 @pytest.mark.nightly
-def test_leaving_a_box_shows_what_is_simulated(report, opened):
-    page = opened(report)
-    box, said = "#in-friction_angle_deg", "#limited-friction_angle_deg"
-    page.fill(box, "75")
-    assert page.inner_text(said) == "limited to 1 to 60°: 60° is simulated"
-    page.press(box, "Tab")
-    assert (page.input_value(box), page.evaluate("page.design.friction_angle_deg")) == ("60", 60.0)
-    assert page.inner_text(said) == "limited to 1 to 60°: 60° is simulated"
-    page.fill(box, "41")
-    assert page.inner_text(said) == ""
-    page.fill(box, "")
-    page.press(box, "Tab")
-    assert (page.input_value(box), page.evaluate("page.design.friction_angle_deg")) == ("41", 41.0)
-    assert page.inner_text(said) == "not a number: 41° is simulated"
-    page.click("#reset")
-    assert page.inner_text(said) == ""
+def test_values_stay_refused_while_others_change_and_ends_of_ranges_are_admitted(explorer, opened):
+    page = opened(explorer)
+    page.fill("#in-friction_angle_deg", "432")
+    page.fill("#in-embedment_depth_m", "2.2")
+    page.press("#in-embedment_depth_m", "Tab")
+    assert page.input_value("#in-embedment_depth_m") == "2.2"
+    assert page.inner_text("#verdict").startswith("! error: soil friction angle: 432 deg is outside")
+    page.focus("#slide-friction_angle_deg")
+    page.keyboard.press("End")
+    assert page.inner_text("#refused-friction_angle_deg") == ""
+    assert page.evaluate("page.design.embedment_depth_m") == 2.2
     page.select_option("#units", "us")
-    page.fill("#in-boulder_height_m", "100")
-    page.press("#in-boulder_height_m", "Enter")
-    assert float(page.input_value("#in-boulder_height_m")) == pytest.approx(20 / 0.3048, rel=1e-5)
-    assert page.inner_text("#limited-boulder_height_m").startswith("limited to 0.03281 to 65.62\u00a0ft: ")
+    page.fill("#in-impact_speed_m_s", "9999")
+    assert page.inner_text("#refused-impact_speed_m_s") == (
+        "9999 mph is outside the admitted range of 0 to 223.694 mph (up to 360 km/h)"
+    )
+    page.fill("#in-boulder_length_m", "65.6168")
+    assert page.inner_text("#refused-boulder_length_m") == ""
+    assert page.evaluate("page.design.boulder_length_m") == 20.0
+    page.select_option("#units", "si")
+    assert page.inner_text("#refused-impact_speed_m_s") == ""
+    assert not page.inner_text("#verdict").startswith("! error")
+
+
+@pytest.mark.nightly
+def test_what_does_not_fit_together_is_said_beside_the_field(tmp_path, explorer, opened):
+    page = opened(explorer)
+    page.fill("#in-embedment_depth_m", "3.5")
+    assert page.inner_text("#refused-embedment_depth_m") == "embedment depth is not less than the boulder's height"
+    page.fill("#in-embedment_depth_m", "2")
+    assert page.inner_text("#refused-embedment_depth_m") == ""
+    ground = ("soil.slope=8 deg", "soil.water_table=0.5 m")
+    page = opened(write_explorer(boulder_sweep.load("configs/rwg.yaml", ground), 0, tmp_path / "ground.html"))
+    page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    page.fill("#in-soil_density_kg_m3", "900")
+    words = "soil of 900 kg/m^3 would float; give the density of the saturated soil below it"
+    assert page.inner_text("#refused-soil_density_kg_m3") == words
+    with pytest.raises(SettingsError, match=re.escape(words)):
+        boulder_sweep.load("configs/rwg.yaml", [*ground, "soil.density=900"])
+    page.fill("#in-friction_angle_deg", "8")
+    assert page.inner_text("#refused-friction_angle_deg") == "the slope of 8 deg must be less, or the ground slides"
+    said = page.inner_text("#verdict")
+    assert "soil density: soil of 900 kg/m^3" in said
+    assert "soil friction angle: the slope of 8 deg" in said
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("units", ["si", "us"])
+def test_the_copied_file_is_in_the_units_shown_to_six_digits(units, tmp_path, opened):
+    ground = [*IN_FILE, "model.resistance=broms", "criterion.min_overlap=1 ft", "boulder.width=1.71234567 m"]
+    sweep = boulder_sweep.load("configs/rwg.yaml", ground)
+    page = opened(write_explorer(sweep, 0, tmp_path / "page.html", units=units))
+    text = page.input_value("#yaml")
+    numbers = re.findall(r"(?<![\w.])\d+\.?\d*(?:e[+-]\d+)?", text)
+    assert max(len(number.split("e")[0].replace(".", "").lstrip("0")) for number in numbers) == 6
+    assert ("ft" in text) == ("pcf" in text) == ("mph" in text) == (units == "us")
+    (tmp_path / "copied.yaml").write_text(text)
+    copied = boulder_sweep.load(tmp_path / "copied.yaml")
+    assert copied.constants == pytest.approx(sweep.constants, rel=1e-5)
+    assert copied.criterion.min_overlap_m == pytest.approx(0.3048, rel=1e-5)
+    assert copied.model.resistance == "broms"
+    for ours, theirs in zip(copied.model.ground.layers, sweep.model.ground.layers, strict=True):
+        assert astuple(ours) == pytest.approx(astuple(theirs), rel=1e-5)
+
+
+@pytest.mark.nightly
+def test_a_vehicle_far_from_its_spring_has_the_caution_of_the_command(explorer, opened):
+    page = opened(explorer)
+    for name, value, override in (
+        ("vehicle_mass_kg", 29483.5, "vehicle.mass=29483.5 kg"),
+        ("vehicle_mass_kg", 1100, "vehicle.mass=1100 kg"),
+        ("impact_speed_m_s", 22, "vehicle.speed=22 m/s"),
+        ("vehicle_damper_N_s_m", 5e4, "vehicle.damper=50 kN*s/m"),
+    ):
+        page.evaluate(f"page.take({{ ...page.data.start, {name}: {value} }})")
+        (note,) = [
+            str(note) for note in boulder_sweep.load("configs/rwg.yaml", [override]).notes if "wall" in str(note)
+        ]
+        assert note.split("vehicle.spring: ")[1] in page.inner_text("#flags")
+    page.click("#reset")
+    assert "rigid wall" not in page.inner_text("#flags")
 
 
 OWN_CLOCK = """(() => {

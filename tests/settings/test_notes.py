@@ -1,6 +1,10 @@
 """Remarks on what is valid and unusual."""
 
+import numpy as np
 import pytest
+
+from boulder_sweep.crash_tests.rigid_wall import RigidWall
+from boulder_sweep.settings.notes import wall_crush
 
 
 def _notes(sweep):
@@ -50,7 +54,7 @@ def test_unusual_values(load_with, override, words):
 
 
 def test_a_remark_has_its_place(load_it, minimal):
-    (note,) = _notes(load_it(minimal.replace("speed: 14.5", "speed: 30")))
+    note, _ = _notes(load_it(minimal.replace("speed: 14.5", "speed: 30")))
     assert note.startswith("grid.yaml:14:3: vehicle.speed: 30 m/s")
 
 
@@ -88,3 +92,46 @@ def test_soil_constants_off_both_families(load_with, angle, reaction, words):
 @pytest.mark.parametrize("override", ["site.embedment_depth=4 m", "site.embedment_ratio=1"])
 def test_what_cannot_be_computed_is_not_called_computed(load_with, override):
     assert not any("computed as given" in note for note in _notes(load_with(override)))
+
+
+FITTED = ("vehicle.spring=3103.3 kN/m", "vehicle.damper=138.91 kN*s/m", "vehicle.mass=15000 lb")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (("vehicle.speed=30 mph",), ""),
+        (("vehicle.speed=[20, 30, 40] mph",), ""),
+        (
+            ("vehicle.mass=65000 lb", "vehicle.speed=30 mph"),
+            "crushed by 2.85 m; its spring and damper are calibrated up",
+        ),
+        (("vehicle.mass=2430 lb", "vehicle.speed=30 mph"), "crushed by only 0.279 m; its spring"),
+        (("vehicle.speed=50 mph",), "crushed by 1.38 m;"),
+        (("vehicle.speed=[30, 40, 50] mph",), "crushed by up to 1.38 m;"),
+        (("vehicle.speed=50 mph", "vehicle.calibrated_crush=1.5 m"), ""),
+        (("vehicle.speed=10 mph",), "crushed by only 0.276 m;"),
+        (("vehicle.speed=50 mph", "vehicle.second_spring=9 MN/m", "vehicle.second_spring_from=1 m"), ""),
+    ],
+)
+def test_a_vehicle_far_from_what_its_spring_was_fitted_to(load_with, overrides, words):
+    found = [note for note in _notes(load_with(*FITTED, *overrides)) if "against a rigid wall" in note]
+    assert len(found) == (words != "")
+    assert not words or words in found[0]
+
+
+def test_named_vehicles_are_held_against_their_own_springs(load_with):
+    """Each of these is within its range; crossed, the heavy one on the soft spring would not be."""
+    light = "{name: light, mass: 1100 kg, speed: 30 mph, spring: 900 kN/m, damper: 25 kN*s/m}"
+    heavy = "{name: heavy, mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}"
+    assert not any("rigid wall" in note for note in _notes(load_with(f"vehicle=[{light}, {heavy}]")))
+    swapped = f"[{light.replace('1100 kg', '15000 lb')}, {heavy}]"
+    assert any("rigid wall" in note for note in _notes(load_with(f"vehicle={swapped}")))
+
+
+def test_the_crush_at_a_rigid_wall_is_that_of_the_analytic_solution():
+    chance = np.random.default_rng(5)
+    vehicles = np.exp(chance.uniform(np.log([1e3, 1.0, 2e5, 1e4]), np.log([3e4, 40.0, 5e7, 2e6]), (200, 4)))
+    walls = [RigidWall(*map(float, one)) for one in vehicles]
+    assert len({wall.over_damped for wall in walls}) == 2
+    np.testing.assert_allclose(wall_crush(*vehicles.T), [wall.max_displacement_m for wall in walls], rtol=1e-9)

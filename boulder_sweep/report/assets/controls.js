@@ -3,8 +3,18 @@
 
 /**
  * @typedef {{name: string, section: string, key: string, label: string, unit: string, low: number, high: number,
- *   from: number, to: number, usual: [number, number, string] | null}} Input
+ *   reason: string, needed: string, above: [number, string] | null, from: number, to: number,
+ *   usual: [number, number, string] | null}} Input `above`: what a value must be more than, and what is said otherwise
  */
+/**
+ * What is said of the value of an input that a settings file is refused for, and of a vehicle whose front is crushed
+ * further, or less far, than its spring and damper were fitted to; written by Python.
+ * @typedef {{outside: string, empty: string, not_a_number: string}} Refused
+ * @typedef {{calibrated: number, least: number, most: number, beyond: string, short: string}} Front
+ */
+
+/** Values that differ by less are the same in the six digits of a box. */
+const SIX_DIGITS = 1e-5;
 
 /** @param {string} id @returns {any} */
 const byId = (id) => document.getElementById(id);
@@ -22,58 +32,86 @@ function element(tag, text, kind = "") {
   return made;
 }
 
+/**
+ * Fill the places of a template, as Python's `str.format` does.
+ * @param {string} template
+ * @param {Record<string, string>} values
+ */
+function filled(template, values) {
+  return template.replace(/\{(\w+)\}/g, (_, name) => values[name]);
+}
+
 /** The sliders and boxes of the simulator. */
 class Controls {
-  /** @param {Input[]} inputs @param {Units} units @param {boolean} face whether the impact height follows from Eq 9 */
-  constructor(inputs, units, face) {
-    this.inputs = inputs;
+  /** @param {any} data of the page @param {Units} units */
+  constructor(data, units) {
+    /** @type {Input[]} */
+    this.inputs = data.inputs;
     this.units = units;
-    this.face = face;
-    /** @type {Record<string, number>} the design that is simulated */
+    /** Whether the impact height follows from Eq 9. @type {boolean} */
+    this.face = data.face;
+    /** @type {Refused} */
+    this.words = data.refused;
+    /** @type {Front} */
+    this.front = data.front;
+    /** Why what stands in the box of an input is refused, by its name. @type {Record<string, string>} */
+    this.refused = {};
+    /** @type {Record<string, number>} the design that was simulated last */
     this.shown = {};
   }
 
-  /** @param {(name: string, value: number) => void} changed what to do with a new value, in the unit of the table */
+  /** @param {(given: Record<string, number>) => void} changed what to do with new values, in the units of the table */
   listen(changed) {
     for (const input of this.inputs) {
       const box = byId(`in-${input.name}`);
-      const admitted = (/** @type {number} */ value) => Math.min(Math.max(value, input.low), input.high);
-      const typed = (/** @type {any} */ place) => place.valueAsNumber * this.units.size(input.unit);
       for (const place of [byId(`slide-${input.name}`), box]) {
         place.addEventListener("input", () => {
-          const value = typed(place);
-          this.say(input, "");
-          if (!Number.isFinite(value)) return;
-          changed(input.name, admitted(value));
-          // Slider and box have six digits.
-          if (Math.abs(admitted(value) - value) > 1e-5 * Math.abs(value)) this.say(input, `limited to ${this.range(input)}`);
+          const { value, why } = this.read(input, place);
+          delete this.refused[input.name];
+          if (why !== "") this.refused[input.name] = why;
+          changed(why === "" ? { [input.name]: value } : {});
         });
       }
-      // Whoever leaves the box sees what is simulated.
-      const settle = () => {
-        const value = typed(box);
-        if (admitted(value) === value) return;
-        if (!Number.isFinite(value)) this.say(input, "not a number");
-        box.value = this.digits(input);
-      };
-      for (const kind of ["change", "blur"]) box.addEventListener(kind, settle);
+      // Whoever leaves the box sees what is simulated; what is refused stays.
+      box.addEventListener("blur", () => {
+        if (!(input.name in this.refused)) box.value = this.digits(input);
+      });
     }
   }
 
-  /** @param {Input} input @returns {string} the value that is simulated, for its box */
+  /**
+   * Read a slider or a box as the command reads an entry of a file.
+   * @param {Input} input @param {any} place
+   * @returns {{value: number, why: string}} the value in the unit of the table, or why it is refused
+   */
+  read(input, place) {
+    const value = place.valueAsNumber * this.units.size(input.unit);
+    if (!Number.isFinite(value)) {
+      const wrong = place.validity.badInput ? this.words.not_a_number : this.words.empty;
+      return { value: NaN, why: `${wrong}; ${input.needed}` };
+    }
+    const admitted = Math.min(Math.max(value, input.low), input.high);
+    const written = (/** @type {number} */ one) => this.units.written(one, input.unit);
+    if (Math.abs(admitted - value) > SIX_DIGITS * Math.abs(value)) {
+      const low = sixDigits(input.low / this.units.size(input.unit));
+      const values = { value: written(value), low, high: written(input.high), reason: input.reason };
+      return { value: NaN, why: filled(this.words.outside, values) };
+    }
+    if (input.above !== null && admitted <= input.above[0]) return { value: NaN, why: filled(input.above[1], { value: written(value) }) };
+    return { value: admitted, why: "" };
+  }
+
+  /** @param {Input} input @returns {string} the value that was simulated last, for its box */
   digits(input) {
-    return String(Number((this.shown[input.name] / this.units.size(input.unit)).toPrecision(6)));
+    return sixDigits(this.shown[input.name] / this.units.size(input.unit));
   }
 
-  /** @param {Input} input @returns {string} what is admitted */
-  range(input) {
-    return `${number(input.low / this.units.size(input.unit))} to ${this.units.text(input.high, input.unit)}`;
-  }
-
-  /** @param {Input} input @param {string} why another value is simulated than the one that was typed; empty if it is not */
-  say(input, why) {
-    const words = why === "" ? "" : `${why}: ${this.units.text(this.shown[input.name], input.unit)} is simulated`;
-    byId(`limited-${input.name}`).textContent = words;
+  /** Say beside the boxes what is refused. @param {Record<string, string>} why by the names of the inputs */
+  say(why) {
+    for (const { name } of this.inputs) {
+      byId(`refused-${name}`).textContent = why[name] ?? "";
+      byId(`in-${name}`).setAttribute("aria-invalid", String(name in why));
+    }
   }
 
   /** @param {Record<string, number>} design by the columns of the table */
@@ -87,8 +125,7 @@ class Controls {
       slide.max = Math.max(input.to, value) / size;
       slide.value = value / size;
       slide.setAttribute("aria-valuetext", this.units.text(value, input.unit));
-      if (document.activeElement !== box) box.value = this.digits(input);
-      this.say(input, "");
+      if (document.activeElement !== box && !(input.name in this.refused)) box.value = this.digits(input);
       const name = this.units.name(input.unit);
       const place = box.closest(".control");
       place.querySelector(".unit").textContent = name === "" ? "" : `[${name}]`;
@@ -107,12 +144,29 @@ class Controls {
   /** @param {Record<string, number>} design */
   showFlags(design) {
     const flags = this.inputs.filter((input) => this.unusual(input, design[input.name]));
-    byId("flags").replaceChildren(
-      ...flags.map((input) => {
-        const [low, high, remark] = /** @type {[number, number, string]} */ (input.usual);
-        const range = `${number(low / this.units.size(input.unit))} to ${this.units.text(high, input.unit)}`;
-        return element("li", `${input.label}: outside the usual ${range} (${remark})`);
-      }),
-    );
+    const words = flags.map((input) => {
+      const [low, high, remark] = /** @type {[number, number, string]} */ (input.usual);
+      const range = `${number(low / this.units.size(input.unit))} to ${this.units.text(high, input.unit)}`;
+      return `${input.label}: outside the usual ${range} (${remark})`;
+    });
+    byId("flags").replaceChildren(...[...words, ...this.cautions(design)].map((one) => element("li", one)));
   }
+
+  /** @param {Record<string, number>} design @returns {string[]} cautions on its vehicle: `boulder_sweep.settings.notes` */
+  cautions(design) {
+    if ("vehicle_second_spring_N_m" in design) return [];
+    const { calibrated, least, most, beyond, short } = this.front;
+    const crush = wallCrush(design);
+    const values = { crush: this.units.written(crush, "m", 3), calibrated: this.units.written(calibrated, "m") };
+    if (crush > most * calibrated) return [filled(beyond, values)];
+    return crush < least * calibrated ? [filled(short, values)] : [];
+  }
+}
+
+/** @param {Record<string, number>} design @returns {number} crush of its vehicle at a rigid wall [m]: `wall_crush` of the same module */
+function wallCrush({ vehicle_mass_kg: m, impact_speed_m_s: v, vehicle_spring_N_m: k, vehicle_damper_N_s_m: c }) {
+  const decay = (-0.5 * k) / c;
+  const b = Math.sqrt(Math.max(k / m - decay ** 2, 0));
+  const stops = Math.atan2(b, decay);
+  return (m * v) / c + (b > 0 ? ((v * Math.exp((decay * stops) / b)) / b) * Math.sin(stops) : 0);
 }

@@ -3,9 +3,9 @@
 
 /**
  * Names of the numbers that the kernel takes and gives, each in its order, how many numbers a layer of soil has, and how
- * many the kernel makes of it; written by Python.
+ * many the kernel makes of it, of a soil element, and of all elements; written by Python.
  * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], sizes: string[],
- *   rulings: string[], layer: number, layer_room: number}} Layout
+ *   rulings: string[], layer: number, layer_room: number, element_room: number, memory_room: number}} Layout
  */
 
 /**
@@ -64,6 +64,18 @@ class Kernel {
   }
 
   /**
+   * @param {number} layers of the soil of a design
+   * @param {number[]} settings in the order of `Layout.settings`
+   * @param {number} [samples] of its motion
+   * @returns {number} how many numbers the kernel needs for the soil
+   */
+  soilRoom(layers, settings, samples = 0) {
+    const { layer_room, element_room, memory_room } = this.layout;
+    const elements = settings[this.layout.settings.indexOf("elements")];
+    return Math.max(layer_room * layers, samples * (2 * elements + 1) + element_room * elements + memory_room);
+  }
+
+  /**
    * Call an exported function. Before its own arguments, compiled Python takes the addresses of a result and of an
    * exception; none of ours uses them, and what it returns is 0 where all went well.
    * @param {string} name
@@ -82,12 +94,12 @@ class Kernel {
    * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome`
    */
   outcomes(designs, layers, settings) {
-    const { design, outcome, layer, layer_room } = this.layout;
+    const { design, outcome, layer } = this.layout;
     const n = designs.length;
     const given = layers.flat();
     const m = n > 0 ? layers[0].length / layer : 0;
     const { at, views } = this.room([
-      2, design.length * n, given.length, layer_room * m, settings.length, outcome.length * n, outcome.length * n,
+      2, design.length * n, given.length, this.soilRoom(m, settings), settings.length, outcome.length * n, outcome.length * n,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
     views[2].set(given);
@@ -117,17 +129,18 @@ class Kernel {
   /**
    * Simulate one design over time.
    * @param {KernelDesign} one
-   * @param {number[]} layers of its soil; none in a uniform soil
+   * @param {number[]} layers of its soil; none in a uniform elastic soil
    * @param {number[]} settings in the order of `Layout.settings`
    * @param {Float64Array} times ascending [s]
    * @returns {Motion}
    */
   history(one, layers, settings, times) {
-    const { design, history, layer, layer_room } = this.layout;
+    const { design, history, layer } = this.layout;
     const n = times.length;
     const m = layers.length / layer;
     const { at, views } = this.room([
-      2, design.length, layers.length, layer_room * m, settings.length, n, 6 * n, 2 * n, 4 * n, n, history.length * n, 2,
+      2, design.length, layers.length, this.soilRoom(m, settings, n), settings.length, n, 6 * n, 2 * n, 4 * n, n,
+      history.length * n, 2,
     ]);
     design.forEach((name, field) => (views[1][field] = one[name]));
     views[2].set(layers);

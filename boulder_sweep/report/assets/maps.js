@@ -96,11 +96,17 @@ function wordsOf(cell) {
   return (cell.names?.length ?? 1) > 1 ? `${words} (the worst of ${cell.names?.length} designs here)` : words;
 }
 
+/** @param {number} count @param {string} [of] @returns {string} how many designs pass, for a sentence */
+function passes(count, of = "") {
+  return `${count.toLocaleString("en-US")} ${of}${count === 1 ? "passes" : "pass"}`;
+}
+
 /** @param {Cell[]} cells @returns {string} how many designs pass, and whether some lie on each other */
 function summed(cells) {
   const all = cells.flatMap((cell) => cell.names ?? [cell.name]);
-  const [passing, total, places] = [all.filter((name) => name === "pass").length, all.length, cells.length].map((n) => n.toLocaleString("en-US"));
-  const first = `${passing} of the ${total} designs shown pass.`;
+  const passing = all.filter((name) => name === "pass").length;
+  const [total, places] = [all.length, cells.length].map((n) => n.toLocaleString("en-US"));
+  const first = `${passes(passing, `of the ${total} designs shown `)}.`;
   if (all.length === cells.length) return first;
   return `${first} Designs lie on each other: the map has ${places} ${cells.length === 1 ? "place" : "places"}, each shown as the worst of its designs, which a click or Enter simulates.`;
 }

@@ -1,7 +1,9 @@
 // @ts-check
 "use strict";
 
+/** Designs along each side of the map around a design, and where each of them takes long. */
 const AROUND = 40;
+const FEW_AROUND = 12;
 const SPREAD = 0.25;
 /** Time without a change after which the rest of the page follows the controls [ms]. */
 const PAUSE = 150;
@@ -21,7 +23,7 @@ class Page {
     this.units = new Units(data.unit, data.units);
     /** @type {Input[]} */
     this.inputs = data.inputs;
-    this.controls = new Controls(data.inputs, this.units, data.face);
+    this.controls = new Controls(data, this.units);
     /** @type {Record<string, number>} the design in the simulator */
     this.design = { ...data.start };
     /** @type {Record<string, number>[]} */
@@ -31,6 +33,8 @@ class Page {
     /** @type {Record<string, {scene: Scene, motion: Motion}>} */
     this.motions = {};
     this.waiting = 0;
+    /** Of maps around a design; another change makes the one that is being computed the last but one. */
+    this.rounds = 0;
     this.printing = false;
     /** @type {Record<string, Cell[]>} */
     this.cells = {};
@@ -66,6 +70,11 @@ class Page {
    */
   showMotion(panel, design) {
     const { judged: found, motion, inputs } = this.simulator.whole(design);
+    this.showFound(panel, found, motion, inputs);
+  }
+
+  /** @param {string} panel @param {Judged} found @param {Motion} motion @param {Record<string, number>} inputs */
+  showFound(panel, found, motion, inputs) {
     this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found);
     const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
     table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
@@ -131,33 +140,80 @@ class Page {
 
   /** Simulate the design of the controls, at once; its energy and the designs around it, as soon as the reader pauses. */
   update() {
-    this.showMotion("live", this.design);
-    this.controls.show(this.simulator.completed(this.design).inputs);
-    byId("yaml").value = yamlOf(this.data, this.design);
     clearTimeout(this.waiting);
+    this.rounds += 1;
+    const { refused } = this.controls;
+    const isRefused = Object.keys(refused).length > 0;
+    for (const name of ["add", "copy"]) byId(name).disabled = isRefused;
+    const { inputs, refusal, at } = this.simulator.completed(this.design);
+    this.controls.say(isRefused || refusal === "" ? refused : { [at]: refusal });
+    this.controls.show(inputs);
+    if (isRefused) {
+      this.refuse(refused, inputs);
+      return;
+    }
+    this.showMotion("live", this.design);
+    byId("yaml").value = yamlOf(this.data, this.design, this.units);
     this.waiting = setTimeout(() => {
       this.showEnergy("live");
       this.showAround();
     }, PAUSE);
   }
 
-  /** Simulate designs over two inputs around the one of the controls. */
-  showAround() {
+  /**
+   * Show nothing but why the values typed are refused.
+   * @param {Record<string, string>} refused by the names of inputs
+   * @param {Record<string, number>} inputs the last ones that were not
+   */
+  refuse(refused, inputs) {
+    const words = this.inputs.filter(({ name }) => name in refused).map(({ name, label }) => `${label}: ${refused[name]}`);
+    const nothing = Object.fromEntries(this.data.outcomes.map((/** @type {any} */ one) => [one.name, null]));
+    const found = /** @type {Judged} */ ({ ...nothing, verdict: "error", reason: words.join("; "), margin: null, rating: null });
+    this.showFound("live", found, this.simulator.motionless(), inputs);
+    this.showEnergy("live");
+    byId("flags").replaceChildren();
+    byId("yaml").value = "";
+    this.showCells([]);
+    byId("live-words").textContent = "";
+  }
+
+  /** Simulate designs over two inputs around the one of the controls; where that takes long, line by line in between. */
+  async showAround() {
+    const round = (this.rounds += 1);
     const { across, up } = this.axes.live;
+    const slow = this.simulator.isSlow;
+    const size = slow ? FEW_AROUND : AROUND;
     /** @param {string} name */
     const line = (name) => {
       const input = /** @type {Input} */ (this.inputs.find((one) => one.name === name));
       const here = this.design[name];
       const [low, high] = [Math.max(here * (1 - SPREAD), input.low), Math.min(here * (1 + SPREAD), input.high)];
-      return Array.from({ length: AROUND }, (_, k) => low + ((high - low) * k) / (AROUND - 1));
+      return Array.from({ length: size }, (_, k) => low + ((high - low) * k) / (size - 1));
     };
     const places = line(across).flatMap((x) => line(up).map((y) => ({ x, y })));
     const designs = places.map(({ x, y }) => ({ ...this.design, [across]: x, [up]: y }));
-    const found = this.simulator.rows(designs);
+    /** @type {Judged[]} */
+    const found = [];
+    const piece = slow ? 1 : designs.length;
+    while (found.length < designs.length) {
+      found.push(...this.simulator.rows(designs.slice(found.length, found.length + piece)));
+      if (!slow) break;
+      byId("live-words").textContent = `Simulating ${found.length} of ${designs.length} designs around this one.`;
+      await new Promise((next) => setTimeout(next));
+      if (round !== this.rounds) return;
+    }
     const cells = places.map(({ x, y }, k) => ({
       x, y, margin: found[k].margin, pick: () => ({ [across]: x, [up]: y }),
       name: found[k].reason === "" ? found[k].verdict : `${found[k].verdict}: ${found[k].reason}`,
     }));
+    this.showCells(cells);
+    const passing = found.filter((one) => one.verdict === "pass").length;
+    byId("live-words").textContent = `Of ${size} × ${size} designs within a quarter of this one, ${passes(passing)}.`;
+  }
+
+  /** Draw the map of designs around the one of the controls. @param {Cell[]} cells */
+  showCells(cells) {
+    const { across, up } = this.axes.live;
     this.cells = { ...this.cells, live: cells };
     const of = (/** @type {string} */ name) => /** @type {Input} */ (this.inputs.find((one) => one.name === name));
     const [labels, units] = [{ x: of(across).label, y: of(up).label }, { x: of(across).unit, y: of(up).unit }];
@@ -165,9 +221,6 @@ class Page {
     drawCells(this.plots, "live", cells, labels, units, this.units, this.data.colours, here);
     this.walkers.live.over(cells, labels, units, here);
     this.legend("live", cells);
-    const passing = found.filter((one) => one.verdict === "pass").length;
-    byId("live-words").textContent =
-      `Of ${AROUND} × ${AROUND} designs within a quarter of this one, ${passing.toLocaleString("en-US")} pass.`;
   }
 
   /** Draw the map of the table. */
@@ -286,6 +339,7 @@ class Page {
     }
     Object.assign(this.design, inputs);
     if (ratio !== undefined) this.design.embedment_depth_m = ratio * this.design.boulder_height_m;
+    this.controls.refused = {};
     this.update();
   }
 
@@ -297,8 +351,8 @@ class Page {
   /** Let the reader do what there is to do. */
   listen() {
     const { data } = this;
-    this.controls.listen((name, value) => {
-      this.design[name] = value;
+    this.controls.listen((given) => {
+      Object.assign(this.design, given);
       this.update();
     });
     for (const player of Object.values(this.players)) player.listen();
@@ -329,6 +383,7 @@ class Page {
     byId("units").addEventListener("change", () => {
       byId("units").focus(); // a box that is being typed into keeps its text, but not its unit
       this.units.system = byId("units").value;
+      this.controls.refused = {};
       this.refresh();
     });
     byId("theme").addEventListener("change", () => this.paint());
@@ -370,7 +425,7 @@ class Page {
 
   async copy() {
     try {
-      await navigator.clipboard.writeText(yamlOf(this.data, this.design));
+      await navigator.clipboard.writeText(byId("yaml").value);
       byId("copy").textContent = "Copied";
     } catch {
       byId("yaml").closest("details").open = true;

@@ -135,16 +135,27 @@ class Simulator {
     return { ...design, ...springs, K_epsilon: design.K_epsilon * (ground.is_proportional ? factor : 1) };
   }
 
-  /** @param {KernelDesign} design @returns {number[]} the layers of its soil; none where resistance grows with depth */
+  /**
+   * @param {KernelDesign} design
+   * @returns {number[]} the layers of its soil; none where it is elastic and its resistance grows with depth
+   */
   layers(design) {
     const { resistance, ground, rules } = this.data;
-    return ground.is_proportional ? [] : layersOf(resistance, ground, design, rules.tested.gravity);
+    const g = rules.tested.gravity;
+    if (!ground.is_proportional) return layersOf(resistance, ground, design, g);
+    const { rho_s, phi, beta } = design;
+    return this.data.settings[this.at("unloading")] > 0 ? [Infinity, rho_s, phi, beta, 0, passiveCoefficient(phi) ** 2 * rho_s * g] : [];
+  }
+
+  /** @returns {boolean} whether a design takes a hundred times as long as in the closed form of the soil */
+  get isSlow() {
+    return this.data.settings[this.at("elements")] > 0;
   }
 
   /**
    * Fill in what follows from the other inputs, and say what cannot be.
    * @param {Record<string, number>} inputs
-   * @returns {{inputs: Record<string, number>, refusal: string}}
+   * @returns {{inputs: Record<string, number>, refusal: string, at: string}} `at`: the input beside which it is said
    */
   completed(inputs) {
     const exposed = inputs.boulder_height_m - inputs.embedment_depth_m;
@@ -155,7 +166,8 @@ class Simulator {
     if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
     if (hood < bumper) refused = 2;
     if (exposed <= 0) refused = 1;
-    return { inputs: { ...inputs, impact_height_m: impact }, refusal: this.data.refusals[refused] };
+    const [refusal, at] = this.data.refusals[refused];
+    return { inputs: { ...inputs, impact_height_m: impact }, refusal, at };
   }
 
   /**
@@ -205,6 +217,12 @@ class Simulator {
     const times = refusal === "" ? this.times : new Float64Array(0);
     const one = this.kernelDesign(inputs);
     return { judged, motion: this.kernel.history(one, this.layers(one), this.settings(beyond), times), inputs };
+  }
+
+  /** @returns {Motion} of what is not simulated */
+  motionless() {
+    const none = this.data.layout.history.map((/** @type {string} */ name) => [name, new Float64Array(0)]);
+    return { time: new Float64Array(0), columns: Object.fromEntries(none), c_x: 0, c_y: 0 };
   }
 
   /** @param {Record<string, number>} changed settings @returns {number} step of the solution that is reported [s] */

@@ -2,25 +2,26 @@
 "use strict";
 
 /**
- * A design as a file of settings.
+ * A design as a file of settings, in the units shown and to six digits.
  * @param {any} data of the page
  * @param {Record<string, number>} design
+ * @param {Units} units
  * @returns {string}
  */
-function yamlOf(data, design) {
+function yamlOf(data, design, units) {
   /** @type {Record<string, string[]>} */
   const sections = {};
   for (const { name, section, key, unit } of /** @type {Input[]} */ (data.inputs)) {
     if (name === "impact_height_m" && data.face) continue;
-    const words = unit === "1" ? "" : ` ${unit}`;
-    (sections[section] ??= []).push(`${key}: ${design[name]}${words}`);
+    (sections[section] ??= []).push(`${key}: ${units.written(design[name], unit)}`);
   }
-  sections.vehicle.push(...data.vehicle);
-  sections.soil.push(...data.soil);
+  const { vehicle, soil, lines } = data.yaml[units.system];
+  sections.vehicle.push(...vehicle);
+  sections.soil.push(...soil);
   return [
     `name: ${JSON.stringify(data.title)}`,
     ...Object.entries(sections).map(([section, entries]) => `${section}: {${entries.join(", ")}}`),
-    ...data.yaml,
+    ...lines,
     "",
   ].join("\n");
 }

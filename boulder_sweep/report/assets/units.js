@@ -22,9 +22,14 @@ class Units {
     return this.table[unit]?.[this.system][1] ?? 1;
   }
 
+  /** @param {string} unit of the table @returns {string} the unit shown, as a settings file has it */
+  plain(unit) {
+    return this.table[unit]?.[this.system][0] ?? unit;
+  }
+
   /** @param {string} unit of the table @returns {string} the unit shown */
   name(unit) {
-    const plain = this.table[unit]?.[this.system][0] ?? unit;
+    const plain = this.plain(unit);
     if (plain === "1" || plain === "") return "";
     return plain.replace("deg", "°").replace("^3", "³").replace("*", "·");
   }
@@ -39,6 +44,17 @@ class Units {
     if (typeof value === "string") return value;
     const name = this.name(unit);
     return name === "" ? number(value) : `${number(value / this.size(unit))}${name === "°" ? "" : "\u00a0"}${name}`;
+  }
+
+  /**
+   * A value as a settings file and its messages have it.
+   * @param {number} value in the unit of the table
+   * @param {string} unit of the table
+   * @param {number} [digits]
+   */
+  written(value, unit, digits = 6) {
+    const plain = this.plain(unit);
+    return `${sixDigits(value / this.size(unit), digits)}${plain === "1" ? "" : ` ${plain}`}`;
   }
 
   /** @param {number | string | null} value @param {string} unit of the table @returns {string} a number without its unit */
@@ -61,6 +77,17 @@ function number(value) {
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "–";
   if (value !== 0 && Math.abs(value) < 1e-3) return value.toLocaleString("en-US", { maximumSignificantDigits: 2 });
   return Number(value.toPrecision(Math.abs(value) >= 1e4 ? 5 : 4)).toLocaleString("en-US", { maximumFractionDigits: 9 });
+}
+
+/**
+ * A number of at most six digits, as Python's format `g` writes it.
+ * @param {number} value
+ * @param {number} [digits]
+ */
+function sixDigits(value, digits = 6) {
+  const [figures, power] = value.toExponential(digits - 1).split("e");
+  if (Number(power) >= -4 && Number(power) < digits) return String(Number(value.toPrecision(digits)));
+  return `${Number(figures)}e${power[0]}${power.slice(1).padStart(2, "0")}`;
 }
 
 /** @param {number} share @returns {string} */
