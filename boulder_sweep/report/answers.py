@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from boulder_sweep.columns import GRADES
+from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
 from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
@@ -64,10 +66,16 @@ def answer_of(rows: Rows) -> Answer:
     means = ", at the means of their uncertain inputs" if uncertain else ""
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
     sentences.append((f"{n:,} of {total:,} designs {_verb(n, 'pass', 'passes')} ({_share(n, total)}){means}.",))
+    if n and rows.grades:
+        sentences.append(_grades(rows, n))
     if NOT_YET in counts:
         left = f"{counted(counts[NOT_YET], 'design')} {_verb(counts[NOT_YET], 'are', 'is')}"
         sentences.append((f"The run is not finished: {left} not computed yet.",))
-    others = [f"{count:,} {_in_words(name, count)}" for name, count in counts.items() if name not in ("pass", NOT_YET)]
+    others = [
+        f"{count:,} {_in_words(name, count)}"
+        for name, count in counts.items()
+        if name.partition(":")[0] not in ("pass", NOT_YET)
+    ]
     if others:
         sentences.append((f"Of the others, {'; '.join(others)}.",))
     flagged = n - rows.flags.get("", 0) if rows.flags else 0
@@ -100,6 +108,16 @@ def answer_of(rows: Rows) -> Answer:
             one if known is None else Named(f"{known.title}, {one.title[0].lower()}{one.title[1:]}", one.number)
         )
     return Answer(tuple(sentences), tuple(named.values()))
+
+
+def _grades(rows: Rows, n: int) -> Sentence:
+    """Say how many of the passes are robust."""
+    robust, sensitive, left = (rows.grades.get(grade, 0) for grade in GRADES)
+    if left == n:
+        return ("No second opinion was asked for; whether a pass stands under another form of the model is open.",)
+    parts = ((robust, f"robust ({IN_WORDS})"), (sensitive, f"sensitive ({SENSITIVE_IN_WORDS})"), (left, "open"))
+    told = _listed(tuple(f"{count:,} {_verb(count, 'are', 'is')} {words}" for count, words in parts if count))
+    return (f"Of the {n:,} that {_verb(n, 'pass', 'passes')}, {told}.",)
 
 
 def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
@@ -144,6 +162,11 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     verdict = f"{_in_words(name, 1)}{margin}{', at the means of its uncertain inputs' if uncertain else ''}"
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
     sentences.append((f"The design {verdict}: ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep."))
+    grade = row.get("robustness")
+    if grade in (meanings := {"robust": IN_WORDS, "sensitive": SENSITIVE_IN_WORDS}):
+        sentences.append((f"It is {grade}: {meanings[grade]}.",))
+    elif grade:
+        sentences.append(("No second opinion was asked for.",))
     flags = [flag for flag in (row["validity"] or "").split(SEPARATOR) if flag]
     if flags:
         sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))
@@ -173,7 +196,7 @@ def _in_words(name: str, count: int) -> str:
     """Verdict and reason of so many designs for a sentence."""
     verdict, _, reason = name.partition(": ")
     verb = _verb(count, *VERBS[verdict])
-    return f"{verb} ({REASON_WORDS.get(reason, reason)})" if reason else verb
+    return f"{verb} ({REASON_WORDS.get(reason, reason)})" if reason and verdict != "pass" else verb
 
 
 def _share(n: int, total: int) -> str:

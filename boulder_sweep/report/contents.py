@@ -34,7 +34,7 @@ from boulder_sweep.report.rows import MOST_ELEMENTS, SIZES, Rows, Thinned, label
 from boulder_sweep.settings.choices import LAYER_FIELDS
 from boulder_sweep.settings.consistency import FLOATS, SLIDES, uppermost_is_wet
 from boulder_sweep.settings.fields import BY_NAME, fields_of
-from boulder_sweep.settings.leaf import OUTSIDE
+from boulder_sweep.settings.leaf import OUTSIDE, sample_of
 from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
 from boulder_sweep.settings.notes import (
     BEYOND_FRONT,
@@ -256,7 +256,7 @@ def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any], g
         "low": field.admitted.low,
         "high": field.admitted.high,
         "reason": field.admitted.reason,
-        "needed": needed(field.unit),
+        "needed": needed(field.unit, sample_of(field)),
         "above": _above(name, ground),
         "from": max(min(ends), field.admitted.low),
         "to": min(max(ends), field.admitted.high),

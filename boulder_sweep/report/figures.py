@@ -93,9 +93,8 @@ def curves(panel: str, parts: Sequence[str]) -> list[figure]:
 
 def verdict_map(panel: str) -> figure:
     """Return a map of verdicts: rectangles over two inputs, which can be chosen."""
-    cells = ColumnDataSource(
-        {"left": [0.0], "right": [0.0], "bottom": [0.0], "top": [0.0], "colour": ["white"]}, name=f"{panel}-cells"
-    )
+    ends = {end: [0.0] for end in ("left", "right", "bottom", "top")}
+    cells = ColumnDataSource({**ends, "colour": ["white"], "hatch": [" "]}, name=f"{panel}-cells")
     plot = _plot(panel, "map", [("", "@verdict"), ("across", "@across{0.000a}"), ("up", "@up{0.000a}")], height=420)
     drawn = plot.quad(
         left="left",
@@ -106,6 +105,9 @@ def verdict_map(panel: str) -> figure:
         fill_color="colour",
         line_color="colour",
         line_width=0.5,
+        hatch_pattern="hatch",
+        hatch_color="white",
+        hatch_scale=8,
         nonselection_fill_alpha=1.0,
         nonselection_line_alpha=1.0,
         selection_line_color="black",

@@ -126,11 +126,14 @@ class Rows:
     finished : FinishedRows or ChanceFile
         Those that were there when they were read.
     names : tuple of str
-        What a code stands for: verdict and reason, ``fail: overturns``; the last is for rows not computed yet.
+        What a code stands for: verdict and reason, ``fail: overturns``, or the grade of a pass of which second opinions
+        were asked, ``pass: robust``; the last is for rows not computed yet.
     codes : ndarray of uint8, shape (rows,)
         Index of the name of every row.
     flags : dict of str to int
         Designs that pass, by validity flags; under ``""`` those without. Empty for a table that does not have them.
+    grades : dict of str to int
+        Designs that pass, by their robustness. Empty for a table that does not have it.
     axes : dict of str to ndarray
         Values along each axis of the grid, the last fastest; for named sets of soils or vehicles their numbers. Empty
         for a list of designs.
@@ -146,6 +149,7 @@ class Rows:
     names: tuple[str, ...]
     codes: np.ndarray
     flags: dict[str, int]
+    grades: dict[str, int]
     axes: dict[str, np.ndarray]
     sets: dict[str, NamedSets]
     inputs: dict[str, np.ndarray]
@@ -304,11 +308,15 @@ def read_rows(folder: Location) -> Rows:
     columns = {name: np.full(finished.rows, np.nan) for name in stored}
     names: list[str] = []
     flags: Counter[str] = Counter()
-    for table in finished.tables(["design_id", "verdict", "reason", "validity", *stored]):
+    grades: Counter[str] = Counter()
+    asked = bool(settings["model"].get("second_opinion"))
+    for table in finished.tables(["design_id", "verdict", "reason", "validity", "robustness", *stored]):
         if "validity" not in finished.lacking:
-            flags.update(_flags_of_passes(table))
+            flags.update(_of_passes(table, "validity"))
+        if "robustness" not in finished.lacking:
+            grades.update(_of_passes(table, "robustness"))
         rows = table.column("design_id").to_numpy()
-        codes[rows] = _codes(table, names)
+        codes[rows] = _codes(table, names, "robustness" if asked else None)
         for name in stored:
             columns[name][rows] = table.column(name).to_numpy()
     codes[codes == 255] = len(names)
@@ -322,7 +330,7 @@ def read_rows(folder: Location) -> Rows:
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
     told = flag_counts(flags.items()) if flags else {}
-    return Rows(folder, finished, (*names, NOT_YET), codes, told, axes, sets, inputs)
+    return Rows(folder, finished, (*names, NOT_YET), codes, told, dict(grades), axes, sets, inputs)
 
 
 def _check_whole(file: ChanceFile, path: Location) -> None:
@@ -375,17 +383,22 @@ def _lengths(settings: dict[str, Any]) -> list[int]:
     return [int(axis["count"]) if isinstance(axis, dict) else len(axis) for axis in axes]
 
 
-def _flags_of_passes(table: Any) -> dict[str, int]:
-    """Return the number of passing designs of a part for each value of the column ``validity``."""
+def _of_passes(table: Any, name: str) -> dict[str, int]:
+    """Return the number of passing designs of a part for each word of a column."""
     import pyarrow.compute as pc
 
-    words = table.column("validity").filter(pc.equal(table.column("verdict").cast("string"), "pass"))
+    words = table.column(name).filter(pc.equal(table.column("verdict").cast("string"), "pass"))
     return {one["values"] or "": one["counts"] for one in pc.value_counts(words.cast("string")).to_pylist()}
 
 
-def _codes(table: Any, names: list[str]) -> np.ndarray:
-    """Code of every row of a part; new verdicts and reasons are added to the names."""
+def _codes(table: Any, names: list[str], grade: str | None) -> np.ndarray:
+    """Code of every row of a part; new verdicts and reasons are added to the names.
+
+    A pass has no reason; the column of its grade, if one is named, stands in for it.
+    """
     verdicts, reasons = (table.column(name).combine_chunks() for name in ("verdict", "reason"))
+    if grade is not None:
+        reasons = _coalesced(table.column(grade), reasons)
     whys = reasons.dictionary.to_pylist()
     pairs = verdicts.indices.to_numpy().astype(np.int64) * max(len(whys), 1) + reasons.indices.to_numpy()
     place = np.zeros(int(pairs.max(initial=0)) + 1, np.uint8)
@@ -396,6 +409,13 @@ def _codes(table: Any, names: list[str]) -> np.ndarray:
             names.append(name)
         place[pair] = names.index(name)
     return place[pairs]
+
+
+def _coalesced(first: Any, second: Any) -> Any:
+    """Words of the first column, of the second where it has none."""
+    import pyarrow.compute as pc
+
+    return pc.coalesce(first.combine_chunks().cast("string"), second.cast("string")).dictionary_encode()
 
 
 @dataclass(frozen=True, eq=False)

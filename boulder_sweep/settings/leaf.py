@@ -106,7 +106,7 @@ def read_single(node: Node, field: Field) -> float:
     if not isinstance(node, Scalar):
         raise LeafError([Mistake(node.position, "takes one value here, not a list or a range")])
     try:
-        value = _to_float(read_quantity(node, field.unit, sample=_sample(field)).value)
+        value = _to_float(read_quantity(node, field.unit, sample=sample_of(field)).value)
     except NumberError as error:
         raise LeafError([Mistake(node.position, str(error))]) from None
     problem = outside(value, field)
@@ -115,7 +115,7 @@ def read_single(node: Node, field: Field) -> float:
     return value
 
 
-def _sample(field: Field) -> str:
+def sample_of(field: Field) -> str:
     """Return the value that a message about an entry suggests: its default; empty where it has none."""
     return "" if field.default is None else describe(field.default, field.unit)
 
@@ -147,7 +147,7 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
     mistakes: dict[str, Mistake] = {}
     for item in items:
         try:
-            quantities.append(read_quantity(item, field.unit, unit, _sample(field)))
+            quantities.append(read_quantity(item, field.unit, unit, sample_of(field)))
         except NumberError as error:
             mistakes.setdefault(str(error), Mistake(item.position, str(error)))
     if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:

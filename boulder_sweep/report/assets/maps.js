@@ -26,6 +26,14 @@ const STRIP = 0.5;
 /** Verdicts, from the best to the worst that a rectangle can show for designs that lie on each other. */
 const WORSE = ["pass", "not computed yet", "undecided", "error", "fail"];
 
+/** Patterns of passes that are not robust. @type {Record<string, string>} */
+const HATCHES = { "pass: sensitive": "/", "pass: open": "." };
+
+/** @param {string} name verdict and reason, or grade @returns {boolean} */
+function isPass(name) {
+  return name.split(":")[0] === "pass";
+}
+
 /**
  * Unpack what Python packed.
  * @param {string} base64
@@ -75,6 +83,7 @@ function drawCells(plots, panel, cells, labels, shownUnits, units, colours, here
     bottom: cells.map((cell) => limit(ys, cell.y, 0) / sy),
     top: cells.map((cell) => limit(ys, cell.y, 1) / sy),
     colour: cells.map((cell) => colourOf(cell.name, colours)),
+    hatch: cells.map((cell) => HATCHES[cell.name] ?? " "),
     verdict: cells.map(wordsOf),
     across: cells.map((cell) => cell.x / sx),
     up: cells.map((cell) => cell.y / sy),
@@ -104,7 +113,7 @@ function passes(count, of = "") {
 /** @param {Cell[]} cells @returns {string} how many designs pass, and whether some lie on each other */
 function summed(cells) {
   const all = cells.flatMap((cell) => cell.names ?? [cell.name]);
-  const passing = all.filter((name) => name === "pass").length;
+  const passing = all.filter(isPass).length;
   const [total, places] = [all.length, cells.length].map((n) => n.toLocaleString("en-US"));
   const first = `${passes(passing, `of the ${total} designs shown `)}.`;
   if (all.length === cells.length) return first;
@@ -117,7 +126,7 @@ function summed(cells) {
  * @returns {Cell[]}
  */
 function merged(cells) {
-  const worse = (/** @type {Cell} */ cell) => WORSE.indexOf(cell.name.split(":")[0]);
+  const worse = (/** @type {Cell} */ cell) => WORSE.indexOf(cell.name.split(":")[0]) + (cell.name in HATCHES ? 0.5 : 0);
   /** @type {Map<string, Cell>} */
   const places = new Map();
   for (const cell of cells) {

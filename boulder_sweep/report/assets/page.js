@@ -247,7 +247,8 @@ class Page {
       ...[...counts].sort().map(([name, count]) => {
         const item = element("li", "");
         const box = document.createElement("i");
-        box.style.background = colourOf(name, this.data.colours);
+        box.style.backgroundColor = colourOf(name, this.data.colours);
+        if (name in HATCHES) box.classList.add("hatched");
         item.append(box, `${name.replaceAll("_", " ")} (${count.toLocaleString("en-US")})`);
         return item;
       }),
