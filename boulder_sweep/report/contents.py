@@ -13,6 +13,7 @@ import numpy as np
 
 from boulder_kernels import Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
+from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES, VERDICTS
@@ -222,6 +223,7 @@ def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
         "rotation": math.radians(rotation),
         "crush": model["calibrated_crush_m"],
         "overlap": TESTED_OVERLAP_M,
+        "gravity": G,
         "usual": {name: usual_range(name) for name in (*SIZES, "embedment_ratio")},
         "soil": {
             "angle": ANGLES.tolist(),

@@ -115,9 +115,7 @@ def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path)
     rows = read_rows(result)
     codes = rows.codes.copy()
     codes[100:] = len(rows.names) - 1
-    unfinished = type(rows)(
-        rows.folder, rows.finished, rows.names, codes, rows.flags, rows.axes, rows.sets, rows.inputs
-    )
+    unfinished = dataclasses.replace(rows, codes=codes)
     assert unfinished.counts()[NOT_YET] == 152
     assert any("152 designs are not computed yet" in str(sentence[0]) for sentence in answer_of(unfinished).sentences)
 
@@ -159,7 +157,7 @@ def test_the_largest_map_takes_little_of_a_page(rows):
     }
     codes = np.random.default_rng(3).integers(0, 4, 1_500_000).astype(np.uint8)
     names = ("pass", "fail: overturns", "fail: penetration", "undecided: error", NOT_YET)
-    large = type(rows)(rows.folder, rows.finished, names, codes, {}, axes, {}, {})
+    large = type(rows)(rows.folder, rows.finished, names, codes, {}, {}, axes, {}, {})
     kept = thinned(large)
     assert kept.words == ""
     assert len(json.dumps(table_data(large, kept))) < 1_000_000
@@ -183,6 +181,25 @@ def said_of(rows, word):
     """Return the sentence with a word, with its numbers in the units of the table."""
     sentence = next(one for one in answer_of(rows).sentences if word in str(one[0]))
     return "".join(part if isinstance(part, str) else f"{part.value:.6g} {part.unit}" for part in sentence)
+
+
+def test_passes_of_which_second_opinions_were_asked_have_a_grade(tmp_path):
+    rows, table = ran(f"{FAST}\nmodel: {{second_opinion: [broms, width_capped]}}\n", tmp_path)
+    passes, counts = table[table.verdict == "pass"], table.robustness.value_counts()
+    graded = {name: n for name, n in rows.counts().items() if name.startswith("pass")}
+    assert graded == {f"pass: {grade}": counts[grade] for grade in ("robust", "sensitive")}
+    assert rows.having("pass").sum() == len(passes)
+    said = said_of(rows, "are robust")
+    assert said.startswith(f"Of the {len(passes)} that pass, {counts['robust']} are robust (stands with friction")
+    assert f"{counts['sensitive']} are sensitive" in said
+
+
+def test_without_second_opinions_the_page_says_so(tmp_path):
+    rows, table = ran(FAST, tmp_path)
+    left = (table.robustness == "open").sum()
+    words = "No second opinion" if left == (table.verdict == "pass").sum() else f"{left} are open"
+    assert words in said_of(rows, words)
+    assert "pass" in rows.names
 
 
 def test_the_least_boulder_withstands_every_speed(tmp_path):
