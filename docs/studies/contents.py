@@ -201,6 +201,10 @@ def _forms_grids(root: Path) -> str:
     return forms.grids_table(root / GRID).markdown()
 
 
+def _forms_grids_words(root: Path) -> str:
+    return forms.grids_words(root / GRID)
+
+
 def _forms_bases(root: Path) -> str:
     return forms.bases_table(root / GRID).markdown()
 
@@ -267,6 +271,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "crush-words": _crush_words,
     "front-face": _front_face,
     "forms-grids": _forms_grids,
+    "forms-grids-words": _forms_grids_words,
     "forms-bases": _forms_bases,
     "forms-tests": _forms_tests,
     "forms-random": _forms_random,

@@ -45,6 +45,8 @@ VEHICLE = {
 }
 """Least and largest value of the vehicle's inputs, SI; those of boulder and soil as of `random_designs`."""
 BUMPER_M, HOOD_M, BED_OFFSET_M = 0.5, 1.4, 2.9
+LITTLE_DEG = 12.0
+"""Rotation up to which passes of the grids are looked at apart."""
 SCATTER = 0.3
 """Standard deviation of the logarithm of the subgrade reaction about the API curve."""
 BINS_DEG = (0.0, 6.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 16.0, 18.0, 20.0)
@@ -125,6 +127,20 @@ def grids_table(grid: Path, count: int = DRAWN) -> Table:
             table.add(name, f"`{law}`", *(cell(law, form) for form in FORMS.values()))
         table.add(name, f"`{PAPER}`, vertical motion without friction", "", "", cell(PAPER, RISING))
     return table
+
+
+def grids_words(grid: Path, count: int = DRAWN) -> str:
+    """Return how many passes of a grid are robust at two speeds, and of those that turn little."""
+    shares, few = [], np.array([], dtype=bool)
+    for name, speed in SPEEDS.items():
+        evaluation, (passes, _) = grid_evaluation(grid, speed), drawn_of_grid(grid, speed, count)
+        standing = robust(passes, evaluation)
+        few = np.append(few, standing[evaluation.judged(passes)["max_rotation_deg"] <= LITTLE_DEG])
+        shares.append(f"{standing.mean():.0%} of the passes of {name}")
+    return (
+        f"Robust are {' and '.join(shares)}; of the {few.size} that turn by at most {LITTLE_DEG:g}°, "
+        f"{np.count_nonzero(few)} are."
+    )
 
 
 def bases_table(grid: Path, count: int = DRAWN) -> Table:
