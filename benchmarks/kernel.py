@@ -1,4 +1,4 @@
-"""The kernels on one core: a right-hand side, a step, an event, a design, an element of the soil.
+"""The kernels on one core: a right-hand side, a step, an event, a design, an element of the soil, a second opinion.
 
 Run as ``python -m benchmarks.kernel``. Every figure is CPU time of one thread, the loops timed in turn with the loop of
 nothing but multiply-adds that shows what the core can do at that moment.
@@ -16,8 +16,13 @@ import boulder_kernels as bk
 from boulder_kernels import lanes
 from boulder_kernels.design import design_at
 from boulder_kernels.layered import COUNTS, TO, filled_layers, uniform_layers
+from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics
+from boulder_kernels.table import some_rows
 from boulder_kernels.workspace import LANES, SIZE
+from boulder_sweep.judge.evaluation import LONGEST_HORIZON
+from boulder_sweep.settings.model import SECOND_OPINIONS
+from boulder_sweep.soils import with_law
 
 from . import loops
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, sample
@@ -36,6 +41,8 @@ ATTEMPTS = 20_000
 ELEMENTS = 5000
 SUMS = 2000
 CLOSED_FORMS = 400_000
+PASSES = 300
+"""Designs that stand and are simulated again for a second opinion."""
 STEP_S = 0.014
 ROUNDS = 9
 ENDLESS = 10**9
@@ -50,6 +57,18 @@ def same_soil(designs: bk.DesignTable, count: int) -> np.ndarray:
         layers[:-1, TO] = design.d * np.arange(1, count) / count
         rows.append(layers)
     return filled_layers(np.stack(rows), count)
+
+
+def second_opinion_us(designs: bk.DesignTable, control: bk.Control) -> float:
+    """Return how long a second opinion takes [us], per law, of designs that stand."""
+    stand = bk.simulate_table(designs, bk.corrected(), control).theta_max < ROTATION_LIMIT
+    passes = some_rows(designs, np.flatnonzero(stand)[:PASSES])
+    asked = HeaveControl(ROTATION_LIMIT, LONGEST_HORIZON * HORIZON)
+    work: dict[str, Callable[[], object]] = {
+        law: partial(second_opinions, with_law(passes, law), asked) for law in SECOND_OPINIONS
+    }
+    least = [min(seconds) for seconds in interleaved(work, 3).values()]
+    return 1e6 * sum(least) / (len(least) * len(passes.L))
 
 
 def measure(rounds: int = ROUNDS) -> Table:
@@ -130,6 +149,10 @@ def measure(rounds: int = ROUNDS) -> Table:
         [
             f"the same in {', '.join(map(str, COUNTS[:-1]))} and {COUNTS[-1]} layers of soil",
             f"{', '.join(ratios[:-1])} and {ratios[-1]} times as long",
+        ],
+        [
+            "a second opinion of a design that stands, one by one, per law",
+            f"{second_opinion_us(designs, control):.0f} us",
         ],
         ["element sums", f"{sum_ns:.2f} ns per element, {1e-3 * sum_ns * ELEMENTS:.1f} us for N = {ELEMENTS}"],
         ["closed form instead, one by one", f"{closed_ns:.0f} ns"],

@@ -10,6 +10,7 @@ from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,
+    NO_OPINION,
     PRESETS,
     PRINTED,
     RESISTANCES,
@@ -23,7 +24,6 @@ from boulder_sweep.settings.problems import did_you_mean, shorten
 from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 
 MOST_LAYERS = 100
-NO_OPINION = "none"
 LAYER_FIELDS = {
     field.key: field
     for field in (

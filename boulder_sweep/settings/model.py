@@ -30,6 +30,8 @@ RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 SECOND_OPINIONS = RESISTANCES[1:]
 """Laws that a second opinion may take."""
+NO_OPINION = "none"
+"""Stands in a file for no second opinion."""
 
 
 UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")

@@ -10,7 +10,7 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import against_tests, answers, energy, moves, scale, soil, unloading
+from docs.studies import against_tests, answers, energy, forms, free_region, moves, scale, soil, unloading
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -197,6 +197,38 @@ def _front_face(root: Path) -> str:
     return one_face_words(root / GRID)
 
 
+def _forms_grids(root: Path) -> str:
+    return forms.grids_table(root / GRID).markdown()
+
+
+def _forms_grids_words(root: Path) -> str:
+    return forms.grids_words(root / GRID)
+
+
+def _forms_bases(root: Path) -> str:
+    return forms.bases_table(root / GRID).markdown()
+
+
+def _forms_tests(root: Path) -> str:
+    return forms.tests_table(root / GRID).markdown()
+
+
+def _forms_random(root: Path) -> str:
+    return forms.random_table(root / GRID).markdown()
+
+
+def _forms_random_words(root: Path) -> str:
+    return forms.random_words(root / GRID)
+
+
+def _forms_free(root: Path) -> str:
+    return free_region.region_table(root / GRID).markdown()
+
+
+def _forms_free_words(root: Path) -> str:
+    return free_region.region_words(root / GRID)
+
+
 def _wild_families(root: Path) -> str:
     return wild_table(root / "configs" / "m30_sizing.yaml").markdown()
 
@@ -239,6 +271,14 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "post-speeds": _post_speeds,
     "crush-words": _crush_words,
     "front-face": _front_face,
+    "forms-grids": _forms_grids,
+    "forms-grids-words": _forms_grids_words,
+    "forms-bases": _forms_bases,
+    "forms-tests": _forms_tests,
+    "forms-random": _forms_random,
+    "forms-random-words": _forms_random_words,
+    "forms-free": _forms_free,
+    "forms-free-words": _forms_free_words,
     "wild-families": _wild_families,
     "settings-entries": _settings_entries,
     "settings-choices": _settings_choices,

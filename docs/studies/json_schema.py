@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS, NO_OPINION
+from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
@@ -14,6 +14,7 @@ from boulder_sweep.settings.leaf import MAX_AXIS
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,
+    NO_OPINION,
     PRESETS,
     PRINTED,
     SECOND_OPINIONS,

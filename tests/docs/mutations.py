@@ -20,7 +20,7 @@ _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kern
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
 _STAGES = "boulder_sweep/crash_tests/stiffening_wall.py"
-_RESISTANCE, _LIFT, _UPLIFT = (f"boulder_sweep/{name}.py" for name in ("soils", "judge/uplift", "impact/uplift"))
+_RESISTANCE = "boulder_sweep/soils.py"
 _GROUND = "boulder_sweep/soils.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
 
@@ -83,9 +83,6 @@ MUTATIONS = (
     Mutation((101,), _RESISTANCE, "return 3.0 * passive_coefficient", "return 2.0 * passive_coefficient"),
     Mutation((102,), _RESISTANCE, "5.0 * table.W / table.d", "5.0 * table.d / table.W"),
     Mutation((102,), _RESISTANCE, "np.minimum(K_p**2, K_p * R)", "K_p * R"),
-    Mutation((103,), _LIFT, "(table.L**2 + table.H**2)", "(table.L**2 - table.H**2)"),
-    Mutation((103,), _LIFT, "table.d**2 * table.L", "table.d**2 * table.W"),
-    Mutation((104,), _UPLIFT, "- (across + over) * omega**2", "+ (across + over) * omega**2"),
     Mutation((105,), _GROUND, "2e3 * cohesion * np.sqrt(K_p)", "1e3 * cohesion * np.sqrt(K_p)"),
     Mutation((105,), _GROUND, "K_p * (stress - weight * top)", "K_p * stress"),
     Mutation((105,), _LAYERED, "p_0 * ultimate, p_1 * design.d * ultimate", "p_0 * ultimate, p_1 * ultimate"),
