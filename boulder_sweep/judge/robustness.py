@@ -29,7 +29,6 @@ from boulder_sweep.soils import with_law
 if TYPE_CHECKING:
     from boulder_kernels import DesignTable
     from boulder_sweep.judge.inputs import Designs
-    from boulder_sweep.judge.verdict import Limits
     from boulder_sweep.settings import Sweep
 
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
@@ -42,16 +41,16 @@ SENSITIVE_IN_WORDS = (
     "crash test"
 )
 """and ``sensitive``."""
-FREE_ROTATION_DEG = 6.0
+FREE_ROTATION_DEG = 8.0
 """Largest rotation up to which a pass is robust without being asked,"""
 FREE = {
-    "L": (0.6, 2.0),
+    "L": (1.0, 2.0),
     "W": (0.8, 2.5),
     "H": (1.5, 4.0),
     "rho_b": (2400.0, 3074.0),
     "e": (0.5, 1.0),
     "rho_s": (1520.0, 2240.0),
-    "phi": (math.radians(30.0), math.radians(49.0)),
+    "phi": (math.radians(36.0), math.radians(42.0)),
     "K_epsilon": (1.0, 1.2),
     "m_v": (5000.0, 9000.0),
     "v_0": (11.0, 18.0),
@@ -59,7 +58,7 @@ FREE = {
     "c_v": (0.75 * 138.91e3, 1.25 * 138.91e3),
 }
 """in these ranges of the inputs, from which the study draws (SI, `boulder_kernels.DesignTable`),"""
-FREE_EMBEDMENT = (0.35, 0.75)
+FREE_EMBEDMENT = (0.5, 0.75)
 """of embedment depth over height, and with a subgrade reaction that belongs to the friction angle."""
 FREE_LIMIT_DEG = 20.0
 """The limit of rotation that the study asks about; a higher one is no easier to stay below for a second opinion."""
@@ -102,7 +101,7 @@ def is_free(table: DesignTable) -> np.ndarray:
     return np.logical_and.reduce(inside)
 
 
-def stands(designs: Designs, law: str, present: str, limits: Limits, longest_s: float) -> np.ndarray:
+def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: float) -> np.ndarray:
     """Return which of n designs pass by a second opinion, bool, shape (n,).
 
     Parameters
@@ -114,7 +113,7 @@ def stands(designs: Designs, law: str, present: str, limits: Limits, longest_s: 
     present
         That of the designs.
     limits
-        Limits of the criterion.
+        Limits of the criterion (`boulder_sweep.judge.verdict.Limits`).
     longest_s
         Longest simulated time; what is not proved to stand by then does not.
     """
@@ -130,7 +129,7 @@ def stands(designs: Designs, law: str, present: str, limits: Limits, longest_s: 
 
 
 def with_second_opinions(
-    judged: Judged, passes: Designs, laws: tuple[str, ...], present: str, limits: Limits, longest_s: float
+    judged: Judged, passes: Designs, laws: tuple[str, ...], present: str, limits: Any, longest_s: float
 ) -> Judged:
     """Return judged rows with every pass simulated again.
 

@@ -44,14 +44,14 @@ def evaluated(sweep: boulder_sweep.Sweep, *laws: str) -> tuple[Evaluation, Judge
 
 
 def test_only_what_the_study_has_drawn_is_robust_without_asking() -> None:
-    assert grade(5.9) == "robust"
-    assert grade(6.1) == "open"
-    assert grade(5.9, error_deg=0.2) == "open"
-    assert grade(5.9, LIMITS._replace(studied=False)) == "open"
-    assert grade(5.9, LIMITS._replace(rotation=math.radians(15.0))) == "open"
-    assert grade(5.9, phi=math.radians(29.0)) == "open"
-    assert grade(5.9, H=3.4, d=2.6) == "open"  # embedded by 0.76 of its height
-    assert grade(5.9, beta=5.0) == "open"  # does not belong to 40 degrees
+    assert grade(7.9) == "robust"
+    assert grade(8.1) == "open"
+    assert grade(7.9, error_deg=0.2) == "open"
+    assert grade(7.9, LIMITS._replace(studied=False)) == "open"
+    assert grade(7.9, LIMITS._replace(rotation=math.radians(15.0))) == "open"
+    assert grade(7.9, phi=math.radians(35.0)) == "open"
+    assert grade(7.9, H=3.4, d=2.6) == "open"  # embedded by 0.76 of its height
+    assert grade(7.9, beta=5.0) == "open"  # does not belong to 40 degrees
 
 
 @pytest.mark.parametrize("name", FREE)
