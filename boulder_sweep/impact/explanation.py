@@ -130,7 +130,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     try:
         control, readings = known_control(there["control"]), Readings(**there["readings"])
         settings = completed(there["settings"])
-        sweep = _one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
+        sweep = one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
         stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     except (LookupError, TypeError, ValueError) as unfamiliar:
         why = f"its settings are not those of this version: {type(unfamiliar).__name__}: {unfamiliar}"
@@ -154,7 +154,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     )
 
 
-def _one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
+def one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
     """Return a sweep of the one design, with the model and the step its row was computed with."""
     model = settings["model"]
     readings, ground = ReadingChoice(**model["readings"]), Ground.of_dict(model.get("ground", {}))

@@ -162,11 +162,9 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     verdict = f"{_in_words(name, 1)}{margin}{', at the means of its uncertain inputs' if uncertain else ''}"
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
     sentences.append((f"The design {verdict}: ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep."))
-    grade = row.get("robustness")
+    grade = rows.grade(row)
     if grade in (meanings := {"robust": IN_WORDS, "sensitive": SENSITIVE_IN_WORDS}):
         sentences.append((f"It is {grade}: {meanings[grade]}.",))
-    elif grade:
-        sentences.append(("No second opinion was asked for.",))
     flags = [flag for flag in (row["validity"] or "").split(SEPARATOR) if flag]
     if flags:
         sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))
@@ -285,8 +283,10 @@ def _least(rows: Rows, withstood: Withstood, what: str) -> tuple[Sentence, Named
     number = int(siblings[np.argmin(np.where(np.isnan(margins), np.inf, margins))])
     mass, depth = (float(np.broadcast_to(value, rows.shape).flat[number]) for value in (rows.mass(), rows.depth()))
     title = "Lightest boulder that passes" if what == "mass" else "Shallowest embedment that passes"
-    margin = rows.row(number)["margin"]
-    held = f", margin {margin:.1%}" if margin is not None else ""
+    row = rows.row(number)
+    grade = rows.grade(row)
+    held = f", margin {row['margin']:.1%}" if row["margin"] is not None else ""
+    held += f", {grade}" if grade in ("robust", "sensitive") else ""
     where = _where(rows, kinds)
     sentence: Sentence = (
         f"The {title[0].lower()}{title[1:]} {where or 'among them'}",

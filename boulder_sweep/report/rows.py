@@ -14,11 +14,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.columns import COLUMNS
+from boulder_sweep.columns import COLUMNS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import ReportError
+from boulder_sweep.impact.explanation import one_design
+from boulder_sweep.judge.evaluation import evaluation_of, known_control
+from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.model import completed
 from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.reader import read_row
 from boulder_sweep.text import counted
@@ -274,6 +278,24 @@ class Rows:
         """
         found = self.finished.row(number) if isinstance(self.finished, ChanceFile) else read_row(self.folder, number)
         return found.to_pylist()[0]
+
+    def grade(self, row: dict[str, Any]) -> str | None:
+        """Return the robustness of a row; where the table left it open, second opinions are asked now.
+
+        None where the row does not pass, or not by today's rules, or its settings are not those of this version.
+        """
+        if row["verdict"] != "pass" or row.get("robustness") not in ("open", None):
+            return row.get("robustness")
+        identity = self.finished.identity
+        inputs = {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
+        try:
+            control = known_control(identity["control"])
+            sweep = one_design(completed(identity["settings"]), inputs, control, row["step_s"] or control.h)
+        except (LookupError, TypeError, ValueError):
+            return row.get("robustness")
+        evaluation, block = evaluation_of(sweep, accuracy_of(sweep)), sweep.block(0, 1)
+        grade: str | None = evaluation.graded(evaluation(block), block).row(0)["robustness"]
+        return grade
 
     def chances(self) -> np.ndarray | None:
         """Return the probability of passing of every design, shape (rows,); None for the result of a run."""

@@ -202,6 +202,16 @@ def test_without_second_opinions_the_page_says_so(tmp_path):
     assert "pass" in rows.names
 
 
+def test_second_opinions_are_asked_of_the_designs_that_an_answer_names(tmp_path):
+    _, asked = ran(f"{FAST}\nmodel: {{second_opinion: [broms, width_capped]}}\n", tmp_path, "asked")
+    rows, _ = ran(FAST, tmp_path)
+    for named in answer_of(rows).named:
+        assert rows.row(named.number)["robustness"] == "open"
+        assert rows.grade(rows.row(named.number)) == asked.robustness[named.number]
+        assert f"design {named.number:,}, margin" in said_of(rows, named.title[0].lower() + named.title[1:])
+    assert any(f", {asked.robustness[one.number]}" in said_of(rows, "lightest") for one in answer_of(rows).named)
+
+
 def test_the_least_boulder_withstands_every_speed(tmp_path):
     rows, table = ran(FAST.replace("angle: [36, 40]", "angle: [40, 43]"), tmp_path)
     everywhere = table.groupby(BOULDER).verdict.transform(lambda verdicts: (verdicts == "pass").all())
@@ -212,7 +222,8 @@ def test_the_least_boulder_withstands_every_speed(tmp_path):
         "The lightest boulder that passes in every soil and at every speed of the sweep: "
         f"{lightest.mass:.6g} kg of rock"
     )
-    assert f"margin {lightest.margin:.1%} in the combination of soil and speed that is worst for it" in said
+    held = f"margin {lightest.margin:.1%}, {rows.grade(rows.row(int(lightest.design_id)))}"
+    assert f"{held} in the combination of soil and speed that is worst for it" in said
     assert answer_of(rows).named[0].number == lightest.design_id
     shallowest = table.embedment_depth_m[answer_of(rows).named[-1].number]
     assert shallowest == pytest.approx(table[everywhere].embedment_depth_m.min())
