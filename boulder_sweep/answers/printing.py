@@ -61,10 +61,10 @@ GRADE: Column = (("second", "opinion"), lambda row: row["robustness"] or "-")
 
 def grade_lines(grades: Iterable[str | None]) -> list[str]:
     """Return what the grades mean that occur."""
-    from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS
+    from boulder_sweep.judge.robustness import MEANINGS
 
-    meanings, occurring = {"robust": IN_WORDS, "sensitive": SENSITIVE_IN_WORDS}, set(grades)
-    words = [f"{word}: {meaning}" for word, meaning in meanings.items() if word in occurring]
+    occurring = set(grades)
+    words = [f"{word}: {meaning}" for word, meaning in MEANINGS.items() if word in occurring]
     return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
 
 
@@ -154,7 +154,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, u
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
     if any(sign in line for line in lines for sign in "≥≤"):
         lines.append("≥, ≤: passes at the worst value tried")
-    return lines
+    return lines + grade_lines(row["robustness"] for row in rows)
 
 
 def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:

@@ -84,6 +84,10 @@ def why_lines(found: Explanation, units: str = "si") -> list[str]:
     ground = ground_words(history.settings)
     lines += [f"  soil: {ground}"] if ground else []
     lines += impact_lines(row, history, units)
+    if row.get("robustness"):
+        stands = row["stands_under"]
+        under = f", stands under {', '.join(stands.split(';'))}" if stands else ""
+        lines.append(f"  second opinion: {row['robustness']}{under}")
     if row.get("validity"):
         lines.append("  outside what the model was tested on (docs/validity.md):")
         names = row["validity"].split(";")

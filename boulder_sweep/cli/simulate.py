@@ -93,8 +93,11 @@ def simulate(
 
 def _cautions(row: dict[str, Any]) -> list[str]:
     """Return the remarks that go with the result."""
+    from boulder_sweep.answers.printing import grade_lines
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
 
-    lines = [f"caution: {words}" for words in meanings(row["validity"] or "")]
-    lines += ["see docs/validity.md"] if lines else []
-    return [*lines, f"pass: {NOT_A_RATING}"] if row["verdict"] == "pass" else lines
+    cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
+    cautions += ["see docs/validity.md"] if cautions else []
+    if row["verdict"] != "pass":
+        return cautions
+    return [*grade_lines([row["robustness"]]), *cautions, f"pass: {NOT_A_RATING}"]

@@ -41,6 +41,12 @@ SENSITIVE_IN_WORDS = (
     "crash test"
 )
 """and ``sensitive``."""
+MEANINGS = {
+    "robust": IN_WORDS,
+    "sensitive": SENSITIVE_IN_WORDS,
+    "open": "second opinions know elastic, dry, level, uniform soil, one spring and corrected readings only",
+}
+"""What a grade means of a pass of which second opinions were asked, if they could be."""
 FREE_ROTATION_DEG = 8.0
 """Largest rotation up to which a pass is robust without being asked,"""
 FREE = {
