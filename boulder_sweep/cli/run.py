@@ -15,7 +15,6 @@ from boulder_sweep.cli.options import RUN_EXAMPLES, cluster_options, json_option
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.locations import Location, location_of
-from boulder_sweep.settings.overrides import ALL_OPINIONS
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -49,6 +48,8 @@ def run(
         raise click.UsageError("--resume and --overwrite cannot be used together")
     if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
         raise click.UsageError("--dashboard needs --backend dask, without --scheduler, which has its own dashboard")
+    from boulder_sweep.settings.overrides import ALL_OPINIONS
+
     chosen = [] if accuracy is None else [f"--accuracy={accuracy}"]
     chosen += [ALL_OPINIONS] if second_opinion else []
     sweep = load_sweep(grid, (*overrides, *chosen), quiet)

@@ -18,7 +18,6 @@ from boulder_sweep.cli.options import (
     units_option,
 )
 from boulder_sweep.cli.output import say, show
-from boulder_sweep.settings.overrides import ALL_OPINIONS
 from boulder_sweep.text import counted
 
 EXAMPLES = """\b
@@ -89,6 +88,8 @@ def uncertainty(
     from boulder_sweep.cli.progress import kernels_for, working
 
     refuse_units_of_json(units, as_json)
+    from boulder_sweep.settings.overrides import ALL_OPINIONS
+
     sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)

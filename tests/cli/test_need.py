@@ -23,7 +23,7 @@ def test_table_fits_the_terminal(sweep):
 def test_columns_of_the_table(sweep):
     _, out, _ = sweep("need", CONFIG, "-q")
     head = out.splitlines()[0].split()
-    assert head == ["H", "φ′", "depth", "ratio", "above", "mass", "margin"]
+    assert head == ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "second"]
     assert len(out.splitlines()) >= 3 + 12
     assert "printed" not in out
     _, out, _ = sweep("need", CONFIG, "-q", "--other-readings")
@@ -45,7 +45,8 @@ def test_what_does_not_pass_is_counted_with_the_next_question(sweep):
 def test_what_passes_is_a_simulation_with_its_flags(sweep):
     _, out, _ = sweep("need", CONFIG, "-q")
     assert "an answer is a simulation, not a rating by test\n" in out
-    assert "flags: 0 of 9 answers inside what the model was tested on; crush 9, rotation 9," in out
+    assert "flags: 0 of 9 answers inside what the model was tested on; rotation 9," in out
+    assert out.index("sensitive: a second opinion overturns it") < out.index("flags: ")
     _, out, _ = sweep("need", CONFIG, "-q", "--between", "1.0 m", "1.2 m")
     assert "flags" not in out
 

@@ -194,5 +194,5 @@ def test_command_makes_energy_and_film(tmp_path: Path, capsys: pytest.CaptureFix
     words = [word for option, name in names.items() for word in (option, str(tmp_path / name))]
     assert execute(["simulate", str(CONFIGS / "rwg.yaml"), "-q", *words]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names.values())
-    assert "max_rotation_deg" in capsys.readouterr().out
+    assert "rwg: PASS" in capsys.readouterr().out
     assert execute(["simulate", str(CONFIGS / "rwg.yaml"), "--animate", str(tmp_path / "film.avi")]) == 2
