@@ -88,8 +88,8 @@ def empty_record(end: float, count: int) -> HeaveRecord:
     return HeaveRecord(np.linspace(0.0, end, count), np.full((count, 8), np.nan), np.full(count, np.nan))
 
 
-def assert_as_the_oracle(design: bk.Design, law: str, form: Form, horizon: float, tolerance: float = 1e-10) -> None:
-    """Hold an impact against the oracle: 1e-3 degrees, 1e-5 m and s; 1e-4 m of the truck, which goes on at speed."""
+def assert_as_the_oracle(design: bk.Design, law: str, form: Form, horizon: float, tolerance: float = 1e-12) -> None:
+    """Hold an impact against the oracle: 1e-3 degrees, 1e-5 m and s."""
     inputs = replace(inputs_of(design), resistance=law)
     known = known_impact(inputs, heave=form.heave, friction=form.friction, horizon=horizon, limit=LIMIT)
     found, _, work = simulate(under(design, law), form, HeaveControl(LIMIT, horizon, tolerance, False))
@@ -106,9 +106,9 @@ def assert_as_the_oracle(design: bk.Design, law: str, form: Form, horizon: float
         assert stopped.t_limit == found.t_limit == pytest.approx(known.t_limit, abs=1e-5)
         assert stopped.t_end == stopped.t_limit
         compared = stopped
-    assert compared.x_b_max == pytest.approx(known.x_b_max, abs=3e-5)
-    assert compared.y_b_max == pytest.approx(known.y_b_max, abs=3e-5)
-    assert compared.x_v_max == pytest.approx(known.x_v_max, abs=1e-4)
+    assert compared.x_b_max == pytest.approx(known.x_b_max, abs=1e-5)
+    assert compared.y_b_max == pytest.approx(known.y_b_max, abs=1e-5)
+    assert compared.x_v_max == pytest.approx(known.x_v_max, abs=1e-5)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -185,9 +185,9 @@ def test_what_is_pressed_in_stays() -> None:
     """The set of the base only grows, on the side that the boulder turns to; none where the base can carry anything."""
     found = 0
     for design in some_designs(12, seed=262):
-        ends = [HeaveControl(1.2, end, 1e-10, False) for end in np.linspace(0.03, 0.3, 10)]
+        ends = [HeaveControl(1.2, end, 1e-12, False) for end in np.linspace(0.03, 0.3, 10)]
         sets = np.array([simulate(design, RISE, how).work[SETS : SETS + PIECES] for how in ends])
-        assert np.diff(sets, axis=0).min() > -1e-5  # the last steps of two ends are not the same
+        assert np.diff(sets, axis=0).min() > -1e-6  # the last steps of two ends are not the same
         assert sets[:, 0].max() == 0.0
         firm = simulate(design, RISE, ends[-1], q_strip=1e15)
         assert firm.work[SETS : SETS + PIECES].max() == 0.0
