@@ -29,8 +29,8 @@ class DocumentError(Exception):
 
 
 def pages(root: Path) -> list[Path]:
-    """Return the pages whose numbers are computed."""
-    return sorted((root / "docs").rglob("*.md"))
+    """Return the pages of the documentation, whose numbers are computed."""
+    return sorted((root / "docs").glob("*.md"))
 
 
 def blocks(root: Path) -> Iterator[Block]:
