@@ -141,7 +141,10 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
             dataclasses.replace(each, control=each.control._replace(longest_horizon=0.0)) for each in (final, coarse)
         )
     if robust:
-        final, coarse = final.asked(), dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED))
+        final, coarse = (
+            final.with_all_opinions(),
+            dataclasses.replace(coarse.with_all_opinions(), only=(*SEARCHED, *GRADED)),
+        )
     else:  # asked of the answers alone
         final, coarse = (dataclasses.replace(each, second_opinion=()) for each in (final, coarse))
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:

@@ -22,7 +22,7 @@ from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import RowStates, finer_controls
-from boulder_sweep.judge.robustness import is_planar_default, with_second_opinions
+from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS, Ground
 from boulder_sweep.soils import with_soil
@@ -76,7 +76,7 @@ class Evaluation:
         Margin that a question asks for, from 0 to less than 1; see `judged`.
     second_opinion
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
-    askable
+    can_be_asked
         Whether second opinions know such designs.
     """
 
@@ -90,7 +90,7 @@ class Evaluation:
     ground: Ground = field(default_factory=Ground)
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
-    askable: bool = False
+    can_be_asked: bool = False
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -160,14 +160,14 @@ class Evaluation:
             return judged
         return self._graded(judged, designs.rows(judged.verdict == PASS), self.second_opinion)
 
-    def asked(self) -> Evaluation:
-        """Return the same with every second opinion, where they can be asked."""
-        return replace(self, second_opinion=SECOND_OPINIONS) if self.askable else self
+    def with_all_opinions(self) -> Evaluation:
+        """Return the same, asking every second opinion of every pass, where they can be asked."""
+        return replace(self, second_opinion=SECOND_OPINIONS) if self.can_be_asked else self
 
     def graded(self, judged: Judged, block: DesignBlock) -> Judged:
         """Return the judged rows of a block with every second opinion of its passes, where they can be asked."""
         passing = judged.verdict == PASS
-        if not self.askable or not passing.any():
+        if not self.can_be_asked or not passing.any():
             return judged
         return self._graded(judged, designs_of(block, passing, self.resistance, self.ground), SECOND_OPINIONS)
 
@@ -268,8 +268,8 @@ def evaluation_of(
         resistance=sweep.model.resistance,
         second_spring=SECOND_SPRING in sweep.plan.columns,
         ground=sweep.model.ground,
-        second_opinion=sweep.model.second_opinion if is_planar_default(sweep) else (),
-        askable=is_planar_default(sweep),
+        second_opinion=sweep.model.second_opinion if can_be_asked(sweep) else (),
+        can_be_asked=can_be_asked(sweep),
     )
 
 

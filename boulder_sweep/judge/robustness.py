@@ -37,8 +37,8 @@ IN_WORDS = (
 )
 """What ``robust`` means, in words,"""
 SENSITIVE_IN_WORDS = (
-    "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed (sweep need --robust) or a "
-    "crash test"
+    "a second opinion overturns it, or the ground under its foot cannot carry it; no fail, but ask for a better soil "
+    "test, a deeper bed (sweep need --robust) or a crash test"
 )
 """and ``sensitive``."""
 MEANINGS = {
@@ -63,7 +63,7 @@ FREE = {
     "k_v": (0.75 * 3103.3e3, 1.25 * 3103.3e3),
     "c_v": (0.75 * 138.91e3, 1.25 * 138.91e3),
 }
-"""in these ranges of the inputs, from which the study draws (SI, `boulder_kernels.DesignTable`),"""
+"""in these ranges of the inputs (SI, `boulder_kernels.DesignTable`), where the study found no pass that is not,"""
 FREE_EMBEDMENT = (0.5, 0.75)
 """of embedment depth over height, and with a subgrade reaction that belongs to the friction angle."""
 FREE_LIMIT_DEG = 20.0
@@ -74,7 +74,7 @@ AT_ONCE = 400
 """Designs simulated per call: an interruption waits for the current call."""
 
 
-def is_planar_default(sweep: Sweep) -> bool:
+def can_be_asked(sweep: Sweep) -> bool:
     """Return whether the designs of a sweep are such as second opinions know: one spring, plain dry soil, corrected."""
     model = sweep.model
     plain = model.ground.is_usual and model.unloading == UNLOADINGS[0]
@@ -99,7 +99,7 @@ def grades_without_asking(facts: Any) -> np.ndarray:
 
 
 def is_free(table: DesignTable) -> np.ndarray:
-    """Return which of n designs lie in the ranges that the study draws from, bool, shape (n,)."""
+    """Return which of n designs lie in the ranges of `FREE`, bool, shape (n,)."""
     ranges = [(getattr(table, name), *ends) for name, ends in FREE.items()]
     ranges.append((table.d / table.H, *FREE_EMBEDMENT))
     ranges.append((table.beta, *family_bounds(np.degrees(table.phi))))
@@ -109,6 +109,8 @@ def is_free(table: DesignTable) -> np.ndarray:
 
 def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: float) -> np.ndarray:
     """Return which of n designs pass by a second opinion, bool, shape (n,).
+
+    A boulder that the ground under its foot cannot carry at rest does not.
 
     Parameters
     ----------
@@ -167,4 +169,4 @@ def with_second_opinions(
 
 def is_studied(sweep: Sweep) -> bool:
     """Return whether the study's model is that of a sweep: the paper's law, and what second opinions know."""
-    return sweep.model.resistance == RESISTANCES[0] and is_planar_default(sweep)
+    return sweep.model.resistance == RESISTANCES[0] and can_be_asked(sweep)
