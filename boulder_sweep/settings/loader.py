@@ -19,8 +19,7 @@ from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
 from boulder_sweep.settings.problems import ProblemList
 from boulder_sweep.settings.source import read_settings_text
-from boulder_sweep.settings.tree import Mapping, Scalar
-from boulder_sweep.settings.yaml_reader import parse
+from boulder_sweep.settings.tree import Mapping, Scalar, parse
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import Axis, Sweep
