@@ -18,8 +18,15 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_sweep.settings.numbers import NumberError, split_number
-from boulder_sweep.settings.problems import Position, ProblemList, cell_position, did_you_mean, shorten
-from boulder_sweep.settings.source import check_regular_file, refuse
+from boulder_sweep.settings.problems import (
+    Position,
+    ProblemList,
+    cell_position,
+    check_regular_file,
+    did_you_mean,
+    refuse,
+    shorten,
+)
 from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
 
 MOST_ROWS, MOST_COLUMNS = 2_000_000, 1000
