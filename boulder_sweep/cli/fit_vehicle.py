@@ -11,7 +11,8 @@ from boulder_sweep.cli.options import OUTPUT, json_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
-    from boulder_sweep.crash_tests.fitting import StagedFit, VehicleFit
+    from boulder_sweep.crash_tests.fitting import StagedFit
+    from boulder_sweep.crash_tests.pulse import VehicleFit
 
 EXAMPLES = """\b
 Examples:
@@ -42,7 +43,8 @@ def fit_vehicle(pulse: str, mass: str, speed: str | None, stages: int, plot: str
     """
     mass_kg = _quantity("--mass", mass, "kg")
     speed_m_s = None if speed is None else _quantity("--speed", speed, "m/s")
-    from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages, read_pulse
+    from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
+    from boulder_sweep.crash_tests.pulse import read_pulse
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
 
     if plot is not None:

@@ -56,7 +56,7 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         written = [] if out is None else [draw(Path(out))]
         content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
         content["files"] += written
-        from boulder_sweep.crash_tests.comparison import deviation_table
+        from boulder_sweep.crash_tests.measured import deviation_table
 
         text = [found.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
     if out is not None:
@@ -72,8 +72,7 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
 def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path], str]]:
     """Compare a user's data with both presets; return a function that draws them into a folder, too."""
     from boulder_sweep.crash_tests.cases import NAMES, crash_test
-    from boulder_sweep.crash_tests.comparison import compare
-    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, read_history
+    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, compare, read_history
     from boulder_sweep.impact.simulation import simulate
     from boulder_sweep.settings import load
     from boulder_sweep.settings.model import PRESETS

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
-from boulder_sweep.crash_tests.convergence import Convergence, convergence
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.statements import Statement, statement_table, statements
+from boulder_sweep.crash_tests.statements import Convergence, Statement, convergence, statement_table, statements
 from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.simulation import simulate

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.crash_tests.cases import NAMES
-from boulder_sweep.crash_tests.comparison import simulated_signal
+from boulder_sweep.crash_tests.measured import simulated_signal
 from boulder_sweep.store.files import replacing
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, BLUE, GREY, ORANGE
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from boulder_sweep.crash_tests.convergence import Convergence
     from boulder_sweep.crash_tests.measured import TimeHistory
     from boulder_sweep.crash_tests.rigid_wall import RigidWall
+    from boulder_sweep.crash_tests.statements import Convergence
     from boulder_sweep.crash_tests.validation import Validation
     from boulder_sweep.impact.trajectory import Trajectory
 

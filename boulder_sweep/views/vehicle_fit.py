@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.crash_tests.fitting.pulse import RESPONSES, UNITS
-from boulder_sweep.crash_tests.stiffening_wall import StiffeningWall
+from boulder_sweep.crash_tests.pulse import RESPONSES, UNITS
+from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, GREY, ORANGE
 
 if TYPE_CHECKING:
-    from boulder_sweep.crash_tests.fitting import VehicleFit
+    from boulder_sweep.crash_tests.pulse import VehicleFit
 
 ORDER = ("displacement", "velocity", "acceleration")
 POINTS = 400

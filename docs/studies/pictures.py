@@ -7,7 +7,8 @@ from pathlib import Path
 
 from boulder_sweep import load, need, read, run, uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.crash_tests.fitting import fit_pulse, read_pulse
+from boulder_sweep.crash_tests.fitting import fit_pulse
+from boulder_sweep.crash_tests.pulse import read_pulse
 from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.settings.overrides import ALL_OPINIONS

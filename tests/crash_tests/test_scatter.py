@@ -7,8 +7,9 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from boulder_sweep.crash_tests.cases import rigid_wall_test
-from boulder_sweep.crash_tests.fitting import Pulse, fit_pulse
-from boulder_sweep.crash_tests.fitting.scatter import Scatter, integrated, scatter_of, summed
+from boulder_sweep.crash_tests.fitting import fit_pulse
+from boulder_sweep.crash_tests.pulse import Pulse
+from boulder_sweep.crash_tests.scatter import Scatter, integrated, scatter_of, summed
 
 PAPER = rigid_wall_test()
 TIMES = np.arange(200) * 1e-3

@@ -8,25 +8,15 @@ have it. What is fitted are the logarithms of sqrt(k/m) and of c/sqrt(k m), and 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from boulder_sweep.crash_tests.fitting.pulse import Pulse, SignalMisfit, VehicleFit
-from boulder_sweep.errors import FitError
-
-if TYPE_CHECKING:
-    from boulder_sweep.crash_tests.fitting.pulse import Pulse, SignalMisfit
-    from boulder_sweep.crash_tests.rigid_wall import RigidWall
-
-
 from dataclasses import dataclass
 from typing import Any
 
-from boulder_sweep.crash_tests.fitting.pulse import RESPONSES, Pulse, SignalMisfit
-from boulder_sweep.crash_tests.fitting.scatter import scatter_of, summed
-from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.stiffening_wall import StiffeningWall
+import numpy as np
+
+from boulder_sweep.crash_tests.pulse import RESPONSES, Pulse, SignalMisfit, VehicleFit
+from boulder_sweep.crash_tests.rigid_wall import RigidWall, StiffeningWall
+from boulder_sweep.crash_tests.scatter import scatter_of, summed
+from boulder_sweep.errors import FitError
 
 RATIO_BOUNDS = (2e-3, 2e2)
 """Range of c/sqrt(k m) that is searched; at its ends one of the two elements is as good as rigid."""
@@ -67,6 +57,14 @@ class FitProblem:
         """Residuals of all signals as multiples of their scales."""
         return np.concatenate([values / scales[name] for name, values in self.by_signal(unknowns).items()])
 
+    def scatter(self, residuals: dict[str, np.ndarray]) -> dict[str, float]:
+        """Return the scale of each signal by which its residuals are divided: their root mean square, never zero."""
+        return {name: max(rms(values), 1e-9 * self.range(name)) for name, values in residuals.items()}
+
+    def misfits(self, residuals: dict[str, np.ndarray]) -> dict[str, SignalMisfit]:
+        """Describe the residuals of every signal."""
+        return {name: misfit_of(values, self.range(name)) for name, values in residuals.items()}
+
     def start(self, scales: dict[str, float]) -> np.ndarray:
         """Best of a grid of vehicles; the response is proportional to the speed, which so follows from each."""
         last = float(self.pulse.time_s[-1])
@@ -97,7 +95,7 @@ class FitProblem:
         """Covariance of the unknowns, shape (p, p).
 
         The sandwich of least squares, (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, with the covariance Σ of the residuals of all signals as
-        `boulder_sweep.crash_tests.fitting.scatter` finds it from them.
+        `boulder_sweep.crash_tests.scatter` finds it from them.
         """
         n = len(unknowns)
         steps = 1e-6 * np.maximum(np.abs(unknowns), 1.0)
@@ -240,11 +238,11 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
         )
         unknowns = solved.x
         residuals = problem.by_signal(unknowns)
-        scales = {name: max(rms(values), 1e-9 * problem.range(name)) for name, values in residuals.items()}
+        scales = problem.scatter(residuals)
     wall = problem.wall(unknowns)
     if not math.isfinite(solved.cost):
         raise FitError(f"{pulse.name}: no vehicle comes near this pulse")
-    misfits = {name: misfit_of(values, problem.range(name)) for name, values in residuals.items()}
+    misfits = problem.misfits(residuals)
     spring_error, damper_error, speed_error = problem.standard_errors(unknowns, scales)
     return VehicleFit(
         pulse=pulse,
@@ -328,12 +326,12 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
     Parameters
     ----------
     pulse, mass_kg, speed_m_s
-        As of `boulder_sweep.crash_tests.fitting.fit_pulse`.
+        See `fit_pulse`.
 
     Raises
     ------
     FitError
-        As of `fit_pulse`; or two springs fit no better than one, because the front does not stiffen or the pulse does
+        As `fit_pulse` does; or two springs fit no better than one, because the front does not stiffen or the pulse does
         not reach its second spring.
     """
     one = fit_pulse(pulse, mass_kg, speed_m_s=speed_m_s)
@@ -341,9 +339,9 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
         raise _no_second(one)
     problem = StagedProblem(pulse, float(mass_kg), speed_m_s)
     scales = {name: misfit.rms for name, misfit in one.misfits.items()}
-    unknowns, scales = _solved(problem, one, scales)
+    unknowns, scales = _solve(problem, one, scales)
     residuals, wall = problem.by_signal(unknowns), problem.wall(unknowns)
-    misfits = {name: misfit_of(values, problem.range(name)) for name, values in residuals.items()}
+    misfits = problem.misfits(residuals)
     if wall.stage is None or _gain(one, misfits, residuals) <= 0.0:
         raise _no_second(one)
     n, covariance = len(unknowns), problem.covariance(unknowns, scales)
@@ -375,7 +373,7 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
     )
 
 
-def _solved(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -> tuple[np.ndarray, dict[str, float]]:
+def _solve(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -> tuple[np.ndarray, dict[str, float]]:
     """Solve from several starts, and once more from the best with the weights of its own scatter."""
     from scipy.optimize import least_squares  # heavy, and only this function needs it
 
@@ -393,8 +391,7 @@ def _solved(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -
 
     starts = [np.array([*known, math.log(ratio), share * crush]) for ratio, share in STARTS]
     best = min((solved(start) for start in starts), key=lambda found: found.cost)
-    residuals = problem.by_signal(best.x)
-    scales = {name: max(rms(values), 1e-9 * problem.range(name)) for name, values in residuals.items()}
+    scales = problem.scatter(problem.by_signal(best.x))
     return solved(best.x).x, scales
 
 
