@@ -70,7 +70,7 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
 def _found_lines(before: str, after: str, found: Comparison, units: str) -> list[str]:
     """Return how many designs both have, what tells them apart, and how many verdicts changed."""
     from boulder_sweep.cli.console import wrapped
-    from boulder_sweep.views.labels import name_of, size_of, unit_of
+    from boulder_sweep.views.wording import name_of, size_of, unit_of
 
     turned, matched = found.turned(), len(found.matched)
     alone = f"{found.only_before:,} only before, {found.only_after:,} only after"
@@ -88,7 +88,7 @@ def _found_lines(before: str, after: str, found: Comparison, units: str) -> list
 def _design_lines(row: dict[str, Any], found: Comparison, units: str) -> list[str]:
     """Return one design whose verdict changed: how, and the inputs that tell it apart."""
     from boulder_sweep.cli.console import wrapped
-    from boulder_sweep.views.labels import value_text
+    from boulder_sweep.views.wording import value_text
 
     verdicts, ids = (" -> ".join(str(row[f"{name}_{when}"]) for when in WHEN) for name in ("verdict", "design_id"))
     rotation = " -> ".join(f"{row[f'max_rotation_deg_{when}']:.4g}" for when in WHEN)

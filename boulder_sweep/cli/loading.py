@@ -67,6 +67,6 @@ def refuse_unwritable_history(
         checked_history(trajectory)
     refuse_unwritable(None, energy)
     if animation is not None:
-        from boulder_sweep.views.animation import checked_animation
+        from boulder_sweep.views.side_view import checked_animation
 
         checked_animation(animation)

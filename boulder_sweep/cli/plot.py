@@ -52,7 +52,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     from boulder_sweep.errors import PictureError
     from boulder_sweep.store.finished import FinishedRows
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
-    from boulder_sweep.views.pieces import finished_pieces
+    from boulder_sweep.views.slices import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
     from boulder_sweep.views.wording import terms_line
 

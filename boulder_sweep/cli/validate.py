@@ -87,10 +87,10 @@ def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path],
     found = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
 
     def draw(folder: Path) -> str:
-        from boulder_sweep.views.validation import draw_overlay
+        from boulder_sweep.views.crash_curves import draw_crash_test
 
         target = folder / f"measured_{Path(measured).stem}.png"
-        draw_overlay(sweep.name, trajectories, history, target)
+        draw_crash_test(sweep.name, trajectories, target, history)
         return str(target)
 
     return found, draw

@@ -146,7 +146,7 @@ def validate(out: str | Path | None = None) -> Validation:
     wall = rigid_wall_test()
     result = Validation(found, wall, study, statements(found, study, wall))
     if out is not None:
-        result.files.extend(draw("validation", "write_validation", result, Path(out)))
+        result.files.extend(draw("crash_curves", "write_validation", result, Path(out)))
     return result
 
 

@@ -13,9 +13,8 @@ from boulder_sweep.columns import GRADES
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import VERDICTS
-from boulder_sweep.views.labels import USUAL, label, name_of, size_of, unbroken, value_text
-from boulder_sweep.views.pieces import ROBUSTNESS, Pieces
-from boulder_sweep.views.slices import Slice, plane, select
+from boulder_sweep.views.slices import ROBUSTNESS, Pieces, Slice, plane, select
+from boulder_sweep.views.wording import USUAL, label, name_of, size_of, unbroken, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,7 +71,7 @@ def draw_verdict_map(
     ----------
     table
         A result table, as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used. Or what
-        yields it piece by piece, see `boulder_sweep.views.pieces`.
+        yields it piece by piece, see `boulder_sweep.views.slices`.
     path
         Picture to write (.png, .svg, .pdf).
     title
@@ -143,11 +142,11 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
     colours = ListedColormap([colour for _, colour, _ in CLASSES])
     norm = BoundaryNorm(np.arange(len(CLASSES) + 1) - 0.5, len(CLASSES))
     x, y = (rows[name].to_numpy(dtype=float) / size_of(name, units) for name in (shown.across, shown.up))
-    x_levels, x_place = np.unique(np.round(x, 9), return_inverse=True)
-    y_levels, y_place = np.unique(np.round(y, 9), return_inverse=True)
+    x_levels, x_index = np.unique(np.round(x, 9), return_inverse=True)
+    y_levels, y_index = np.unique(np.round(y, 9), return_inverse=True)
     cells = np.full((len(y_levels), len(x_levels)), -1, dtype=np.int16)
-    cells[y_place, x_place] = codes
-    filled = len(np.unique(y_place.astype(np.int64) * max(len(x_levels), 1) + x_place))
+    cells[y_index, x_index] = codes
+    filled = len(np.unique(y_index.astype(np.int64) * max(len(x_levels), 1) + x_index))
     gridded = (
         not shown.thinned
         and filled == len(rows)
@@ -160,7 +159,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
         axes.pcolormesh(_edges(x_levels), _edges(y_levels), masked, **style)
         for grade, hatch in _hatches(shown).items():
             graded = np.zeros(cells.shape, dtype=bool)
-            graded[y_place, x_place] = rows[ROBUSTNESS].astype(str).to_numpy() == grade
+            graded[y_index, x_index] = rows[ROBUSTNESS].astype(str).to_numpy() == grade
             if graded.any():
                 covered = np.ma.masked_array(np.zeros(cells.shape), ~graded)
                 drawn = axes.pcolor(_edges(x_levels), _edges(y_levels), covered, facecolor="none", hatch=hatch)
@@ -236,8 +235,8 @@ def _legend(fig: Any, present: set[int], shown: Slice, *, beside: bool) -> float
         graded = [Patch(color=colour, label=f"pass: {ROBUST}")] if shown.grades.get(ROBUST) else []
         graded += [Patch(**style, hatch=hatch, label=f"pass: {grade}") for grade, hatch in hatches.items()]
         handles = [*graded, *handles[1:]]
-    place, columns = ("outside right upper", 1) if beside else ("outside upper right", len(handles))
-    drawn = fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
+    position, columns = ("outside right upper", 1) if beside else ("outside upper right", len(handles))
+    drawn = fig.legend(handles=handles, loc=position, ncols=columns, handlelength=1.2, columnspacing=1.2)
     return float(drawn.get_window_extent().width / fig.dpi)
 
 

@@ -22,9 +22,8 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.settings import load_text
 from boulder_sweep.views import figures
-from boulder_sweep.views.energy import LAYERS
 from boulder_sweep.views.figures import checked_kind
-from boulder_sweep.views.trajectory import AFTER_PEAK, unreliable_from
+from boulder_sweep.views.time_curves import AFTER_PEAK, LAYERS, unreliable_from
 from boulder_sweep.views.verdict_map import CLASSES
 
 Draw = Callable[[Trajectory, Path], None]

@@ -24,23 +24,23 @@ NAMED_STEPS_MS = {False: (16.0, 8.0), True: (2.0, 1.0, 0.5)}
 WORDS = {"as_printed": "as printed", "corrected": "corrected", "mixed": "readings of the file"}
 
 
-def draw_tradeoff(found: Tradeoff, path: str | Path) -> None:
+def draw_tradeoff(result: Tradeoff, path: str | Path) -> None:
     """Draw a panel for each reading.
 
     Parameters
     ----------
-    found
+    result
         What was measured.
     path
         Picture to write.
     """
-    names = list(dict.fromkeys(point.method.readings for point in found.points))
+    names = list(dict.fromkeys(point.method.readings for point in result.points))
     with figure(path, 5.4 * len(names), 5.0) as fig:
         panels = fig.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
-            _panel(axes, [point for point in found.points if point.method.readings == name])
-            own = " (this file)" if name == found.own_readings else ""
-            axes.set_title(f"{WORDS.get(name, name)}{own}")
+            _panel(axes, [point for point in result.points if point.method.readings == name])
+            this_file = " (this file)" if name == result.own_readings else ""
+            axes.set_title(f"{WORDS.get(name, name)}{this_file}")
             axes.set_xlabel("CPU time per design, one core [µs]")
         panels[0].set_ylabel("error of the largest rotation [deg]\n99 % of designs; thin line up to the largest")
         handles, labels = panels[0].get_legend_handles_labels()
