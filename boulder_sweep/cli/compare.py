@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.loading import refuse_units_of_json
-from boulder_sweep.cli.options import json_option, units_option
+from boulder_sweep.cli.options import json_option, refuse_units_of_json, units_option
 from boulder_sweep.cli.output import show
 from boulder_sweep.text import counted
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 import textwrap
 from collections.abc import Mapping
@@ -13,7 +12,6 @@ from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:
-    from boulder_sweep.impact.trajectory import Trajectory
     from boulder_sweep.locations import Location
     from boulder_sweep.runner.estimate import Estimate
     from boulder_sweep.runner.summary import Summary
@@ -184,53 +182,6 @@ def status_lines(status: RunStatus) -> list[str]:
 def wrapped(text: str, width: int = 80) -> list[str]:
     """Return a sentence as lines for a terminal of 80 columns."""
     return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-
-
-def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si") -> list[str]:
-    """Return how near one design came to every limit, when, and to within what.
-
-    Parameters
-    ----------
-    row
-        Its outcome columns, in the units of the table; it has touched the truck.
-    history
-        The impact over time.
-    units
-        ``si`` or ``us``.
-    """
-    from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-    from boulder_sweep.settings.shown_units import shown_unit
-
-    (length, metre), (force, kilonewton) = shown_unit("m", units), shown_unit("kN", units)
-    limit = math.degrees(history.motion.control.theta_limit)
-    if row["time_to_limit_s"] is not None:
-        reached_ms = 1e3 * row["time_to_limit_s"]
-        lines = [f"  rotation: the limit of {limit:g} deg is reached {reached_ms:.1f} ms after contact"]
-    else:
-        rating = history.settings["criterion"]["rating"]
-        lines = [
-            f"  rotation: {row['max_rotation_deg']:.4g} deg of {limit:g} deg allowed, "
-            f"{1 - row['max_rotation_deg'] / limit:.1%} below, "
-            f"{1e3 * history.motion.outcome.maxima.t_theta:.0f} ms after contact",
-            f"  penetration: {row['penetration_m'] / metre:.4g} {length}, {rating} allows "
-            f"{PENETRATION_LIMITS_M[rating] / metre:.3g} {length} beyond the far face",
-            f"  displacement: boulder {row['max_displacement_m'] / metre:.3g} {length}, "
-            f"truck {row['max_vehicle_displacement_m'] / metre:.3g} {length}; "
-            f"peak force {row['peak_force_kN'] / kilonewton:,.0f} {force}",
-        ]
-    if row.get("permanent_tilt_deg") is not None:
-        lines.append(
-            f"  afterwards: swings back by {row['swing_back_deg']:.3g} deg, rests at "
-            f"{row['permanent_tilt_deg']:.3g} deg, to within {row['permanent_tilt_error_deg']:.1g} deg"
-        )
-    if (second := history.motion.second) is not None:
-        reached = history.time_s[history.motion.record.offset > 0.0]
-        when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
-        crush = f"{second.s_2 / metre:.4g} {length}"
-        lines.append(f"  front: its second spring acts from a crush of {crush} on, {when}")
-    if row["rotation_error_deg"] is not None:
-        lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
-    return lines
 
 
 def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:

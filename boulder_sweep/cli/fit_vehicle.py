@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, json_option
+from boulder_sweep.cli.options import OUTPUT, json_option, refuse_unwritable
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -45,11 +45,8 @@ def fit_vehicle(pulse: str, mass: str, speed: str | None, stages: int, plot: str
     speed_m_s = None if speed is None else _quantity("--speed", speed, "m/s")
     from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
     from boulder_sweep.crash_tests.pulse import read_pulse
-    from boulder_sweep.views.figures import checked_kind, require_matplotlib
 
-    if plot is not None:
-        checked_kind(plot)
-        require_matplotlib()
+    refuse_unwritable(None, plot)
     fit = (fit_pulse if stages == 1 else fit_stages)(read_pulse(pulse), mass_kg, speed_m_s=speed_m_s)
     if plot is not None:
         fit.plot(plot)

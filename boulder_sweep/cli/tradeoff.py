@@ -6,11 +6,11 @@ import json
 import math
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, cluster_options, json_option, set_option
+from boulder_sweep.cli.options import OUTPUT, cluster_options, grid_argument, json_option, set_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ Examples:
 
 
 @click.command("tradeoff", short_help="Measure speed against accuracy on a grid.", epilog=EXAMPLES)
-@click.argument("grid", type=click.Path())
+@grid_argument
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for table and picture.")
 @click.option(
     "--designs",
@@ -52,13 +52,10 @@ Examples:
 def tradeoff(
     grid: str,
     out: str | None,
-    designs: int,
-    seconds: float,
     quiet: bool,
-    backend: str,
-    scheduler: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
+    **options: Any,
 ) -> int:
     """Simulate a sample of GRID by many methods and compare each with a far finer solution.
 
@@ -70,7 +67,7 @@ def tradeoff(
     from boulder_sweep.settings import load
     from boulder_sweep.tradeoff.study import measure
 
-    if math.isnan(seconds):
+    if math.isnan(options["seconds"]):
         raise click.UsageError("--seconds nan: give a number of seconds")
     sweep = load(grid, overrides)
     if out is not None:
@@ -79,10 +76,7 @@ def tradeoff(
         require_matplotlib()
         make_folder(Path(out))
     with working(quiet, doing="measuring"):
-        progress = None if quiet else say
-        found = measure(
-            sweep, designs=designs, seconds=seconds, backend=backend, scheduler=scheduler, progress=progress
-        )
+        found = measure(sweep, **options, progress=None if quiet else say)
     files = [] if out is None else found.write(out)
     if as_json:
         show(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))

@@ -1,4 +1,4 @@
-"""``sweep new``: a commented settings file to start from."""
+"""Settings files: ``sweep new`` writes one to start from, ``sweep check`` finds every mistake at once."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.options import OutputPath
+from boulder_sweep.cli.options import OutputPath, grid_argument, load_sweep, set_option
 from boulder_sweep.cli.output import show
 
-EXAMPLES = """\b
+NEW_EXAMPLES = """\b
 Examples:
   sweep new
   sweep new my-site.yaml
@@ -22,7 +22,7 @@ DEFAULT = "my-site.yaml"
 SYSTEMS = ("si", "us")
 
 
-@click.command("new", short_help="Write a commented settings file to start from.", epilog=EXAMPLES)
+@click.command("new", short_help="Write a commented settings file to start from.", epilog=NEW_EXAMPLES)
 @click.argument("file", type=OutputPath(dir_okay=False, path_type=Path), required=False)
 @click.option("--class", "vehicle", metavar="CLASS", help="Class of the vehicle in ASTM F2656, such as M40 [M30].")
 @click.option("--units", type=click.Choice(SYSTEMS), help="Units of the values [si].")
@@ -84,3 +84,21 @@ def _checked_name(text: str) -> str:
     if not NAME.fullmatch(text):
         raise click.UsageError(f"the name {NAME_RULE}")
     return text
+
+
+CHECK_EXAMPLES = """\b
+Example:
+  sweep check configs/m30_sizing.yaml
+"""
+
+
+@click.command(short_help="Check a file: all mistakes at once, with their lines.", epilog=CHECK_EXAMPLES)
+@grid_argument
+@set_option
+def check(grid: str, overrides: tuple[str, ...]) -> int:
+    """Check GRID without simulating: all mistakes at once, with file, line and column."""
+    from boulder_sweep.cli import console
+
+    sweep = load_sweep(grid, overrides, quiet=False)
+    show(f"{grid}: valid", *console.grid_lines(sweep))
+    return 0
