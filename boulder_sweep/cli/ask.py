@@ -92,19 +92,19 @@ def need(
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out, picture)
     with working(quiet, kernels_for(sweep), of="designs" if question["probability"] is None else "values") as progress:
-        found = find(sweep, **question, progress=progress)
+        result = find(sweep, **question, progress=progress)
     if as_json:
-        show(json.dumps(found.to_dict()))
+        show(json.dumps(result.to_dict()))
     else:
-        show(*need_lines(found, units=units, file=grid))
+        show(*need_lines(result, units=units, file=grid))
     if not quiet:
-        counts = ", ".join(f"{word} {count:,}" for word, count in found.counts().items())
-        say(f"{counted(len(found), 'row')}: {counts}; {counted(found.simulated, 'simulation')}")
+        counts = ", ".join(f"{word} {count:,}" for word, count in result.counts().items())
+        say(f"{counted(len(result), 'row')}: {counts}; {counted(result.simulated, 'simulation')}")
     if out is not None:
-        found.write(out)
+        result.write(out)
     if picture is not None:
-        found.plot(picture, units=units)
-    return EXIT_SOME_ROWS_FAILED if found.errors else EXIT_DONE
+        result.plot(picture, units=units)
+    return EXIT_SOME_ROWS_FAILED if result.errors else EXIT_DONE
 
 
 UNCERTAINTY_EXAMPLES = """\b
@@ -175,24 +175,24 @@ def uncertainty(
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     with working(quiet, kernels_for(sweep)) as progress:
-        found = estimate(sweep, **question, progress=progress)
+        result = estimate(sweep, **question, progress=progress)
     parts = []
     if doubts:
         from boulder_sweep.answers.doubts import doubts as divide
 
         parts = divide(sweep, design=design, seed=question["seed"], jobs=question["jobs"])
     if as_json:
-        show(json.dumps(found.to_dict() | ({"doubts": [asdict(part) for part in parts]} if doubts else {})))
+        show(json.dumps(result.to_dict() | ({"doubts": [asdict(part) for part in parts]} if doubts else {})))
     else:
-        show(*uncertainty_lines(found, units=units), *(["", *doubt_lines(parts)] if doubts else []))
+        show(*uncertainty_lines(result, units=units), *(["", *doubt_lines(parts)] if doubts else []))
     if not quiet:
-        drawn = sum(found.arrow["p_pass_designs"].to_pylist())
-        say(f"{counted(len(found), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {question['seed']}")
+        drawn = sum(result.arrow["p_pass_designs"].to_pylist())
+        say(f"{counted(len(result), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {question['seed']}")
     if out is not None:
-        for file in found.write(out):
+        for file in result.write(out):
             say(f"written  {file}")
     if picture is not None:
-        found.plot(picture, design, units=units)
+        result.plot(picture, design, units=units)
     return 0
 
 
@@ -241,9 +241,9 @@ def capacity(
     sweep = load_sweep(grid, overrides, quiet)
     refuse_unwritable(out)
     with working(quiet, kernels_for(sweep)) as progress:
-        found = reserves(sweep, jobs=jobs, progress=progress)
-    show(*([json.dumps(found.to_dict())] if as_json else reserve_lines(found, units=units)))
+        result = reserves(sweep, jobs=jobs, progress=progress)
+    show(*([json.dumps(result.to_dict())] if as_json else reserve_lines(result, units=units)))
     if out is not None:
-        found.write(out)
-    errors = found.arrow["verdict"].to_pylist().count("error")
+        result.write(out)
+    errors = result.arrow["verdict"].to_pylist().count("error")
     return EXIT_SOME_ROWS_FAILED if errors else EXIT_DONE

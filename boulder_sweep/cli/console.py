@@ -81,18 +81,18 @@ def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
 
     if not any(key.startswith("pass/") for key in reasons):
         return []
-    lines = [f"pass   is {NOT_A_RATING}", *_wrapped(f"robust: {IN_WORDS}", "       ")]
+    lines = [f"pass   is {NOT_A_RATING}", *_indent(f"robust: {IN_WORDS}", "       ")]
     if "pass/open" in reasons:
         lines.append("       open: not asked; --second-opinion asks")
     return lines
 
 
-def _wrapped(text: str, indent: str) -> list[str]:
+def _indent(text: str, indent: str) -> list[str]:
     return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent=indent)
 
 
 def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
-    """Return how firm the passes are, from a sample of the designs; nothing if it was not found out."""
+    """Return how firm the passes are, from a sample of the designs; nothing where none was taken."""
     if not firmness or "lost" not in firmness:
         return []
     error, lost = firmness["numerical_error_deg"], firmness["lost"]
@@ -109,9 +109,9 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
             f"another law of the soil without friction: {laws}",
         )
     )
-    lines += _wrapped(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")
+    lines += _indent(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")
     shares = ", ".join(f"{name} {count / firmness['passes']:.0%}" for name, count in firmness["flags"].items() if name)
-    return [*lines, *_wrapped(f"flags: {shares}", "       ")] if shares else lines
+    return [*lines, *_indent(f"flags: {shares}", "       ")] if shares else lines
 
 
 def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
@@ -123,12 +123,12 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
         steps += f" and {1e3 * accuracy['reported_step_s']:g} ms"
     if accuracy["yield_located"]:
         steps += ", yield located"
-    found = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
+    line = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
     if "pilot_designs" not in accuracy:
-        return [found]
+        return [line]
     sample = counted(accuracy["pilot_designs"], "design")
     reached = f"{accuracy['estimated_error_p99_9_deg']:g} deg in 99.9 % of a pilot of {sample}"
-    return [found, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
+    return [line, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
 def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:
@@ -149,9 +149,9 @@ def verdict_lines(reasons: Mapping[str, int], rows: int) -> list[str]:
     """Return one line per verdict with its reasons; `reasons` counts rows by ``verdict/reason``."""
     lines = []
     for verdict in VERDICTS:
-        own = {key: count for key, count in reasons.items() if key.split("/")[0] == verdict}
-        total = sum(own.values())
-        named = {key.partition("/")[2]: count for key, count in own.items() if "/" in key and count}
+        of_verdict = {key: count for key, count in reasons.items() if key.split("/")[0] == verdict}
+        total = sum(of_verdict.values())
+        named = {key.partition("/")[2]: count for key, count in of_verdict.items() if "/" in key and count}
         detail = ", ".join(f"{reason} {count:,}" for reason, count in sorted(named.items(), key=lambda i: -i[1]))
         lines.append(f"  {verdict:<10}{total:>13,}{total / max(rows, 1):>8.1%}   {detail}".rstrip())
     return lines
@@ -179,7 +179,7 @@ def status_lines(status: RunStatus) -> list[str]:
     return lines
 
 
-def wrapped(text: str, width: int = 80) -> list[str]:
+def wrap(text: str, width: int = 80) -> list[str]:
     """Return a sentence as lines for a terminal of 80 columns."""
     return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 

@@ -90,7 +90,7 @@ Start with:
 Exit codes:
   0 done (also when designs fail)
   1 internal error, or a result that is damaged
-  2 wrong use, invalid file, or a place that cannot be written
+  2 wrong use, invalid file, or a path that cannot be written
   3 some designs could not be computed
   4 the output exists already, or is of another version
   130, 143 interrupted; the run can be resumed
@@ -162,7 +162,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
         return shell_complete(cli, {}, "sweep", COMPLETION, completion)
     try:
-        with noted_signals() as signals, _older_rules_told():
+        with noted_signals() as signals, _report_older_rules():
             code = signals.call(lambda: _invoke(words))
         sys.stdout.flush()
         return code
@@ -186,7 +186,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _older_rules_told() -> Iterator[None]:
+def _report_older_rules() -> Iterator[None]:
     """Say by whose rules a table was judged in one line, however often it is read; other warnings stay as they are."""
     said: set[str] = set()
     with warnings.catch_warnings():
@@ -230,9 +230,9 @@ def _report(error: Exception, verbose: bool) -> int:
     if isinstance(error, MemoryError):
         say("error: there is not enough memory")
         return EXIT_INTERNAL
-    if isinstance(error, OSError):  # a place that cannot be read or written
-        place = f"{error.filename}: " if error.filename else ""
-        say(f"error: {place}{why(error)}")
+    if isinstance(error, OSError):  # a path that cannot be read or written
+        path = f"{error.filename}: " if error.filename else ""
+        say(f"error: {path}{why(error)}")
         return EXIT_WRONG_USE
     say(f"internal error: {type(error).__name__}: {error}; {REPORT}")
     return EXIT_INTERNAL

@@ -22,7 +22,7 @@ JOBS = click.IntRange(1, MOST_JOBS)
 
 
 class OutputPath(click.Path):
-    """Name of a file or folder to write; an empty one, as of a shell variable that is not set, names nothing."""
+    """Name of a file or folder to write; an empty one, such as an unset shell variable, is refused."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse an empty name."""
@@ -132,8 +132,8 @@ def refuse_unwritable_history(
 ) -> None:
     """Refuse what cannot be written of a time history, before anything is computed; None where it is not wanted."""
     names = [name for name in (plot, trajectory, energy, animation) if name is not None]
-    for place, name in enumerate(names):
-        if any(Path(name).resolve() == Path(other).resolve() for other in names[:place]):
+    for index, name in enumerate(names):
+        if any(Path(name).resolve() == Path(other).resolve() for other in names[:index]):
             raise click.UsageError(f"{name} is named twice; give each output a name of its own")
     refuse_unwritable(None, plot)
     if trajectory is not None:

@@ -91,7 +91,7 @@ def run(
     from boulder_sweep.runner.sweeper import run as run_sweep
 
     notes = Notes()
-    # Who waits for this command does not act on a signal before it has told how to go on.
+    # Who waits for this command does not act on a signal before it has said how to go on.
     with noted_signals() as signals, signals.deferred(), progress(quiet, notes, kernels_for(sweep)) as shown:
         try:
             summary = run_sweep(
@@ -164,6 +164,6 @@ def status(out: str, verify: bool, as_json: bool) -> int:
     from boulder_sweep.cli import console
     from boulder_sweep.store import status as look
 
-    found = look(out, verify=verify)
-    show(*[json.dumps(found.to_dict(), default=str)] if as_json else console.status_lines(found))
-    return EXIT_INTERNAL if found.damaged else 0
+    state = look(out, verify=verify)
+    show(*[json.dumps(state.to_dict(), default=str)] if as_json else console.status_lines(state))
+    return EXIT_INTERNAL if state.damaged else 0

@@ -97,7 +97,7 @@ def simulate(
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         columns = ["", *console.value_lines(shown_values(row, units))] if every else []
-        show(*console.wrapped(verdict_line(result)), *lines, *_cautions(row), *columns)
+        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row), *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:
@@ -152,40 +152,42 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
     refuse_unwritable_history(plot, trajectory)
     try:
         with working(as_json, "design"):
-            found = compute_again(out, design_id)
+            explanation = compute_again(out, design_id)
     except IndexError as problem:
         raise click.UsageError(str(problem)) from None
-    if found.trajectory is not None:
+    if explanation.trajectory is not None:
         if plot is not None:
-            found.trajectory.plot(plot, units=units)
+            explanation.trajectory.plot(plot, units=units)
         if trajectory is not None:
-            found.trajectory.to_parquet(trajectory)
+            explanation.trajectory.to_parquet(trajectory)
     elif plot is not None or trajectory is not None:
-        say(f"note: the design cannot be computed{' again' if found.unfamiliar else ''}; there is no time history")
+        say(
+            f"note: the design cannot be computed{' again' if explanation.unfamiliar else ''}; there is no time history"
+        )
     if as_json:
-        show(json.dumps(found.as_dict(units)))
+        show(json.dumps(explanation.as_dict(units)))
         return 0
-    values = {"design": shown_values(found.inputs, units), "outcome": shown_values(found.stored, units)}
-    show(*value_lines(values), *why_lines(found, units))
-    for name in found.unequal:
-        show(f"differs now: {name} was {found.stored[name]!r}, comes out as {found.recomputed[name]!r}")
-    for line in found.changed:
+    values = {"design": shown_values(explanation.inputs, units), "outcome": shown_values(explanation.stored, units)}
+    show(*value_lines(values), *why_lines(explanation, units))
+    for name in explanation.unequal:
+        show(f"differs now: {name} was {explanation.stored[name]!r}, comes out as {explanation.recomputed[name]!r}")
+    for line in explanation.changed:
         show(f"changed since: {line}")
-    if found.judged_by:
-        show(f"as stored, the row was {found.judged_by}")
-    if found.unfamiliar:
-        show(f"not computed again: {found.unfamiliar}")
-    elif not found.unequal:
+    if explanation.judged_by:
+        show(f"as stored, the row was {explanation.judged_by}")
+    if explanation.unfamiliar:
+        show(f"not computed again: {explanation.unfamiliar}")
+    elif not explanation.unequal:
         show("computed again: the same to the last bit")
     return 0
 
 
-def why_lines(found: Explanation, units: str = "si") -> list[str]:
+def why_lines(explanation: Explanation, units: str = "si") -> list[str]:
     """Return what decided a row, and how near it came to every limit."""
     from boulder_sweep.judge.validity import BY_FLAG
     from boulder_sweep.views.wording import REASON_WORDS, ground_words
 
-    row, history = found.stored, found.trajectory
+    row, history = explanation.stored, explanation.trajectory
     reason = REASON_WORDS.get(row["reason"], row["reason"])
     lines = ["why", f"  {row['verdict']}{f': {reason}' if reason else ''}"]
     if history is None or row["max_rotation_deg"] is None:

@@ -76,43 +76,43 @@ def tradeoff(
         require_matplotlib()
         make_folder(Path(out))
     with working(quiet, doing="measuring"):
-        found = measure(sweep, **options, progress=None if quiet else say)
-    files = [] if out is None else found.write(out)
+        result = measure(sweep, **options, progress=None if quiet else say)
+    files = [] if out is None else result.write(out)
     if as_json:
-        show(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))
+        show(json.dumps({**result.to_dict(), "files": [str(file) for file in files]}))
         return 0
-    if found.points:
-        _show(found)
-    for sentence in found.recommendation():
+    if result.points:
+        _show(result)
+    for sentence in result.recommendation():
         show(*textwrap.wrap(sentence, 80))
-    if found.left_out:
-        ways = len(found.points) + len(found.left_out)
-        show(f"left out for time: {len(found.left_out)} of {ways} methods (--json lists them)")
+    if result.left_out:
+        ways = len(result.points) + len(result.left_out)
+        show(f"left out for time: {len(result.left_out)} of {ways} methods (--json lists them)")
     for file in files:
         show(f"written  {file}")
     return 0
 
 
-def _show(found: Tradeoff) -> None:
+def _show(result: Tradeoff) -> None:
     """Print the table: all of it where the terminal is wide enough, else the columns that matter most."""
     from rich.console import Console
 
     wide = Console(width=1000)
     width = Console().width
-    table = _table(found, whole=True)
+    table = _table(result, whole=True)
     whole = wide.measure(table).maximum <= width
     if not whole:
-        table = _table(found, whole=False)
+        table = _table(result, whole=False)
     Console(width=max(width, wide.measure(table).maximum)).print(table)
     show("* none with these readings is both cheaper and more accurate (rotation, 99 %)")
     if not whole:
         show("y: yield located; a wider terminal shows more columns, and -o writes all of them")
-    for readings, error in found.reference_deg.items():
-        show(f"{readings}: against steps of {found.reference_step_ms:g} ms, known to {error:.0e} deg")
+    for readings, error in result.reference_deg.items():
+        show(f"{readings}: against steps of {result.reference_step_ms:g} ms, known to {error:.0e} deg")
     show("")
 
 
-def _table(found: Tradeoff, *, whole: bool) -> RichTable:
+def _table(result: Tradeoff, *, whole: bool) -> RichTable:
     """Return the methods as a table; not whole, it fits a terminal of 80 columns."""
     from rich.box import SIMPLE
     from rich.table import Table as RichTable
@@ -129,7 +129,7 @@ def _table(found: Tradeoff, *, whole: bool) -> RichTable:
         table.add_column(heads[k], justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     before = ("", 0, False, False)
-    for point in found.points:
+    for point in result.points:
         method = point.method
         group = (method.readings, method.soil_elements, method.error_estimate, method.locate_yield)
         if group != before and before[0]:

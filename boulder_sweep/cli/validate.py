@@ -48,9 +48,9 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     from boulder_sweep.crash_tests.validation import validate as run_validation
 
     overlaid = None if measured is None or case is None else _overlay(measured, case)
-    found = run_validation(out)
-    content: dict[str, Any] = found.to_dict()
-    text = [found.text(), "", f"note: {NOT_COMPARED}"]
+    validation = run_validation(out)
+    content: dict[str, Any] = validation.to_dict()
+    text = [validation.text(), "", f"note: {NOT_COMPARED}"]
     if overlaid is not None:
         overlay, draw = overlaid
         written = [] if out is None else [draw(Path(out))]
@@ -58,15 +58,15 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         content["files"] += written
         from boulder_sweep.crash_tests.measured import deviation_table
 
-        text = [found.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
+        text = [validation.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
     if out is not None:
         text += ["", *(f"written  {file}" for file in content["files"])]
     if as_json:
         show(json.dumps(content))
     else:
         words = (line for part in text for line in part.split("\n"))
-        show(*(own for line in words for own in (textwrap.wrap(line, 80) if line.startswith("note:") else [line])))
-    return 0 if found.holds else 1
+        show(*(part for line in words for part in (textwrap.wrap(line, 80) if line.startswith("note:") else [line])))
+    return 0 if validation.holds else 1
 
 
 def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path], str]]:
@@ -84,7 +84,7 @@ def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path],
     end = float(history.time_s[-1])
     horizon = max(end, 0.0) or None
     trajectories: dict[str, Trajectory] = {p: simulate(sweep, readings=p, horizon_s=horizon) for p in PRESETS}
-    found = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
+    deviations = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
 
     def draw(folder: Path) -> str:
         from boulder_sweep.views.crash_curves import draw_crash_test
@@ -93,4 +93,4 @@ def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path],
         draw_crash_test(sweep.name, trajectories, target, history)
         return str(target)
 
-    return found, draw
+    return deviations, draw

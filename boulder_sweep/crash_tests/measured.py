@@ -351,7 +351,7 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
     """
     end = float(trajectory.time_s[-1]) if len(trajectory) else 0.0
     limit = trajectory.motion.outcome.t_limit
-    found = []
+    deviations = []
     for name, values in measured.signals.items():
         for until in (end, limit) if math.isfinite(limit) else (end,):
             inside = np.isfinite(values) & (measured.time_s >= 0.0) & (measured.time_s <= until)
@@ -360,7 +360,7 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
             times, data = measured.time_s[inside], values[inside]
             simulated = np.interp(times, trajectory.time_s, simulated_signal(trajectory, name))
             error = simulated - data
-            found.append(
+            deviations.append(
                 Deviation(
                     signal=name,
                     unit=UNITS[name],
@@ -372,15 +372,15 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
                     simulated_peak=_peak(simulated),
                 )
             )
-    if not found:
+    if not deviations:
         raise ComparisonError(
             f"{measured.path}: no measured value lies within the simulated time, 0 to {end:g} s; "
             f"time counts from first touch"
         )
-    return found
+    return deviations
 
 
-def deviation_table(found: dict[str, list[Deviation]]) -> Table:
+def deviation_table(by_preset: dict[str, list[Deviation]]) -> Table:
     """Return deviations by preset as a table."""
     table = Table(
         (
@@ -395,7 +395,7 @@ def deviation_table(found: dict[str, list[Deviation]]) -> Table:
             "peak error",
         )
     )
-    for preset, deviations in found.items():
+    for preset, deviations in by_preset.items():
         for d in deviations:
             digits = 2 if d.unit == "deg" else 4
             unit = "°" if d.unit == "deg" else f" {d.unit}"

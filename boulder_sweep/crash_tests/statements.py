@@ -65,13 +65,13 @@ class Convergence:
         head = ["elements N"]
         head += [f"RWG {preset.replace('_', ' ')}: max rotation [deg]" for preset in PRESETS]
         head += [f"ABG {preset.replace('_', ' ')}: 20° at [ms]" for preset in PRESETS]
-        found = Table(tuple(head))
+        table = Table(tuple(head))
         for n in (*self.elements, 0):
             cells = [f"{n}" if n else "closed form"]
             cells += [number(self.rotation_deg["rwg", preset, n], 4) for preset in PRESETS]
             cells += [number(1e3 * self.time_to_limit_s["abg", preset, n], 3) for preset in PRESETS]
-            found.add(*cells)
-        return found
+            table.add(*cells)
+        return table
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -143,11 +143,11 @@ class Statement:
         return asdict(self)
 
 
-def statement_table(found: list[Statement]) -> Table:
-    """Return statements as a table."""
+def statement_table(rows: list[Statement]) -> Table:
+    """Return statements as a table, one a row."""
     table = Table(("section", "the paper says", "the model gives", "consistent"))
     words = {True: "yes", False: "NO", None: "cannot be checked"}
-    for statement in found:
+    for statement in rows:
         table.add(statement.section, statement.says, statement.model_gives, words[statement.holds])
     return table
 
@@ -259,8 +259,8 @@ def _moved(trajectory: Trajectory) -> float:
     return float(trajectory.motion.outcome.maxima.x_b)
 
 
-def _each(found: Mapping[str, Trajectory], words: Any) -> str:
-    return _list({preset: words(trajectory) for preset, trajectory in found.items()})
+def _each(by_preset: Mapping[str, Trajectory], words: Any) -> str:
+    return _list({preset: words(trajectory) for preset, trajectory in by_preset.items()})
 
 
 def _list(texts: Mapping[str, str]) -> str:

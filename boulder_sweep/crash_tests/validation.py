@@ -29,7 +29,7 @@ COMPARED_AT_S = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """What `validate` found.
+    """Result of `validate`.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Validation:
 
     def table(self) -> Table:
         """Return both tests under both presets."""
-        found = Table(
+        table = Table(
             (
                 "test",
                 "readings",
@@ -74,7 +74,7 @@ class Validation:
             )
         )
         for (test, preset), row in self.rows().items():
-            found.add(
+            table.add(
                 NAMES[test],
                 preset.replace("_", " "),
                 row["verdict"] + (f", {row['reason']}" if row["reason"] else ""),
@@ -87,7 +87,7 @@ class Validation:
                 number(row["time_of_max_vehicle_displacement_s"], 4),
                 number(row["peak_force_kN"], 1),
             )
-        return found
+        return table
 
     def rows(self) -> dict[tuple[str, str], dict[str, Any]]:
         """Return the same as plain data, by test and preset."""
@@ -141,10 +141,10 @@ def validate(out: str | Path | None = None) -> Validation:
     """
     from boulder_sweep.crash_tests.cases import rigid_wall_test
 
-    found = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
+    trajectories = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
     study = convergence()
     wall = rigid_wall_test()
-    result = Validation(found, wall, study, statements(found, study, wall))
+    result = Validation(trajectories, wall, study, statements(trajectories, study, wall))
     if out is not None:
         result.files.extend(draw("crash_curves", "write_validation", result, Path(out)))
     return result

@@ -47,7 +47,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
     path : str or Path
         YAML file.
     overrides : sequence of str
-        ``key.path=value`` entries that replace those of the file, as of ``--set``.
+        ``key.path=value`` entries that replace those of the file, as ``--set`` gives them.
 
     Returns
     -------

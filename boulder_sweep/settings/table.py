@@ -30,9 +30,9 @@ from boulder_sweep.settings.table_columns import (
     check_count,
     check_numbers,
     check_values,
-    converted,
     label_of,
     read_header,
+    to_input_unit,
 )
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.text import one_line
@@ -88,16 +88,16 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
         return None
     try:
         check_regular_file(path, MAX_TABLE_BYTES, "Split it into several sweeps")
-        found = reader(path, problems)
+        designs = reader(path, problems)
     except SettingsError as error:
         for problem in error.problems:
             inside = problem.line is not None
             position = Position(problem.file, problem.line, problem.column) if inside else node.position
             problems.add(position, "table", problem.message if inside else f"{problem.file}: {problem.message}")
         return None
-    if len(problems.problems) == before and not found.columns:
+    if len(problems.problems) == before and not designs.columns:
         problems.add(node.position, "table", f"{path} has no column that is an input")
-    return None if len(problems.problems) > before else found
+    return None if len(problems.problems) > before else designs
 
 
 class _Rows:
@@ -162,7 +162,7 @@ class _Rows:
             if column.field is None:
                 self.texts.setdefault(column.name, []).extend(cells)
                 continue
-            values = converted(self.convert(cells, index, column), column)
+            values = to_input_unit(self.convert(cells, index, column), column)
             for row, message in check_values(values, column.field):
                 if not np.isnan(values[row]):  # those have been reported as they were read
                     self.alike.add("cells", self.position(self.origins[row], index), column.name, message)
@@ -357,7 +357,7 @@ def _read_parquet(path: Location, problems: ProblemList) -> DesignList:
     label = str(path)
     position = Position(label)
     alike = Alike(problems)
-    found = DesignList(path.name, {})
+    designs = DesignList(path.name, {})
     try:
         file = pq.ParquetFile(source_of(path))
         rows = file.metadata.num_rows
@@ -374,7 +374,7 @@ def _read_parquet(path: Location, problems: ProblemList) -> DesignList:
             numeric = pa.types.is_floating(cells.type) or pa.types.is_integer(cells.type)
             if column.field is None:
                 if not numeric or check_numbers(column, position, problems):
-                    found.labels[name] = _label(cells)
+                    designs.labels[name] = _label(cells)
                 continue
             if not numeric:
                 problems.add(position, name, f"holds {cells.type}, not numbers")
@@ -382,15 +382,15 @@ def _read_parquet(path: Location, problems: ProblemList) -> DesignList:
             if cells.null_count:
                 problems.add(position, name, f"has {cells.null_count} empty cells; every design needs a value")
                 continue
-            values = converted(cells.cast(pa.float64()).to_numpy(), column)
+            values = to_input_unit(cells.cast(pa.float64()).to_numpy(), column)
             for row, message in check_values(values, column.field):
                 alike.add("rows", position, name, f"row {row + 1}: {message}")
-            found.columns[column.field.name] = np.ascontiguousarray(values)
+            designs.columns[column.field.name] = np.ascontiguousarray(values)
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, MemoryError) as error:
         # Of a damaged file, pyarrow raises almost anything.
         raise refuse(label, f"cannot be read as Parquet ({shorten(str(error), 100)})") from None
     alike.finish()
-    return found
+    return designs
 
 
 def _label(cells: pa.ChunkedArray) -> Label:

@@ -64,14 +64,14 @@ def read_header(names: list[str], positions: list[Position], problems: ProblemLi
     """Return what every column is, None for those that cannot be used; mistakes go to `problems`."""
     columns: list[TableColumn | None] = []
     for name, position in zip(names, positions, strict=True):
-        found = _column(name)
-        if isinstance(found, TableColumn):
-            same = [other for other in columns if other is not None and _key(other) == _key(found)]
+        column = _column(name)
+        if isinstance(column, TableColumn):
+            same = [other for other in columns if other is not None and _key(other) == _key(column)]
             if same:
-                found = f"gives the same as column {same[0].name}" if same[0].name != name else "appears twice"
-        if isinstance(found, str):
-            problems.add(position, shorten(name) or "(empty)", found)
-        columns.append(found if isinstance(found, TableColumn) else None)
+                column = f"gives the same as column {same[0].name}" if same[0].name != name else "appears twice"
+        if isinstance(column, str):
+            problems.add(position, shorten(name) or "(empty)", column)
+        columns.append(column if isinstance(column, TableColumn) else None)
     return columns
 
 
@@ -182,6 +182,6 @@ def label_of(texts: list[str]) -> Label:
     return Label(codes.astype(np.int32), tuple(words.tolist()))
 
 
-def converted(values: np.ndarray, column: TableColumn) -> np.ndarray:
+def to_input_unit(values: np.ndarray, column: TableColumn) -> np.ndarray:
     """Return values in the unit of the input."""
     return values if column.factor == 1 else values * float(column.factor)

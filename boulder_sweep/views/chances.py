@@ -13,7 +13,7 @@ from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.text import chance_text
 from boulder_sweep.views.figures import BLUE, GREY, LIGHT_GREY, ORANGE, PALE_ORANGE, caption, figure, headline
-from boulder_sweep.views.wording import USUAL, label, name_of, size_of, terms_line, unbroken, value_text
+from boulder_sweep.views.wording import USUAL, keep_together, label, name_of, size_of, terms_line, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,11 +68,11 @@ def _caption(result: Uncertainty, row: Mapping[str, Any], uncertain: Sequence[st
     sets = [f"{axis.name}: {row[axis.name]}" for axis in result.sweep.axes if axis.labels]
     follows = () if "impact_height_m" in result.sweep.plan.given else ("impact_height_m",)
     values = {
-        name: unbroken(value_text(name, row[name], units))
+        name: keep_together(value_text(name, row[name], units))
         for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS)
         if row.get(name) is not None and name not in follows and (name, row[name]) not in USUAL
     }
-    design = ", ".join([*map(unbroken, sets), *(words for name, words in values.items() if name not in uncertain)])
+    design = ", ".join([*map(keep_together, sets), *(words for name, words in values.items() if name not in uncertain)])
     means = ", ".join(values[name] for name in uncertain if name in values)
     of = f"Design #{row['design_id']} of #0 to #{len(result) - 1}" if len(result) > 1 else "Design"
     least = json.loads(result.arrow.schema.metadata[b"boulder_sweep.question"])["margin"]

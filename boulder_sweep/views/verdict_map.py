@@ -14,7 +14,7 @@ from boulder_sweep.errors import PictureError
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import VERDICTS
 from boulder_sweep.views.slices import ROBUSTNESS, Pieces, Slice, plane, select
-from boulder_sweep.views.wording import USUAL, label, name_of, size_of, unbroken, value_text
+from boulder_sweep.views.wording import USUAL, keep_together, label, name_of, size_of, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -202,9 +202,9 @@ def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, whic
         lines = []
         for column, column_value in enumerate(shown.column_values):
             parts = _panel_title(shown, row_value, column_value, units)
-            name = figures.broken(fig, ", ".join(parts), map_in, **style)
+            name = figures.break_lines(fig, ", ".join(parts), map_in, **style)
             if "\n" in name:
-                name = figures.broken(fig, "\n".join(parts), map_in, **style)
+                name = figures.break_lines(fig, "\n".join(parts), map_in, **style)
             grid[row, column].set_title(name, **style)
             lines.append(name.count("\n"))
         further += max(lines) * LINE_IN["map"]
@@ -242,7 +242,7 @@ def _legend(fig: Any, present: set[int], shown: Slice, *, beside: bool) -> float
 
 def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     """Say what is shown, what all designs have in common, and what a pass means, each on a new line."""
-    fixed = ", ".join(unbroken(_held(shown, name, value, units)) for name, value in shown.fixed.items())
+    fixed = ", ".join(keep_together(_held(shown, name, value, units)) for name, value in shown.fixed.items())
     words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
     if shown.grades:
@@ -250,7 +250,7 @@ def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     for name, count in shown.left_out.items():
         words.append(f"{name_of(name)}: {count} values, not all shown")
     same = [
-        unbroken(_held(shown, name, value, units))
+        keep_together(_held(shown, name, value, units))
         for name, value in shown.constants.items()
         if (name, value) not in USUAL
     ]
@@ -265,7 +265,7 @@ def _flagged(shown: Slice) -> str:
     shares = {name: count / shown.passing for name, count in shown.flags.items()}
     inside = shares.pop("", 0.0)
     most = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
-    named = ", ".join(unbroken(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
+    named = ", ".join(keep_together(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
     if not named:
         return "No pass lies outside what the model was tested on"
     return f"Of the passes {1.0 - inside:.0%} lie outside what the model was tested on: {named}"

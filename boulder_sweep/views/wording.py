@@ -87,7 +87,7 @@ def value_text(name: str, value: float, units: str = "si") -> str:
     return SYMBOLS[name].format(shown) if name in SYMBOLS else f"{name_of(name)} {shown}"
 
 
-def unbroken(words: str) -> str:
+def keep_together(words: str) -> str:
     """Return words that stay on one line."""
     return words.replace(" ", NO_BREAK_SPACE)
 

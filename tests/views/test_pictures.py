@@ -150,7 +150,7 @@ def test_a_caption_tells_all_of_the_ground_within_the_picture(drawn: list[Figure
 @pytest.mark.parametrize("inches", [0.01, 0.5, 2.0])
 def test_a_broken_text_loses_nothing_but_spaces(words: str, inches: float) -> None:
     fig = Figure()
-    found = figures.broken(fig, words, inches)
+    found = figures.break_lines(fig, words, inches)
     assert found.replace("\n", "").replace(" ", "") == words.replace("\n", "").replace(" ", "")
     lines = found.split("\n")
     for line in lines:
