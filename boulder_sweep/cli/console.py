@@ -175,7 +175,7 @@ def status_lines(status: RunStatus) -> list[str]:
     if status.resume_command and not status.running:
         lines.append(f"resume   {status.resume_command}")
         if status.settings_missing:
-            lines.append(f"note     there is no {status.settings_missing}; name the settings file where it is now")
+            lines.append(f"note     there is no {status.settings_missing}; give its present path instead")
     return lines
 
 

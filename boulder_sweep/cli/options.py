@@ -130,7 +130,7 @@ def refuse_unwritable(table: str | None, picture: str | None = None) -> None:
 def refuse_unwritable_history(
     plot: str | None, trajectory: str | None, energy: str | None = None, animation: str | None = None
 ) -> None:
-    """Refuse what cannot be written of a time history, before anything is computed; None where it is not wanted."""
+    """Refuse outputs of a time history that cannot be written, before anything is computed; None: not wanted."""
     names = [name for name in (plot, trajectory, energy, animation) if name is not None]
     for index, name in enumerate(names):
         if any(Path(name).resolve() == Path(other).resolve() for other in names[:index]):

@@ -63,12 +63,12 @@ def new(file: Path | None, vehicle: str | None, units: str | None, output: Path 
 
 
 def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
-    """Say which entries of a vehicle nobody has published, and how to find them."""
+    """Return which entries of a vehicle have no published values, and how to measure them."""
     from boulder_sweep.settings.starter import CATEGORIES, CLASSES
 
     mass = CATEGORIES[CLASSES[vehicle][0]].mass[units]
     return [
-        f"{file}: fill in three entries; none is published for {vehicle}.",
+        f"{file}: fill in three entries; no values are published for {vehicle}.",
         "  vehicle.spring, vehicle.damper: from a crash against a rigid wall. Measure the",
         "    deceleration of the vehicle over time (or its displacement), then",
         f"    sweep fit-vehicle PULSE.csv --mass '{mass}'",

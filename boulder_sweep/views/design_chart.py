@@ -29,7 +29,7 @@ CURVES = ("friction_angle_deg", "subgrade_reaction_MN_m3", "boulder_width_m", "i
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 """Of as many curves as can be told apart with their bands."""
 SET_COLOURS = (*COLOURS, SKY, AMBER, BLACK)
-"""Of named soils or vehicles, each of which gets its curve; beyond that the dashes differ."""
+"""Of the curves of named soils or vehicles; with more curves the dashes differ."""
 DASHES = ("-", "--", "-.", (0, (1, 1)))
 
 

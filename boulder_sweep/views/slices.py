@@ -197,15 +197,15 @@ class Slice:
     constants : dict of str to float
         Inputs that have one value in the whole table.
     total, count, passing : int
-        How many rows the table has, how many of them lie in the plane, and how many of these pass.
+        Rows of the table, those of them in the plane, and those of these that pass.
     thinned : bool
         Whether there were too many rows to keep them all.
     flags : dict of str to int
-        How many of those that pass have each flag of the column ``validity``; under ``""`` those without any.
+        Number of passing rows with each flag of the column ``validity``; under ``""`` those without any.
     grades : dict of str to int
-        How many of those that pass have each grade of the column ``robustness``; empty for a table without it.
+        Number of passing rows with each grade of the column ``robustness``; empty for a table without it.
     left_out : dict of str to int
-        Of which multiples only some are shown: how many values there are.
+        Inputs of which only some values are shown, each with the number of its values.
     sets : dict of str to sequence of str
         Named soils or vehicles; their values here are positions in these lists.
     """

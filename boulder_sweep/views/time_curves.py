@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.errors import PictureError
+from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import (
     AMBER,
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 
 BEYOND_LIMIT, AFTER_PEAK = "#F3E7DF", "#F0F0F0"
-"""Behind the curves where the model no longer holds, and where its elastic soil gives back all that it took."""
+"""Behind the curves where the model no longer holds, and where elastic soil returns all the energy that it took."""
 
 
 def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:
@@ -82,7 +83,8 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     Returns
     -------
     float
-        Time of the rotation limit; where it is not reached, of the last peak of rotation and displacement [s].
+        Time of the rotation limit; where it is not reached, of the last peak of rotation and displacement in elastic
+        soil, and never in plastic soil: infinite [s].
     str
         What makes the time after it unreliable.
     """
@@ -90,6 +92,8 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     if math.isfinite(outcome.t_limit):
         limit = math.degrees(trajectory.motion.control.theta_limit)
         return outcome.t_limit, f"shaded: beyond {limit:g}° the model no longer holds"
+    if trajectory.settings["model"].get("unloading", UNLOADINGS[0]) != UNLOADINGS[0]:
+        return math.inf, ""
     peak = max(outcome.maxima.t_theta, outcome.maxima.t_x_b)
     return peak, "shaded: rebound (the soil of the model has no memory)"
 

@@ -76,10 +76,10 @@ def _panel(axes: Axes, points: list[Point]) -> None:
             words = "error for each design" if estimate else "closed form"
             words += ", yield located" if located else ""
         these = [p for p in points if (p.method.soil_elements, p.method.error_estimate, p.method.locate_yield) == group]
-        _way(axes, these, colour, marker, words)
+        _method(axes, these, colour, marker, words)
 
 
-def _way(axes: Axes, points: list[Point], colour: str, marker: str, words: str) -> None:
+def _method(axes: Axes, points: list[Point], colour: str, marker: str, words: str) -> None:
     """Draw one method over its steps."""
     cost = [p.cpu_us for p in points]
     usual = [max(p.rotation_p99_deg, LEAST_DEG) for p in points]

@@ -195,7 +195,7 @@ def test_it_says_what_to_measure_for_a_vehicle_without_published_values(sweep, t
     code, out, err = sweep("new", "--class", vehicle, "--units", "us", "h.yaml")
     assert (code, err) == (0, "")
     lines = out.splitlines()
-    assert lines[0] == f"h.yaml: fill in three entries; none is published for {vehicle}."
+    assert lines[0] == f"h.yaml: fill in three entries; no values are published for {vehicle}."
     assert "  vehicle.spring, vehicle.damper: from a crash against a rigid wall. Measure the" in lines
     assert f"    sweep fit-vehicle PULSE.csv --mass '{mass}'" in lines
     assert lines[-1] == "Then: sweep check h.yaml"
