@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 Command = Callable[..., Any]
+SYSTEMS = ("si", "us")
 JOBS = click.IntRange(1, MOST_JOBS)
 
 
@@ -44,9 +45,7 @@ set_option = click.option(
 )
 jobs_option = click.option("--jobs", type=JOBS, help="Threads [default: all cores].")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
-units_option = click.option(
-    "--units", type=click.Choice(["si", "us"]), default="si", show_default=True, help="Units shown."
-)
+units_option = click.option("--units", type=click.Choice(SYSTEMS), default="si", show_default=True, help="Units shown.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No notes.")
 margin_option = click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 second_opinion_option = click.option(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.options import OutputPath, grid_argument, load_sweep, set_option
+from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, load_sweep, set_option
 from boulder_sweep.cli.output import show
 
 NEW_EXAMPLES = """\b
@@ -19,7 +19,6 @@ Examples:
   sweep new --class M40 --units us -o my-site.yaml
 """
 DEFAULT = "my-site.yaml"
-SYSTEMS = ("si", "us")
 
 
 @click.command("new", short_help="Write a commented settings file to start from.", epilog=NEW_EXAMPLES)

@@ -111,6 +111,7 @@ def convergence(elements: Sequence[int] = ELEMENTS) -> Convergence:
 
 
 CLOSE_UNTIL_S = 0.1
+"""Time up to which the paper finds the first test close [s]."""
 CLOSE_ENOUGH_S = 0.03
 """The paper reads "approximately 0.1 s" off a figure; 20 deg must fall within so much of it."""
 NO_CHANGE_DEG = 0.01

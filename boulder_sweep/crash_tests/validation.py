@@ -11,7 +11,14 @@ import numpy as np
 
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.statements import Convergence, Statement, convergence, statement_table, statements
+from boulder_sweep.crash_tests.statements import (
+    CLOSE_UNTIL_S,
+    Convergence,
+    Statement,
+    convergence,
+    statement_table,
+    statements,
+)
 from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.simulation import simulate
@@ -23,8 +30,6 @@ NOT_COMPARED = (
     "What is checked is what the paper says in words and numbers. `--measured FILE.csv` lays your own test data over "
     "the simulation."
 )
-COMPARED_AT_S = 0.1
-"""Time up to which the paper finds the first test close [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +177,7 @@ def _row(trajectory: Trajectory) -> dict[str, Any]:
         trajectory.vehicle_velocity_m_s[-1] > 0.0
         and trajectory.vehicle_displacement_m[-1] >= trajectory.vehicle_displacement_m.max()
     )
-    early = np.searchsorted(trajectory.time_s, COMPARED_AT_S)
+    early = np.searchsorted(trajectory.time_s, CLOSE_UNTIL_S)
     row["rotation_at_0.1_s_deg"] = math.degrees(trajectory.rotation_rad[early])
     row["boulder_centre_displacement_at_0.1_s_m"] = float(trajectory.boulder_centre_displacement_m[early])
     return row

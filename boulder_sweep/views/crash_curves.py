@@ -12,7 +12,7 @@ from boulder_sweep.crash_tests.cases import NAMES
 from boulder_sweep.crash_tests.measured import simulated_signal
 from boulder_sweep.crash_tests.pulse import RESPONSES, UNITS
 from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
-from boulder_sweep.crash_tests.statements import CLOSE_UNTIL_S
+from boulder_sweep.crash_tests.statements import CLOSE_UNTIL_S, PAPERS_N
 from boulder_sweep.store.files import replacing
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, BLUE, GREY, ORANGE
@@ -174,8 +174,8 @@ def draw_convergence(study: Convergence, path: Path) -> None:
             order = study.order("rwg", preset)
             words = f"{preset.replace('_', ' ')}: order {order:.1f}"
             axes.loglog(n, gap, marker="o", markersize=4.5, label=words, **style)
-        axes.axvline(5000, color=GREY, linewidth=0.9, linestyle=":")
-        axes.annotate("N of the paper", (5000, axes.get_ylim()[1]), fontsize=8.5, color=GREY, ha="right", va="top")
+        axes.axvline(PAPERS_N, color=GREY, linewidth=0.9, linestyle=":")
+        axes.annotate("N of the paper", (PAPERS_N, axes.get_ylim()[1]), fontsize=8.5, color=GREY, ha="right", va="top")
         axes.set_xlabel("number N of soil elements")
         axes.set_ylabel("|largest rotation − closed form| [deg]")
         axes.set_title("Rockville White Granite: element sums against N → ∞")
