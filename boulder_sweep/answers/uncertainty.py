@@ -93,7 +93,7 @@ class Uncertainty(Result):
         PictureError
             It cannot be drawn.
         """
-        draw("uncertainty", "draw_uncertainty", self, path, design_id=design_id, units=units)
+        draw("chances", "draw_uncertainty", self, path, design_id=design_id, units=units)
 
 
 def uncertainty(

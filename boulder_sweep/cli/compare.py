@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.loading import refuse_units_of_json
-from boulder_sweep.cli.options import json_option, units_option
+from boulder_sweep.cli.options import json_option, refuse_units_of_json, units_option
 from boulder_sweep.cli.output import show
 from boulder_sweep.text import counted
 
@@ -45,50 +44,50 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
     from boulder_sweep.settings.shown_units import shown_unit
 
     refuse_units_of_json(units, as_json)
-    found = match(before, after)
+    comparison = match(before, after)
     if as_json:
-        show(json.dumps(found.to_dict()))
+        show(json.dumps(comparison.to_dict()))
         return 0
-    for name, judged_by in zip((before, after), found.judged_by, strict=True):
-        if any(found.judged_by):
+    for name, judged_by in zip((before, after), comparison.judged_by, strict=True):
+        if any(comparison.judged_by):
             show(f"rules    {name}: {judged_by or 'judged by the rules of this version'}")
-    for line in found.changed:
+    for line in comparison.changed:
         show(f"changed  {line}")
-    show(*_found_lines(before, after, found, units))
-    for change, count in found.flips().items():
+    show(*_count_lines(before, after, comparison, units))
+    for change, count in comparison.flips().items():
         show(f"  {count:>9,}  {change}")
-    for name, pair in found.least.items():
+    for name, pair in comparison.least.items():
         words, unit = LEAST[name]
         shown, size = shown_unit(unit, units)
         values = ["none passes" if value is None else f"{value / size:,.5g} {shown}" for value in pair]
         show(f"{words} that passes: {values[0]} before, {values[1]} after")
-    for row in found.flipped.head(listed).to_dict("records"):
-        show(*_design_lines(row, found, units))
+    for row in comparison.flipped.head(listed).to_dict("records"):
+        show(*_design_lines(row, comparison, units))
     return 0
 
 
-def _found_lines(before: str, after: str, found: Comparison, units: str) -> list[str]:
+def _count_lines(before: str, after: str, comparison: Comparison, units: str) -> list[str]:
     """Return how many designs both have, what tells them apart, and how many verdicts changed."""
-    from boulder_sweep.cli.console import wrapped
-    from boulder_sweep.views.labels import name_of, size_of, unit_of
+    from boulder_sweep.cli.console import wrap
+    from boulder_sweep.views.wording import name_of, size_of, unit_of
 
-    turned, matched = found.turned(), len(found.matched)
-    alone = f"{found.only_before:,} only before, {found.only_after:,} only after"
+    turned, matched = comparison.turned(), len(comparison.matched)
+    alone = f"{comparison.only_before:,} only before, {comparison.only_after:,} only after"
     lines = [f"{counted(matched, 'design')} in both; {alone}"]
-    for name in found.differ:
-        size, pairs = size_of(name, units), found.values(name)
+    for name in comparison.differ:
+        size, pairs = size_of(name, units), comparison.values(name)
         shown = [f"{one / size:.6g} -> {other / size:.6g}" for one, other in pairs[:MOST_PAIRS]]
         more = f" and {len(pairs) - MOST_PAIRS} more" if len(pairs) > MOST_PAIRS else ""
-        lines += wrapped(f"differs  {name_of(name)}: {', '.join(shown)} {unit_of(name, units)}".rstrip() + more)
-    lines += wrapped(f"{turned['passes_lost']:,} of {turned['passes']:,} passes in {before} do not pass in {after}")
-    lines += wrapped(f"{turned['passes_gained']:,} of {matched - turned['passes']:,} others do")
-    return [*lines, f"{counted(len(found.flipped), 'verdict')} changed"]
+        lines += wrap(f"differs  {name_of(name)}: {', '.join(shown)} {unit_of(name, units)}".rstrip() + more)
+    lines += wrap(f"{turned['passes_lost']:,} of {turned['passes']:,} passes in {before} do not pass in {after}")
+    lines += wrap(f"{turned['passes_gained']:,} of {matched - turned['passes']:,} others do")
+    return [*lines, f"{counted(len(comparison.flipped), 'verdict')} changed"]
 
 
-def _design_lines(row: dict[str, Any], found: Comparison, units: str) -> list[str]:
+def _design_lines(row: dict[str, Any], comparison: Comparison, units: str) -> list[str]:
     """Return one design whose verdict changed: how, and the inputs that tell it apart."""
-    from boulder_sweep.cli.console import wrapped
-    from boulder_sweep.views.labels import value_text
+    from boulder_sweep.cli.console import wrap
+    from boulder_sweep.views.wording import value_text
 
     verdicts, ids = (" -> ".join(str(row[f"{name}_{when}"]) for when in WHEN) for name in ("verdict", "design_id"))
     rotation = " -> ".join(f"{row[f'max_rotation_deg_{when}']:.4g}" for when in WHEN)
@@ -96,6 +95,6 @@ def _design_lines(row: dict[str, Any], found: Comparison, units: str) -> list[st
         value_text(name, row[name], units)
         if name in row
         else " -> ".join(value_text(name, row[f"{name}_{when}"], units) for when in WHEN)
-        for name in found.varying
+        for name in comparison.varying
     ]
-    return [f"  design {ids}: {verdicts}, {rotation} deg", *(f"    {line}" for line in wrapped(", ".join(inputs), 76))]
+    return [f"  design {ids}: {verdicts}, {rotation} deg", *(f"    {line}" for line in wrap(", ".join(inputs), 76))]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 import textwrap
 from collections.abc import Mapping
@@ -13,7 +12,6 @@ from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:
-    from boulder_sweep.impact.trajectory import Trajectory
     from boulder_sweep.locations import Location
     from boulder_sweep.runner.estimate import Estimate
     from boulder_sweep.runner.summary import Summary
@@ -83,18 +81,18 @@ def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
 
     if not any(key.startswith("pass/") for key in reasons):
         return []
-    lines = [f"pass   is {NOT_A_RATING}", *_wrapped(f"robust: {IN_WORDS}", "       ")]
+    lines = [f"pass   is {NOT_A_RATING}", *_indent(f"robust: {IN_WORDS}", "       ")]
     if "pass/open" in reasons:
         lines.append("       open: not asked; --second-opinion asks")
     return lines
 
 
-def _wrapped(text: str, indent: str) -> list[str]:
+def _indent(text: str, indent: str) -> list[str]:
     return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent=indent)
 
 
 def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
-    """Return how firm the passes are, from a sample of the designs; nothing if it was not found out."""
+    """Return how firm the passes are, from a sample of the designs; nothing where none was taken."""
     if not firmness or "lost" not in firmness:
         return []
     error, lost = firmness["numerical_error_deg"], firmness["lost"]
@@ -111,9 +109,9 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
             f"another law of the soil without friction: {laws}",
         )
     )
-    lines += _wrapped(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")
+    lines += _indent(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")
     shares = ", ".join(f"{name} {count / firmness['passes']:.0%}" for name, count in firmness["flags"].items() if name)
-    return [*lines, *_wrapped(f"flags: {shares}", "       ")] if shares else lines
+    return [*lines, *_indent(f"flags: {shares}", "       ")] if shares else lines
 
 
 def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
@@ -125,12 +123,12 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
         steps += f" and {1e3 * accuracy['reported_step_s']:g} ms"
     if accuracy["yield_located"]:
         steps += ", yield located"
-    found = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
+    line = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
     if "pilot_designs" not in accuracy:
-        return [found]
+        return [line]
     sample = counted(accuracy["pilot_designs"], "design")
     reached = f"{accuracy['estimated_error_p99_9_deg']:g} deg in 99.9 % of a pilot of {sample}"
-    return [found, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
+    return [line, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
 def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:
@@ -151,9 +149,9 @@ def verdict_lines(reasons: Mapping[str, int], rows: int) -> list[str]:
     """Return one line per verdict with its reasons; `reasons` counts rows by ``verdict/reason``."""
     lines = []
     for verdict in VERDICTS:
-        own = {key: count for key, count in reasons.items() if key.split("/")[0] == verdict}
-        total = sum(own.values())
-        named = {key.partition("/")[2]: count for key, count in own.items() if "/" in key and count}
+        of_verdict = {key: count for key, count in reasons.items() if key.split("/")[0] == verdict}
+        total = sum(of_verdict.values())
+        named = {key.partition("/")[2]: count for key, count in of_verdict.items() if "/" in key and count}
         detail = ", ".join(f"{reason} {count:,}" for reason, count in sorted(named.items(), key=lambda i: -i[1]))
         lines.append(f"  {verdict:<10}{total:>13,}{total / max(rows, 1):>8.1%}   {detail}".rstrip())
     return lines
@@ -177,60 +175,13 @@ def status_lines(status: RunStatus) -> list[str]:
     if status.resume_command and not status.running:
         lines.append(f"resume   {status.resume_command}")
         if status.settings_missing:
-            lines.append(f"note     there is no {status.settings_missing}; name the settings file where it is now")
+            lines.append(f"note     there is no {status.settings_missing}; give its present path instead")
     return lines
 
 
-def wrapped(text: str, width: int = 80) -> list[str]:
+def wrap(text: str, width: int = 80) -> list[str]:
     """Return a sentence as lines for a terminal of 80 columns."""
     return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-
-
-def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si") -> list[str]:
-    """Return how near one design came to every limit, when, and to within what.
-
-    Parameters
-    ----------
-    row
-        Its outcome columns, in the units of the table; it has touched the truck.
-    history
-        The impact over time.
-    units
-        ``si`` or ``us``.
-    """
-    from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-    from boulder_sweep.settings.shown_units import shown_unit
-
-    (length, metre), (force, kilonewton) = shown_unit("m", units), shown_unit("kN", units)
-    limit = math.degrees(history.motion.control.theta_limit)
-    if row["time_to_limit_s"] is not None:
-        reached_ms = 1e3 * row["time_to_limit_s"]
-        lines = [f"  rotation: the limit of {limit:g} deg is reached {reached_ms:.1f} ms after contact"]
-    else:
-        rating = history.settings["criterion"]["rating"]
-        lines = [
-            f"  rotation: {row['max_rotation_deg']:.4g} deg of {limit:g} deg allowed, "
-            f"{1 - row['max_rotation_deg'] / limit:.1%} below, "
-            f"{1e3 * history.motion.outcome.maxima.t_theta:.0f} ms after contact",
-            f"  penetration: {row['penetration_m'] / metre:.4g} {length}, {rating} allows "
-            f"{PENETRATION_LIMITS_M[rating] / metre:.3g} {length} beyond the far face",
-            f"  displacement: boulder {row['max_displacement_m'] / metre:.3g} {length}, "
-            f"truck {row['max_vehicle_displacement_m'] / metre:.3g} {length}; "
-            f"peak force {row['peak_force_kN'] / kilonewton:,.0f} {force}",
-        ]
-    if row.get("permanent_tilt_deg") is not None:
-        lines.append(
-            f"  afterwards: swings back by {row['swing_back_deg']:.3g} deg, rests at "
-            f"{row['permanent_tilt_deg']:.3g} deg, to within {row['permanent_tilt_error_deg']:.1g} deg"
-        )
-    if (second := history.motion.second) is not None:
-        reached = history.time_s[history.motion.record.offset > 0.0]
-        when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
-        crush = f"{second.s_2 / metre:.4g} {length}"
-        lines.append(f"  front: its second spring acts from a crush of {crush} on, {when}")
-    if row["rotation_error_deg"] is not None:
-        lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
-    return lines
 
 
 def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, json_option
+from boulder_sweep.cli.options import OUTPUT, json_option, refuse_unwritable
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
-    from boulder_sweep.crash_tests.fitting import StagedFit, VehicleFit
+    from boulder_sweep.crash_tests.fitting import StagedFit
+    from boulder_sweep.crash_tests.pulse import VehicleFit
 
 EXAMPLES = """\b
 Examples:
@@ -42,12 +43,10 @@ def fit_vehicle(pulse: str, mass: str, speed: str | None, stages: int, plot: str
     """
     mass_kg = _quantity("--mass", mass, "kg")
     speed_m_s = None if speed is None else _quantity("--speed", speed, "m/s")
-    from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages, read_pulse
-    from boulder_sweep.views.figures import checked_kind, require_matplotlib
+    from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
+    from boulder_sweep.crash_tests.pulse import read_pulse
 
-    if plot is not None:
-        checked_kind(plot)
-        require_matplotlib()
+    refuse_unwritable(None, plot)
     fit = (fit_pulse if stages == 1 else fit_stages)(read_pulse(pulse), mass_kg, speed_m_s=speed_m_s)
     if plot is not None:
         fit.plot(plot)

@@ -15,26 +15,17 @@ from typing import Any, NoReturn
 
 import click
 
-# Every module of a command imports heavy packages (numba, pandas, pyarrow, even numpy) inside its function, so that
+# Every command imports heavy packages (numba, pandas, pyarrow, even numpy) inside its function, so that
 # `sweep --help` and `sweep check` are instant.
-from boulder_sweep.cli.capacity import capacity
-from boulder_sweep.cli.check import check
+from boulder_sweep.cli.ask import capacity, need, uncertainty
 from boulder_sweep.cli.compare import compare
-from boulder_sweep.cli.explain import explain
-from boulder_sweep.cli.explore import explore
-from boulder_sweep.cli.export import export
 from boulder_sweep.cli.fit_vehicle import fit_vehicle
-from boulder_sweep.cli.need import need
-from boulder_sweep.cli.new import new
-from boulder_sweep.cli.options import GROUP_EPILOG, GroupedCommands, version_option
 from boulder_sweep.cli.output import ready_streams, say
-from boulder_sweep.cli.plot import plot
-from boulder_sweep.cli.report import report
-from boulder_sweep.cli.run import run
-from boulder_sweep.cli.simulate import simulate
-from boulder_sweep.cli.status import status
+from boulder_sweep.cli.run import run, status
+from boulder_sweep.cli.settings_files import check, new
+from boulder_sweep.cli.share import explore, export, plot, report
+from boulder_sweep.cli.simulate import explain, simulate
 from boulder_sweep.cli.tradeoff import tradeoff
-from boulder_sweep.cli.uncertainty import uncertainty
 from boulder_sweep.cli.validate import validate
 from boulder_sweep.errors import (
     EXIT_INTERNAL,
@@ -88,8 +79,47 @@ COMPLETION = "_SWEEP_COMPLETE"
 REPORT = "this is a bug in boulder-sweep, not in your file; please report it with the command and the file"
 
 
-@click.group(cls=GroupedCommands, epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
-@version_option
+# "\b" tells click to keep the lines of a paragraph as they are.
+EPILOG = """\b
+Start with:
+  sweep check configs/m30_sizing.yaml     is the file valid, how many designs has it?
+  sweep run configs/m30_sizing.yaml       simulate them all into m30-sizing.sweep
+  sweep simulate configs/rwg.yaml         one design with its time history
+
+\b
+Exit codes:
+  0 done (also when designs fail)
+  1 internal error, or a result that is damaged
+  2 wrong use, invalid file, or a path that cannot be written
+  3 some designs could not be computed
+  4 the output exists already, or is of another version
+  130, 143 interrupted; the run can be resumed
+"""
+
+
+class GroupedCommands(click.Group):
+    """Group that lists its commands under headings, in the order in which they were added."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.headings: dict[str, str] = {}
+        """Heading of every command; one without is not listed."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the commands that are listed."""
+        return list(self.headings)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a section for each heading."""
+        width = formatter.width - 6 - max(map(len, self.headings))
+        for heading in dict.fromkeys(self.headings.values()):
+            with formatter.section(heading):
+                names = [name for name, under in self.headings.items() if under == heading]
+                formatter.write_dl([(name, self.commands[name].get_short_help_str(width)) for name in names])
+
+
+@click.group(cls=GroupedCommands, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="boulder-sweep", message="sweep %(version)s", help="Show the version.")
 def cli() -> None:
     """Find out which boulder, buried how deep in which soil, stops a truck.
 
@@ -132,7 +162,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
         return shell_complete(cli, {}, "sweep", COMPLETION, completion)
     try:
-        with noted_signals() as signals, _older_rules_told():
+        with noted_signals() as signals, _report_older_rules():
             code = signals.call(lambda: _invoke(words))
         sys.stdout.flush()
         return code
@@ -156,7 +186,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _older_rules_told() -> Iterator[None]:
+def _report_older_rules() -> Iterator[None]:
     """Say by whose rules a table was judged in one line, however often it is read; other warnings stay as they are."""
     said: set[str] = set()
     with warnings.catch_warnings():
@@ -200,9 +230,9 @@ def _report(error: Exception, verbose: bool) -> int:
     if isinstance(error, MemoryError):
         say("error: there is not enough memory")
         return EXIT_INTERNAL
-    if isinstance(error, OSError):  # a place that cannot be read or written
-        place = f"{error.filename}: " if error.filename else ""
-        say(f"error: {place}{why(error)}")
+    if isinstance(error, OSError):  # a path that cannot be read or written
+        path = f"{error.filename}: " if error.filename else ""
+        say(f"error: {path}{why(error)}")
         return EXIT_WRONG_USE
     say(f"internal error: {type(error).__name__}: {error}; {REPORT}")
     return EXIT_INTERNAL

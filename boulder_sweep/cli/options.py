@@ -1,64 +1,29 @@
-"""Options that several commands share, and the examples that ``--help`` shows."""
+"""What several commands share: options, settings as every command loads them, refusals before anything is computed."""
 
 from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from boulder_sweep.cli.output import say
 from boulder_sweep.runner.backends import BACKENDS, MOST_JOBS
+from boulder_sweep.text import counted
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
 
 Command = Callable[..., Any]
+SYSTEMS = ("si", "us")
 JOBS = click.IntRange(1, MOST_JOBS)
-
-# "\b" tells click to keep the lines of a paragraph as they are.
-GROUP_EPILOG = """\b
-Start with:
-  sweep check configs/m30_sizing.yaml     is the file valid, how many designs has it?
-  sweep run configs/m30_sizing.yaml       simulate them all into m30-sizing.sweep
-  sweep simulate configs/rwg.yaml         one design with its time history
-
-\b
-Exit codes:
-  0 done (also when designs fail)
-  1 internal error, or a result that is damaged
-  2 wrong use, invalid file, or a place that cannot be written
-  3 some designs could not be computed
-  4 the output exists already, or is of another version
-  130, 143 interrupted; the run can be resumed
-"""
-
-RUN_EXAMPLES = """\b
-Examples:
-  sweep run configs/m30_sizing.yaml
-  sweep run grid.yaml -o results/m50 --set vehicle.speed='50 mph'
-  sweep run grid.yaml --dry-run
-  sweep run grid.yaml --resume
-"""
-
-CHECK_EXAMPLES = """\b
-Example:
-  sweep check configs/m30_sizing.yaml
-"""
-
-SIMULATE_EXAMPLES = """\b
-Examples:
-  sweep simulate configs/rwg.yaml --plot rwg.png
-  sweep simulate configs/crash_tests.yaml --design 1 --trajectory rwg.parquet
-  sweep simulate configs/abg.yaml --set model.readings=as_printed --json
-"""
-
-STATUS_EXAMPLES = """\b
-Example:
-  sweep status m30-sizing.sweep --verify
-"""
 
 
 class OutputPath(click.Path):
-    """Name of a file or folder to write; an empty one, as of a shell variable that is not set, names nothing."""
+    """Name of a file or folder to write; an empty one, such as an unset shell variable, is refused."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse an empty name."""
@@ -69,84 +34,25 @@ class OutputPath(click.Path):
 
 OUTPUT = OutputPath()
 
-
-class GroupedCommands(click.Group):
-    """Group that lists its commands under headings, in the order in which they were added."""
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.headings: dict[str, str] = {}
-        """Heading of every command; one without is not listed."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the commands that are listed."""
-        return list(self.headings)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a section for each heading."""
-        width = formatter.width - 6 - max(map(len, self.headings))
-        for heading in dict.fromkeys(self.headings.values()):
-            with formatter.section(heading):
-                own = [name for name, under in self.headings.items() if under == heading]
-                formatter.write_dl([(name, self.commands[name].get_short_help_str(width)) for name in own])
-
-
-def version_option(function: Command) -> Command:
-    """Add ``--version``."""
-    return click.option(
-        "--version",
-        is_flag=True,
-        is_eager=True,
-        expose_value=False,
-        callback=_show_version,
-        help="Show the version.",
-    )(function)
-
-
-def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
-    if wanted:
-        # Reading the installed version takes longer than printing the help.
-        from importlib.metadata import version
-
-        click.echo(f"sweep {version('boulder-sweep')}")
-        ctx.exit()
-
-
-def set_option(function: Command) -> Command:
-    """Add ``--set KEY=VALUE``, any number of times."""
-    return click.option(
-        "--set",
-        "overrides",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="Replace one entry of the file, e.g. --set vehicle.speed='50 mph' (may be repeated).",
-    )(function)
-
-
-def jobs_option(function: Command) -> Command:
-    """Add ``--jobs``, a number of threads."""
-    return click.option("--jobs", type=JOBS, help="Threads [default: all cores].")(function)
-
-
-def json_option(function: Command) -> Command:
-    """Add ``--json``."""
-    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")(function)
-
-
-def second_opinion_option(function: Command) -> Command:
-    """Add ``--second-opinion``."""
-    return click.option(
-        "--second-opinion",
-        is_flag=True,
-        help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive?",
-    )(function)
-
-
-def units_option(function: Command) -> Command:
-    """Add ``--units``."""
-    return click.option(
-        "--units", type=click.Choice(["si", "us"]), default="si", show_default=True, help="Units shown."
-    )(function)
+grid_argument = click.argument("grid", type=click.Path())
+result_argument = click.argument("out", type=click.Path())
+set_option = click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Replace one entry of the file, e.g. --set vehicle.speed='50 mph' (may be repeated).",
+)
+jobs_option = click.option("--jobs", type=JOBS, help="Threads [default: all cores].")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
+units_option = click.option("--units", type=click.Choice(SYSTEMS), default="si", show_default=True, help="Units shown.")
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="No notes.")
+margin_option = click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
+second_opinion_option = click.option(
+    "--second-opinion",
+    is_flag=True,
+    help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive?",
+)
 
 
 def talk_options(function: Command) -> Command:
@@ -183,24 +89,58 @@ def cluster_options(function: Command) -> Command:
     return command
 
 
-def run_options(function: Command) -> Command:
-    """Add the options that only ``sweep run`` has."""
-    for option in reversed(
-        (
-            click.option("-o", "--output", "out", type=OUTPUT, help="Folder for the table [default: NAME.sweep]."),
-            click.option("--jobs", type=JOBS, help="Workers [default: all cores]."),
-            click.option(
-                "--dashboard",
-                metavar="ADDRESS",
-                help="Where Dask's dashboard listens [default: this machine only].",
-            ),
-            click.option("--resume", is_flag=True, help="Resume an interrupted run."),
-            click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run."),
-            click.option("--force", is_flag=True, help="Run even if disk or memory seem too small."),
-            click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing."),
-            click.option("--accuracy", metavar="NAME", help="fast, balanced, fine, or '0.01 deg'."),
-            second_opinion_option,
-        )
-    ):
-        function = option(function)
-    return function
+def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
+    """Load settings and print the notes on them."""
+    from boulder_sweep.settings import load
+
+    sweep = load(path, overrides)
+    if not quiet:
+        for note in sweep.notes:
+            say(f"note: {note}")
+    return sweep
+
+
+def refuse_missing(sweep: Sweep, path: str, number: int) -> None:
+    """Refuse the number of a design that the file does not hold."""
+    if number >= sweep.n_designs:
+        held = counted(sweep.n_designs, "design")
+        raise click.UsageError(f"{path} holds {held}, numbered from 0; there is no {number}")
+
+
+def refuse_units_of_json(units: str, as_json: bool) -> None:
+    """Refuse ``--json`` in US units, for commands whose objects are in those of the table."""
+    if as_json and units != "si":
+        raise click.UsageError(f"--json is in SI units for this command; leave out --units {units} or --json")
+
+
+def refuse_unwritable(table: str | None, picture: str | None = None) -> None:
+    """Refuse a table or a picture that cannot be written, before anything is computed; None where none is wanted."""
+    if table is not None:
+        from boulder_sweep.answers.tables import checked_parquet
+
+        checked_parquet(table)
+    if picture is not None:
+        from boulder_sweep.views.figures import checked_kind, require_matplotlib
+
+        require_matplotlib()
+        checked_kind(picture)
+
+
+def refuse_unwritable_history(
+    plot: str | None, trajectory: str | None, energy: str | None = None, animation: str | None = None
+) -> None:
+    """Refuse outputs of a time history that cannot be written, before anything is computed; None: not wanted."""
+    names = [name for name in (plot, trajectory, energy, animation) if name is not None]
+    for index, name in enumerate(names):
+        if any(Path(name).resolve() == Path(other).resolve() for other in names[:index]):
+            raise click.UsageError(f"{name} is named twice; give each output a name of its own")
+    refuse_unwritable(None, plot)
+    if trajectory is not None:
+        from boulder_sweep.impact.trajectory_file import checked_history
+
+        checked_history(trajectory)
+    refuse_unwritable(None, energy)
+    if animation is not None:
+        from boulder_sweep.views.side_view import checked_animation
+
+        checked_animation(animation)

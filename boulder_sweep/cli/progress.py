@@ -67,11 +67,11 @@ def cold_start(kernels: str | None) -> str | None:
         return None
     if CACHE_FOLDER is not None:
         with suppress(OSError, ValueError):  # no earlier compilation on this machine
-            seconds = float(_remembered(kernels).read_text())
+            seconds = float(_seconds_file(kernels).read_text())
     return f"compiling kernels, once on this machine, about {max(seconds, 1.0):.0f} s"
 
 
-def _remembered(kernels: str) -> Path:
+def _seconds_file(kernels: str) -> Path:
     """Return the file with the seconds that the last compilation took, of whatever version of the kernels."""
     from boulder_kernels._cache import CACHE_FOLDER
 
@@ -132,7 +132,7 @@ def progress(
     notes
         What was shown already.
     kernels, doing, of
-        As of `working`.
+        See `working`.
     """
     if quiet:
         yield None
@@ -156,7 +156,7 @@ def progress(
 def _remember(kernels: str, seconds: float) -> None:
     """Keep how long a compilation took, for the next version of the kernels."""
     with suppress(OSError):
-        _remembered(kernels).write_text(f"{seconds:.1f}")
+        _seconds_file(kernels).write_text(f"{seconds:.1f}")
 
 
 class Notes:

@@ -1,4 +1,4 @@
-"""``sweep run``: every design of a file simulated into one table."""
+"""``sweep run``: every design of a file simulated into one table; ``sweep status``: how far a run got."""
 
 from __future__ import annotations
 
@@ -10,10 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep
-from boulder_sweep.cli.options import RUN_EXAMPLES, cluster_options, json_option, run_options, set_option, talk_options
+from boulder_sweep.cli.options import (
+    JOBS,
+    OUTPUT,
+    cluster_options,
+    grid_argument,
+    json_option,
+    load_sweep,
+    result_argument,
+    second_opinion_option,
+    set_option,
+    talk_options,
+)
 from boulder_sweep.cli.output import say, show
-from boulder_sweep.errors import Interrupted
+from boulder_sweep.errors import EXIT_INTERNAL, Interrupted
 from boulder_sweep.locations import Location, location_of
 from boulder_sweep.text import counted
 
@@ -21,9 +31,26 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 
+RUN_EXAMPLES = """\b
+Examples:
+  sweep run configs/m30_sizing.yaml
+  sweep run grid.yaml -o results/m50 --set vehicle.speed='50 mph'
+  sweep run grid.yaml --dry-run
+  sweep run grid.yaml --resume
+"""
+
+
 @click.command(short_help="Simulate every design of a file into one table.", epilog=RUN_EXAMPLES)
-@click.argument("grid", type=click.Path())
-@run_options
+@grid_argument
+@click.option("-o", "--output", "out", type=OUTPUT, help="Folder for the table [default: NAME.sweep].")
+@click.option("--jobs", type=JOBS, help="Workers [default: all cores].")
+@click.option("--dashboard", metavar="ADDRESS", help="Where Dask's dashboard listens [default: this machine only].")
+@click.option("--resume", is_flag=True, help="Resume an interrupted run.")
+@click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run.")
+@click.option("--force", is_flag=True, help="Run even if disk or memory seem too small.")
+@click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing.")
+@click.option("--accuracy", metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
+@second_opinion_option
 @cluster_options
 @set_option
 @json_option
@@ -64,7 +91,7 @@ def run(
     from boulder_sweep.runner.sweeper import run as run_sweep
 
     notes = Notes()
-    # Who waits for this command does not act on a signal before it has told how to go on.
+    # Who waits for this command does not act on a signal before it has said how to go on.
     with noted_signals() as signals, signals.deferred(), progress(quiet, notes, kernels_for(sweep)) as shown:
         try:
             summary = run_sweep(
@@ -120,3 +147,23 @@ def _resume_command(
     for override in overrides:
         words += ["--set", override]
     return shlex.join([*words, "--resume"])
+
+
+STATUS_EXAMPLES = """\b
+Example:
+  sweep status m30-sizing.sweep --verify
+"""
+
+
+@click.command(short_help="Show how far a run got and how to resume it.", epilog=STATUS_EXAMPLES)
+@result_argument
+@click.option("--verify", is_flag=True, help="Read every part and compare its checksum.")
+@json_option
+def status(out: str, verify: bool, as_json: bool) -> int:
+    """Show how far the run into OUT got, what is missing, and the command that resumes it."""
+    from boulder_sweep.cli import console
+    from boulder_sweep.store import status as look
+
+    state = look(out, verify=verify)
+    show(*[json.dumps(state.to_dict(), default=str)] if as_json else console.status_lines(state))
+    return EXIT_INTERNAL if state.damaged else 0

@@ -1,16 +1,39 @@
-"""``sweep simulate``: one design with its time history."""
+"""One design over time: ``sweep simulate``, and ``sweep explain`` for one row of a result, from the result alone."""
 
 from __future__ import annotations
 
 import json
-from typing import Any
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.loading import load_sweep, refuse_missing, refuse_unwritable_history
-from boulder_sweep.cli.options import OUTPUT, SIMULATE_EXAMPLES, json_option, set_option, talk_options, units_option
+from boulder_sweep.cli.options import (
+    OUTPUT,
+    json_option,
+    load_sweep,
+    refuse_missing,
+    refuse_unwritable_history,
+    result_argument,
+    set_option,
+    talk_options,
+    units_option,
+)
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.cli.progress import kernels_for, working
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
+
+if TYPE_CHECKING:
+    from boulder_sweep.impact.explanation import Explanation
+    from boulder_sweep.impact.trajectory import Trajectory
+
+SIMULATE_EXAMPLES = """\b
+Examples:
+  sweep simulate configs/rwg.yaml --plot rwg.png
+  sweep simulate configs/crash_tests.yaml --design 1 --trajectory rwg.parquet
+  sweep simulate configs/abg.yaml --set model.readings=as_printed --json
+"""
 
 
 @click.command(short_help="Simulate one design with its time history.", epilog=SIMULATE_EXAMPLES)
@@ -46,7 +69,6 @@ def simulate(
 ) -> int:
     """Simulate one design of CASE with its time history, beyond the rotation limit and to the end."""
     from boulder_sweep.cli import console
-    from boulder_sweep.cli.progress import kernels_for, working
 
     sweep = load_sweep(case, overrides, quiet)
     number = design or 0
@@ -73,9 +95,9 @@ def simulate(
     if as_json:
         show(json.dumps(shown_values(row, units)))
     else:
-        lines = [] if row["max_rotation_deg"] is None else console.impact_lines(row, result, units)
+        lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         columns = ["", *console.value_lines(shown_values(row, units))] if every else []
-        show(*console.wrapped(verdict_line(result)), *lines, *_cautions(row), *columns)
+        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row), *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:
@@ -101,3 +123,131 @@ def _cautions(row: dict[str, Any]) -> list[str]:
     if row["verdict"] != "pass":
         return cautions
     return [*grade_lines([row["robustness"]]), *cautions, f"pass: {NOT_A_RATING}"]
+
+
+EXPLAIN_EXAMPLES = """\b
+Examples:
+  sweep explain m30-sizing.sweep 4711
+  sweep explain m30-sizing.sweep 4711 --plot 4711.png
+"""
+
+
+@click.command("explain", short_help="Recompute one row of a result over time.", epilog=EXPLAIN_EXAMPLES)
+@result_argument
+@click.argument("design_id", type=click.IntRange(min=0))
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw rotation, displacements and forces over time.")
+@click.option("--trajectory", type=OUTPUT, metavar="F.parquet", help="Write the time history.")
+@units_option
+@json_option
+def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, units: str, as_json: bool) -> int:
+    """Compute row DESIGN_ID of the result in OUT again, from the result alone, and say what decided it.
+
+    Says whether every outcome is the same to the last bit and, if not, what has changed since: versions, kernels,
+    rules. As in `sweep simulate`, the time history continues beyond the rotation limit.
+    """
+    from boulder_sweep.cli.console import value_lines
+    from boulder_sweep.impact.explanation import explain as compute_again
+    from boulder_sweep.settings.shown_units import shown_values
+
+    refuse_unwritable_history(plot, trajectory)
+    try:
+        with working(as_json, "design"):
+            explanation = compute_again(out, design_id)
+    except IndexError as problem:
+        raise click.UsageError(str(problem)) from None
+    if explanation.trajectory is not None:
+        if plot is not None:
+            explanation.trajectory.plot(plot, units=units)
+        if trajectory is not None:
+            explanation.trajectory.to_parquet(trajectory)
+    elif plot is not None or trajectory is not None:
+        say(
+            f"note: the design cannot be computed{' again' if explanation.unfamiliar else ''}; there is no time history"
+        )
+    if as_json:
+        show(json.dumps(explanation.as_dict(units)))
+        return 0
+    values = {"design": shown_values(explanation.inputs, units), "outcome": shown_values(explanation.stored, units)}
+    show(*value_lines(values), *why_lines(explanation, units))
+    for name in explanation.unequal:
+        show(f"differs now: {name} was {explanation.stored[name]!r}, comes out as {explanation.recomputed[name]!r}")
+    for line in explanation.changed:
+        show(f"changed since: {line}")
+    if explanation.judged_by:
+        show(f"as stored, the row was {explanation.judged_by}")
+    if explanation.unfamiliar:
+        show(f"not computed again: {explanation.unfamiliar}")
+    elif not explanation.unequal:
+        show("computed again: the same to the last bit")
+    return 0
+
+
+def why_lines(explanation: Explanation, units: str = "si") -> list[str]:
+    """Return what decided a row, and how near it came to every limit."""
+    from boulder_sweep.judge.validity import BY_FLAG
+    from boulder_sweep.views.wording import REASON_WORDS, ground_words
+
+    row, history = explanation.stored, explanation.trajectory
+    reason = REASON_WORDS.get(row["reason"], row["reason"])
+    lines = ["why", f"  {row['verdict']}{f': {reason}' if reason else ''}"]
+    if history is None or row["max_rotation_deg"] is None:
+        return lines
+    ground = ground_words(history.settings)
+    lines += [f"  soil: {ground}"] if ground else []
+    lines += impact_lines(row, history, units)
+    if row.get("robustness"):
+        stands = row["stands_under"]
+        under = f", stands under {', '.join(stands.split(';'))}" if stands else ""
+        lines.append(f"  second opinion: {row['robustness']}{under}")
+    if row.get("validity"):
+        lines.append("  outside what the model was tested on (docs/validity.md):")
+        names = row["validity"].split(";")
+        lines += [f"    {name}: {BY_FLAG[name].meaning}" if name in BY_FLAG else f"    {name}" for name in names]
+    return lines
+
+
+def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si") -> list[str]:
+    """Return how near one design came to every limit, when, and to within what.
+
+    Parameters
+    ----------
+    row
+        Its outcome columns, in the units of the table; it has touched the truck.
+    history
+        The impact over time.
+    units
+        ``si`` or ``us``.
+    """
+    from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
+    from boulder_sweep.settings.shown_units import shown_unit
+
+    (length, metre), (force, kilonewton) = shown_unit("m", units), shown_unit("kN", units)
+    limit = math.degrees(history.motion.control.theta_limit)
+    if row["time_to_limit_s"] is not None:
+        reached_ms = 1e3 * row["time_to_limit_s"]
+        lines = [f"  rotation: the limit of {limit:g} deg is reached {reached_ms:.1f} ms after contact"]
+    else:
+        rating = history.settings["criterion"]["rating"]
+        lines = [
+            f"  rotation: {row['max_rotation_deg']:.4g} deg of {limit:g} deg allowed, "
+            f"{1 - row['max_rotation_deg'] / limit:.1%} below, "
+            f"{1e3 * history.motion.outcome.maxima.t_theta:.0f} ms after contact",
+            f"  penetration: {row['penetration_m'] / metre:.4g} {length}, {rating} allows "
+            f"{PENETRATION_LIMITS_M[rating] / metre:.3g} {length} beyond the far face",
+            f"  displacement: boulder {row['max_displacement_m'] / metre:.3g} {length}, "
+            f"truck {row['max_vehicle_displacement_m'] / metre:.3g} {length}; "
+            f"peak force {row['peak_force_kN'] / kilonewton:,.0f} {force}",
+        ]
+    if row.get("permanent_tilt_deg") is not None:
+        lines.append(
+            f"  afterwards: swings back by {row['swing_back_deg']:.3g} deg, rests at "
+            f"{row['permanent_tilt_deg']:.3g} deg, to within {row['permanent_tilt_error_deg']:.1g} deg"
+        )
+    if (second := history.motion.second) is not None:
+        reached = history.time_s[history.motion.record.offset > 0.0]
+        when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
+        crush = f"{second.s_2 / metre:.4g} {length}"
+        lines.append(f"  front: its second spring acts from a crush of {crush} on, {when}")
+    if row["rotation_error_deg"] is not None:
+        lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
+    return lines

@@ -6,11 +6,11 @@ import json
 import math
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, cluster_options, json_option, set_option
+from boulder_sweep.cli.options import OUTPUT, cluster_options, grid_argument, json_option, set_option
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ Examples:
 
 
 @click.command("tradeoff", short_help="Measure speed against accuracy on a grid.", epilog=EXAMPLES)
-@click.argument("grid", type=click.Path())
+@grid_argument
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for table and picture.")
 @click.option(
     "--designs",
@@ -52,13 +52,10 @@ Examples:
 def tradeoff(
     grid: str,
     out: str | None,
-    designs: int,
-    seconds: float,
     quiet: bool,
-    backend: str,
-    scheduler: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
+    **options: Any,
 ) -> int:
     """Simulate a sample of GRID by many methods and compare each with a far finer solution.
 
@@ -70,7 +67,7 @@ def tradeoff(
     from boulder_sweep.settings import load
     from boulder_sweep.tradeoff.study import measure
 
-    if math.isnan(seconds):
+    if math.isnan(options["seconds"]):
         raise click.UsageError("--seconds nan: give a number of seconds")
     sweep = load(grid, overrides)
     if out is not None:
@@ -79,46 +76,43 @@ def tradeoff(
         require_matplotlib()
         make_folder(Path(out))
     with working(quiet, doing="measuring"):
-        progress = None if quiet else say
-        found = measure(
-            sweep, designs=designs, seconds=seconds, backend=backend, scheduler=scheduler, progress=progress
-        )
-    files = [] if out is None else found.write(out)
+        result = measure(sweep, **options, progress=None if quiet else say)
+    files = [] if out is None else result.write(out)
     if as_json:
-        show(json.dumps({**found.to_dict(), "files": [str(file) for file in files]}))
+        show(json.dumps({**result.to_dict(), "files": [str(file) for file in files]}))
         return 0
-    if found.points:
-        _show(found)
-    for sentence in found.recommendation():
+    if result.points:
+        _show(result)
+    for sentence in result.recommendation():
         show(*textwrap.wrap(sentence, 80))
-    if found.left_out:
-        ways = len(found.points) + len(found.left_out)
-        show(f"left out for time: {len(found.left_out)} of {ways} methods (--json lists them)")
+    if result.left_out:
+        ways = len(result.points) + len(result.left_out)
+        show(f"left out for time: {len(result.left_out)} of {ways} methods (--json lists them)")
     for file in files:
         show(f"written  {file}")
     return 0
 
 
-def _show(found: Tradeoff) -> None:
+def _show(result: Tradeoff) -> None:
     """Print the table: all of it where the terminal is wide enough, else the columns that matter most."""
     from rich.console import Console
 
     wide = Console(width=1000)
     width = Console().width
-    table = _table(found, whole=True)
+    table = _table(result, whole=True)
     whole = wide.measure(table).maximum <= width
     if not whole:
-        table = _table(found, whole=False)
+        table = _table(result, whole=False)
     Console(width=max(width, wide.measure(table).maximum)).print(table)
     show("* none with these readings is both cheaper and more accurate (rotation, 99 %)")
     if not whole:
         show("y: yield located; a wider terminal shows more columns, and -o writes all of them")
-    for readings, error in found.reference_deg.items():
-        show(f"{readings}: against steps of {found.reference_step_ms:g} ms, known to {error:.0e} deg")
+    for readings, error in result.reference_deg.items():
+        show(f"{readings}: against steps of {result.reference_step_ms:g} ms, known to {error:.0e} deg")
     show("")
 
 
-def _table(found: Tradeoff, *, whole: bool) -> RichTable:
+def _table(result: Tradeoff, *, whole: bool) -> RichTable:
     """Return the methods as a table; not whole, it fits a terminal of 80 columns."""
     from rich.box import SIMPLE
     from rich.table import Table as RichTable
@@ -135,7 +129,7 @@ def _table(found: Tradeoff, *, whole: bool) -> RichTable:
         table.add_column(heads[k], justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     before = ("", 0, False, False)
-    for point in found.points:
+    for point in result.points:
         method = point.method
         group = (method.readings, method.soil_elements, method.error_estimate, method.locate_yield)
         if group != before and before[0]:

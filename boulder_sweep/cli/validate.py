@@ -48,32 +48,31 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     from boulder_sweep.crash_tests.validation import validate as run_validation
 
     overlaid = None if measured is None or case is None else _overlay(measured, case)
-    found = run_validation(out)
-    content: dict[str, Any] = found.to_dict()
-    text = [found.text(), "", f"note: {NOT_COMPARED}"]
+    validation = run_validation(out)
+    content: dict[str, Any] = validation.to_dict()
+    text = [validation.text(), "", f"note: {NOT_COMPARED}"]
     if overlaid is not None:
         overlay, draw = overlaid
         written = [] if out is None else [draw(Path(out))]
         content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
         content["files"] += written
-        from boulder_sweep.crash_tests.comparison import deviation_table
+        from boulder_sweep.crash_tests.measured import deviation_table
 
-        text = [found.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
+        text = [validation.text(), "", f"{measured} against {case}:", deviation_table(overlay).text()]
     if out is not None:
         text += ["", *(f"written  {file}" for file in content["files"])]
     if as_json:
         show(json.dumps(content))
     else:
         words = (line for part in text for line in part.split("\n"))
-        show(*(own for line in words for own in (textwrap.wrap(line, 80) if line.startswith("note:") else [line])))
-    return 0 if found.holds else 1
+        show(*(part for line in words for part in (textwrap.wrap(line, 80) if line.startswith("note:") else [line])))
+    return 0 if validation.holds else 1
 
 
 def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path], str]]:
     """Compare a user's data with both presets; return a function that draws them into a folder, too."""
     from boulder_sweep.crash_tests.cases import NAMES, crash_test
-    from boulder_sweep.crash_tests.comparison import compare
-    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, read_history
+    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, compare, read_history
     from boulder_sweep.impact.simulation import simulate
     from boulder_sweep.settings import load
     from boulder_sweep.settings.model import PRESETS
@@ -85,13 +84,13 @@ def _overlay(measured: str, case: str) -> tuple[dict[str, Any], Callable[[Path],
     end = float(history.time_s[-1])
     horizon = max(end, 0.0) or None
     trajectories: dict[str, Trajectory] = {p: simulate(sweep, readings=p, horizon_s=horizon) for p in PRESETS}
-    found = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
+    deviations = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
 
     def draw(folder: Path) -> str:
-        from boulder_sweep.views.validation import draw_overlay
+        from boulder_sweep.views.crash_curves import draw_crash_test
 
         target = folder / f"measured_{Path(measured).stem}.png"
-        draw_overlay(sweep.name, trajectories, history, target)
+        draw_crash_test(sweep.name, trajectories, target, history)
         return str(target)
 
-    return found, draw
+    return deviations, draw

@@ -23,7 +23,7 @@ _BOTH = {
     "hood_height_m": 1.4,
     "bed_offset_m": 2.9,
 }
-_OWN = {
+_BY_TEST = {
     "abg": {
         "boulder_length_m": 0.762,
         "boulder_width_m": 1.016,
@@ -61,7 +61,7 @@ def crash_test(name: str) -> Sweep:
         ``abg`` or ``rwg``.
     """
     solver = SolverSettings(accuracy=None, step_s=STEP_S, horizon_s=HORIZON_S)
-    return Sweep(name=name, path=None, axes=(), constants={**_BOTH, **_OWN[name]}, solver=solver)
+    return Sweep(name=name, path=None, axes=(), constants={**_BOTH, **_BY_TEST[name]}, solver=solver)
 
 
 def rigid_wall_test() -> RigidWall:

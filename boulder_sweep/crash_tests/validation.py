@@ -10,9 +10,15 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
-from boulder_sweep.crash_tests.convergence import Convergence, convergence
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.statements import Statement, statement_table, statements
+from boulder_sweep.crash_tests.statements import (
+    CLOSE_UNTIL_S,
+    Convergence,
+    Statement,
+    convergence,
+    statement_table,
+    statements,
+)
 from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.simulation import simulate
@@ -24,13 +30,11 @@ NOT_COMPARED = (
     "What is checked is what the paper says in words and numbers. `--measured FILE.csv` lays your own test data over "
     "the simulation."
 )
-COMPARED_AT_S = 0.1
-"""Time up to which the paper finds the first test close [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """What `validate` found.
+    """Result of `validate`.
 
     Attributes
     ----------
@@ -59,7 +63,7 @@ class Validation:
 
     def table(self) -> Table:
         """Return both tests under both presets."""
-        found = Table(
+        table = Table(
             (
                 "test",
                 "readings",
@@ -75,7 +79,7 @@ class Validation:
             )
         )
         for (test, preset), row in self.rows().items():
-            found.add(
+            table.add(
                 NAMES[test],
                 preset.replace("_", " "),
                 row["verdict"] + (f", {row['reason']}" if row["reason"] else ""),
@@ -88,7 +92,7 @@ class Validation:
                 number(row["time_of_max_vehicle_displacement_s"], 4),
                 number(row["peak_force_kN"], 1),
             )
-        return found
+        return table
 
     def rows(self) -> dict[tuple[str, str], dict[str, Any]]:
         """Return the same as plain data, by test and preset."""
@@ -142,12 +146,12 @@ def validate(out: str | Path | None = None) -> Validation:
     """
     from boulder_sweep.crash_tests.cases import rigid_wall_test
 
-    found = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
+    trajectories = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
     study = convergence()
     wall = rigid_wall_test()
-    result = Validation(found, wall, study, statements(found, study, wall))
+    result = Validation(trajectories, wall, study, statements(trajectories, study, wall))
     if out is not None:
-        result.files.extend(draw("validation", "write_validation", result, Path(out)))
+        result.files.extend(draw("crash_curves", "write_validation", result, Path(out)))
     return result
 
 
@@ -173,7 +177,7 @@ def _row(trajectory: Trajectory) -> dict[str, Any]:
         trajectory.vehicle_velocity_m_s[-1] > 0.0
         and trajectory.vehicle_displacement_m[-1] >= trajectory.vehicle_displacement_m.max()
     )
-    early = np.searchsorted(trajectory.time_s, COMPARED_AT_S)
+    early = np.searchsorted(trajectory.time_s, CLOSE_UNTIL_S)
     row["rotation_at_0.1_s_deg"] = math.degrees(trajectory.rotation_rad[early])
     row["boulder_centre_displacement_at_0.1_s_m"] = float(trajectory.boulder_centre_displacement_m[early])
     return row

@@ -240,11 +240,11 @@ class Trajectory:
         PictureError
             There is nothing to draw, the kind is unknown, or matplotlib is not installed.
         """
-        draw("trajectory", "draw_trajectory", self, path, units=units)
+        draw("time_curves", "draw_trajectory", self, path, units=units)
 
     def plot_energy(self, path: str | Path, *, units: str = "si") -> None:
         """Draw where the vehicle's energy goes, stacked over time; see `plot`."""
-        draw("energy", "draw_energy", self, path, units=units)
+        draw("time_curves", "draw_energy", self, path, units=units)
 
     def plot_side_view(self, path: str | Path, *, time_s: float | None = None) -> None:
         """Draw the impact from the side at one instant, by default when the contact force peaks; see `plot`."""
@@ -260,7 +260,7 @@ class Trajectory:
         progress
             Told how many frames of how many are drawn.
         """
-        draw("animation", "animate", self, path, progress)
+        draw("side_view", "animate", self, path, progress)
 
 
 def _plain(value: Any) -> float | None:

@@ -15,7 +15,7 @@ from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.provenance import differences
 from boulder_sweep.store.reader import read
 from boulder_sweep.text import counted
-from boulder_sweep.views.labels import RATIO, name_of, unit_of
+from boulder_sweep.views.wording import RATIO, name_of, unit_of
 
 if TYPE_CHECKING:
     import pandas as pd

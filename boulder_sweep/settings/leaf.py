@@ -91,7 +91,7 @@ def read_leaf(node: Node, field: Field) -> Leaf:
     if len(items) > MAX_AXIS:
         raise LeafError([Mistake(node.position, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")])
     quantities = _read_all(items, field, node.unit if isinstance(node, Sequence) else None)
-    values = _checked(quantities, items, field)
+    values = _check_values(quantities, items, field)
     return Leaf(np.array(values), isinstance(node, Sequence), node.position)
 
 
@@ -160,7 +160,7 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
     return quantities
 
 
-def _checked(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
+def _check_values(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
     """Return the values; every one of them must be admitted."""
     values = [_to_float(quantity.value) for quantity in quantities]
     problems = ((node, outside(value, field)) for node, value in zip(nodes, values, strict=True))
@@ -179,7 +179,7 @@ def _read_range(node: Mapping, field: Field) -> list[float]:
     bounding = [
         (quantity, entry.value) for entry, quantity in zip(ends, quantities, strict=True) if entry.key != "step"
     ]
-    _checked([quantity for quantity, _ in bounding], [value for _, value in bounding], field)
+    _check_values([quantity for quantity, _ in bounding], [value for _, value in bounding], field)
     try:
         if "step" in exact:
             count = _count_of_step(exact["from"], exact["to"], exact["step"], field.unit)

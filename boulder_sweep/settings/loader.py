@@ -17,16 +17,24 @@ from boulder_sweep.settings.consistency import check_complete, check_pairs
 from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
 from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
-from boulder_sweep.settings.problems import ProblemList
-from boulder_sweep.settings.source import read_settings_text
-from boulder_sweep.settings.tree import Mapping, Scalar
-from boulder_sweep.settings.yaml_reader import parse
+from boulder_sweep.settings.problems import ProblemList, SettingsError, check_regular_file, reason_of, refuse
+from boulder_sweep.settings.tree import Mapping, Scalar, parse
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import Axis, Sweep
 
 MAX_DESIGNS = 2**63 - 1
 """Most designs of a sweep: ``design_id`` is a 64-bit number."""
+
+MAX_BYTES = 500_000
+"""Largest settings file; real ones have a few kilobytes. Long lists of designs belong in a table."""
+
+_BYTE_ORDER_MARKS = (
+    (b"\xff\xfe\x00\x00", "UTF-32"),
+    (b"\x00\x00\xfe\xff", "UTF-32"),
+    (b"\xff\xfe", "UTF-16"),
+    (b"\xfe\xff", "UTF-16"),
+)
 
 Part = TypeVar("Part", Criterion, Model, SolverSettings)
 
@@ -39,7 +47,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
     path : str or Path
         YAML file.
     overrides : sequence of str
-        ``key.path=value`` entries that replace those of the file, as of ``--set``.
+        ``key.path=value`` entries that replace those of the file, as ``--set`` gives them.
 
     Returns
     -------
@@ -52,7 +60,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         With every mistake of the file and of the overrides.
     """
     path = Path(path)
-    return load_text(read_settings_text(path), path, overrides)
+    return load_text(_read_text(path), path, overrides)
 
 
 def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
@@ -60,8 +68,7 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     problems = ProblemList()
     root = parse(text, str(path), problems)
     if root is None:
-        problems.raise_if_any()
-        raise AssertionError("a text without keys is a problem")
+        raise SettingsError(problems.in_order())
     apply_overrides(root, overrides, problems)
     entries = Entries(root, path, problems)
     name = _read_name(entries)
@@ -70,6 +77,47 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     check_pairs(entries)
     problems.raise_if_any()
     return _build(name, entries, tuple(overrides))
+
+
+def _read_text(path: Path) -> str:
+    """Return the text of a settings file.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read, is too large, or is not UTF-8 text.
+    """
+    check_regular_file(path, MAX_BYTES, "Put a long list of designs into a separate file: table: designs.csv")
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)  # a file may grow between the check and the reading
+    except OSError as error:
+        raise refuse(str(path), f"cannot be read ({reason_of(error)})") from None
+    if len(data) > MAX_BYTES:
+        raise refuse(str(path), f"is larger than {MAX_BYTES / 1e6:g} MB")
+    return decode(data, str(path))
+
+
+def decode(data: bytes, label: str) -> str:
+    """Return `data` as text, or say why it cannot be.
+
+    Raises
+    ------
+    SettingsError
+        UTF-16 or UTF-32, zero bytes, or bytes that are not UTF-8.
+    """
+    for mark, encoding in _BYTE_ORDER_MARKS:
+        if data.startswith(mark):
+            raise refuse(label, f"is {encoding} text; save it as UTF-8")
+    if b"\x00" in data:
+        raise refuse(label, "is not a text file (it contains zero bytes); a YAML file in UTF-8 is needed")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start]
+        line = before.count(b"\n") + 1
+        column = error.start - (before.rfind(b"\n") + 1) + 1
+        raise refuse(label, "is not UTF-8 text; save it as UTF-8", line, column) from None
 
 
 def _read_name(entries: Entries) -> str:

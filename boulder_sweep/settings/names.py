@@ -45,13 +45,13 @@ def named(word: str, among: Sequence[Field] = (*INPUTS, BOULDER_MASS)) -> Field:
     UnknownNameError
         No entry has this name, or several have this key.
     """
-    found = [field for field in among if word in (field.path, field.name)]
-    found = found or [field for field in among if word == field.key]
-    found = [field for field in found if field in INPUTS or field == BOULDER_MASS] or found
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise UnknownNameError(word, f"is ambiguous; use {' or '.join(field.path for field in found)}")
+    matches = [field for field in among if word in (field.path, field.name)]
+    matches = matches or [field for field in among if word == field.key]
+    matches = [field for field in matches if field in INPUTS or field == BOULDER_MASS] or matches
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        raise UnknownNameError(word, f"is ambiguous; use {' or '.join(field.path for field in matches)}")
     keys = [field.key for field in among]
     short = [field.path if keys.count(field.key) > 1 else field.key for field in among]
     near = [known for known in short if word.lower() in known] or [

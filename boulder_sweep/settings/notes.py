@@ -44,15 +44,15 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Proble
     ----------
     sweep : Sweep
         Valid settings.
-    places : mapping of str to Position
-        Where each quantity stands in the file.
+    positions : mapping of str to Position
+        Position of each quantity in the file.
     """
     values = {name: np.array([value]) for name, value in sweep.constants.items()}
     groups = [axis.columns for axis in sweep.axes] + ([] if sweep.table is None else [sweep.table.columns])
     for group in groups:
         values |= group
-    for name, found in values.items():
-        message = _unusual(name, found)
+    for name, of_input in values.items():
+        message = _unusual(name, of_input)
         if message:
             yield _note(positions[name], BY_NAME[name].path, message)
     for axis in sweep.axes:
@@ -120,18 +120,18 @@ def _off_front(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarr
     listed = [group for group in groups if len(group) > 1 and set(group) & set(_FRONT)]
     front = []
     for name in _FRONT:
-        place = next((k for k, group in enumerate(listed) if name in group), None)
-        own = values[name] if place is not None else np.array([values[name].min(), values[name].max()])
-        dimension = _FRONT.index(name) if place is None else len(_FRONT) + place
-        front.append(own.reshape([-1 if k == dimension else 1 for k in range(len(_FRONT) + len(listed))]))
+        index = next((k for k, group in enumerate(listed) if name in group), None)
+        ends = values[name] if index is not None else np.array([values[name].min(), values[name].max()])
+        dimension = _FRONT.index(name) if index is None else len(_FRONT) + index
+        front.append(ends.reshape([-1 if k == dimension else 1 for k in range(len(_FRONT) + len(listed))]))
     crush = wall_crush(*front)
-    found, words = float(crush.max()), BEYOND_FRONT
-    up_to = "" if crush.min() == found else "up to "
-    if found <= MOST_CRUSH * calibrated:
-        found, words, up_to = float(crush.min()), SHORT_OF_FRONT, ""
-        if found >= LEAST_CRUSH * calibrated:
+    largest, words = float(crush.max()), BEYOND_FRONT
+    up_to = "" if crush.min() == largest else "up to "
+    if largest <= MOST_CRUSH * calibrated:
+        largest, words, up_to = float(crush.min()), SHORT_OF_FRONT, ""
+        if largest >= LEAST_CRUSH * calibrated:
             return ""
-    return words.format(crush=f"{up_to}{found:.3g} m", calibrated=f"{calibrated:g} m")
+    return words.format(crush=f"{up_to}{largest:.3g} m", calibrated=f"{calibrated:g} m")
 
 
 def _without_partner(off: np.ndarray) -> np.ndarray:
@@ -157,9 +157,9 @@ def _unusual(name: str, values: np.ndarray) -> str:
     if usual is None or not _outside(values, BY_NAME[name]).any():
         return ""
     low, high = float(values.min()), float(values.max())
-    found = describe(low, unit) if low == high else f"{low:.6g} to {describe(high, unit)}"
+    given = describe(low, unit) if low == high else f"{low:.6g} to {describe(high, unit)}"
     ends = f"{usual.low:g} to {describe(usual.high, unit)}"
-    return f"{found} is outside the usual range of {ends} ({usual.remark}); {_outcome(name, low, high)}"
+    return f"{given} is outside the usual range of {ends} ({usual.remark}); {_outcome(name, low, high)}"
 
 
 def _outcome(name: str, low: float, high: float) -> str:

@@ -73,7 +73,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
 
 
 def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]:
-    """Return the number at the beginning of a text and the rest, its unit; `sample` as of `read_quantity`.
+    """Return the number at the beginning of a text and the rest, its unit; `sample`: see `read_quantity`.
 
     Raises
     ------

@@ -9,9 +9,8 @@ from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.settings.names import BOULDER_MASS, UnknownNameError, named
 from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, nearest, shorten
-from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse_node
 from boulder_sweep.settings.tree import Sequence as List
-from boulder_sweep.settings.yaml_reader import parse_node
 
 _ALTERNATIVES = {
     "site.embedment_ratio": "embedment_depth",

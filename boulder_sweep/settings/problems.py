@@ -1,11 +1,14 @@
-"""Problems in a settings file: where each one is and what is allowed instead."""
+"""Problems in files that people write: where each one is, what is allowed instead, and files that cannot be read."""
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from boulder_sweep.errors import BoulderSweepError
+from boulder_sweep.locations import RemotePath
 
 MAX_REPORTED = 100
 """Most problems reported at once: a longer list does not help, and a hostile file could make it endless."""
@@ -72,12 +75,54 @@ class SettingsError(BoulderSweepError):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def user_message(self) -> str:
-        """Return the problems, one a line; each begins with its place in the file."""
+        """Return the problems, one a line; each begins with its position in the file."""
         return str(self)
 
     def __reduce__(self) -> tuple[type[SettingsError], tuple[list[Problem]]]:
         """Pickle by the problems, so that the error can pass between processes."""
         return type(self), (self.problems,)
+
+
+def refuse(file: str, message: str, line: int | None = None, column: int | None = None) -> SettingsError:
+    """Return the error for a file that cannot be used at all."""
+    return SettingsError([Problem(file, line, column, "", message)])
+
+
+def check_regular_file(path: Path | RemotePath, max_bytes: int, what: str) -> None:
+    """Refuse anything but a regular file of at most `max_bytes`, before a byte is read.
+
+    Parameters
+    ----------
+    path : Path or RemotePath
+        The file.
+    max_bytes : int
+        Largest size admitted.
+    what : str
+        Advice for a file that is too large.
+
+    Raises
+    ------
+    SettingsError
+        Missing, a directory, a device or pipe, not readable, or too large.
+    """
+    label = str(path)
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise refuse(label, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise refuse(label, f"cannot be opened ({reason_of(error)})") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise refuse(label, "is a directory; a file is needed")
+    if not stat.S_ISREG(status.st_mode):
+        raise refuse(label, "is not a regular file (pipes and devices are not read)")
+    if status.st_size > max_bytes:
+        raise refuse(label, f"has {status.st_size / 1e6:.1f} MB; at most {max_bytes / 1e6:g} MB is read. {what}")
+
+
+def reason_of(error: Exception) -> str:
+    """Return why a file cannot be opened or read, without its name."""
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 @dataclass

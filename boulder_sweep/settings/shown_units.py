@@ -100,14 +100,14 @@ def shown_as(stored: str, unit: str, meaning: str, units: str) -> Shown:
 
 def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
     """Return values by names of columns in the units asked for; what is no column stays as it is."""
-    found = {}
+    shown_by_name = {}
     for name, value in values.items():
         if name not in BY_NAME:
-            found[name] = value
+            shown_by_name[name] = value
             continue
         column = shown_column(name, units)
-        found[column.name] = value / column.size if isinstance(value, float) else value
-    return found
+        shown_by_name[column.name] = value / column.size if isinstance(value, float) else value
+    return shown_by_name
 
 
 def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
@@ -116,18 +116,18 @@ def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
     Parameters
     ----------
     settings
-        As of `boulder_sweep.settings.Sweep.resolved`, or a part of it.
+        See `boulder_sweep.settings.Sweep.resolved`, or a part of it.
     units
         ``si`` or ``us``.
     """
     if units == "si":
         return dict(settings)
-    found = {}
+    shown_by_name = {}
     for name, value in settings.items():
         unit, size = _unit_of(name, units)
         shown = name if size == 1.0 else name.removesuffix(_suffix(unit)) + _suffix(shown_unit(unit, units).unit)
-        found[shown] = _shown_setting(value, size, units)
-    return found
+        shown_by_name[shown] = _shown_setting(value, size, units)
+    return shown_by_name
 
 
 def _unit_of(name: str, units: str) -> tuple[str, float]:

@@ -30,9 +30,6 @@ def default_text(field: Field, units: str = "si") -> str:
     return describe(value, unit) if size == 1.0 else f"{value / size:.5g} {unit}"
 
 
-UNITS = SYSTEMS
-
-
 class Category(NamedTuple):
     """A vehicle of ASTM F2656, see ``docs/vehicle.md``."""
 
@@ -121,7 +118,7 @@ def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", 
     for section, words in SECTIONS.items():
         lines += ["", f"{section}:".ljust(60) + f"# {words}"]
         for field in fields_of(section):
-            lines.append(_line(field, vehicle, UNITS.index(units)))
+            lines.append(_line(field, vehicle, SYSTEMS.index(units)))
     return "\n".join(lines) + "\n"
 
 
@@ -138,7 +135,7 @@ def _line(field: Field, vehicle: str, units: int) -> str:
         if path in of_class
         else _EXAMPLES[path][units]
         if path in _EXAMPLES
-        else default_text(field, UNITS[units])
+        else default_text(field, SYSTEMS[units])
     )
     needed = path in of_class or (field in INPUTS and (not field.optional or field.name == EMBEDMENT[0]))
     sign = "" if needed else "# "

@@ -259,7 +259,7 @@ class Tradeoff:
             pq.write_table(self.table(), file)
         with replacing(files[1]) as file:
             pa_csv.write_csv(self.table(), file)
-        draw("tradeoff", "draw_tradeoff", self, files[2])
+        draw("work_precision", "draw_tradeoff", self, files[2])
         return files
 
 

@@ -12,7 +12,7 @@ from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, caption, figure, headline
-from boulder_sweep.views.labels import RATIO, label, name_of, size_of, sized, value_text
+from boulder_sweep.views.wording import RATIO, label, name_of, size_of, sized, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +29,7 @@ CURVES = ("friction_angle_deg", "subgrade_reaction_MN_m3", "boulder_width_m", "i
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 """Of as many curves as can be told apart with their bands."""
 SET_COLOURS = (*COLOURS, SKY, AMBER, BLACK)
-"""Of named soils or vehicles, each of which gets its curve; beyond that the dashes differ."""
+"""Of the curves of named soils or vehicles; with more curves the dashes differ."""
 DASHES = ("-", "--", "-.", (0, (1, 1)))
 
 
@@ -75,8 +75,8 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
         raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
     with figure(path, 7.2, 4.8) as fig:
         axes = fig.subplots()
-        for place, (words, rows) in enumerate(_curves(frame, over, sets, units)):
-            colour, dashes = SET_COLOURS[place % len(SET_COLOURS)], DASHES[place // len(SET_COLOURS) % len(DASHES)]
+        for index, (words, rows) in enumerate(_curves(frame, over, sets, units)):
+            colour, dashes = SET_COLOURS[index % len(SET_COLOURS)], DASHES[index // len(SET_COLOURS) % len(DASHES)]
             _curve(axes, need, rows.sort_values(across), across, (colour, dashes), words, units)
         axes.set_xlabel(label(across, units))
         axes.set_ylabel(_answer_label(need, units))
@@ -97,7 +97,7 @@ def _curves(
     else:
         values = sorted(frame[over].astype(float).unique())
         if len(values) > len(COLOURS):
-            values = [values[place] for place in np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
+            values = [values[index] for index in np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
         for value in values:
             yield value_text(over, value, units), frame[frame[over].astype(float) == value]
 
@@ -145,6 +145,6 @@ def _caption(need: Need, held: Mapping[str, float | str], units: str) -> str:
         parts.append(f"margin {need.least_margin:.0%} or more")
     parts.append("hollow: passes in the whole range searched; no point: nothing passes")
     if need.others:
-        own, other = (name.replace("_", " ") for name in (need.sweep.model.preset, need.others[0]))
-        parts.append(f"solid: {own}, dotted: {other}, the band shows the spread between them")
+        ours, other = (name.replace("_", " ") for name in (need.sweep.model.preset, need.others[0]))
+        parts.append(f"solid: {ours}, dotted: {other}, the band shows the spread between them")
     return "; ".join(parts)

@@ -155,21 +155,21 @@ def _keep_text_plain(fig: Figure) -> None:
             text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
 
 
-def headline(fig: Figure, words: str, beside_in: float = 0.0) -> str:
+def headline(fig: Figure, words: str, beside_in: float = 0.0, size: float = 11.5) -> str:
     """Write the title of a picture at the left, in lines that leave some inches at the right; return it as written."""
-    style: Any = {"fontsize": 11.5, "fontweight": "bold"}
-    title = broken(fig, words, (1.0 - 2.0 * MARGIN) * fig.get_figwidth() - beside_in, **style)
+    style: Any = {"fontsize": size, "fontweight": "bold"}
+    title = break_lines(fig, words, (1.0 - 2.0 * MARGIN) * fig.get_figwidth() - beside_in, **style)
     fig.suptitle(title, x=MARGIN, ha="left", **style)
     return title
 
 
-def caption(fig: Figure, words: str, size: float = 8.0) -> None:
+def caption(fig: Figure, words: str, size: float = 8.0, colour: str = GREY) -> None:
     """Write the caption of a picture below it, in lines that fit."""
-    text = broken(fig, words, (1.0 - 2.0 * MARGIN) * fig.get_figwidth(), fontsize=size)
-    fig.supxlabel(text, x=MARGIN, ha="left", fontsize=size, color=GREY)
+    text = break_lines(fig, words, (1.0 - 2.0 * MARGIN) * fig.get_figwidth(), fontsize=size)
+    fig.supxlabel(text, x=MARGIN, ha="left", fontsize=size, color=colour)
 
 
-def broken(fig: Figure, words: str, inches: float, **style: Any) -> str:
+def break_lines(fig: Figure, words: str, inches: float, **style: Any) -> str:
     """Break words into lines of at most so many inches: at spaces, and within a word where it is longer."""
     from matplotlib.text import Text
 
@@ -194,6 +194,12 @@ def _parts(line: str, fits: Callable[[str], bool]) -> Iterator[str]:
         yield line[:cut]
         line = line[cut:].lstrip(f" {NO_BREAK_SPACE}")
     yield line
+
+
+def time_axis(axes: Axes, end_s: float) -> None:
+    """Let the horizontal axis be the time from first touch to an end."""
+    axes.set_xlim(0.0, end_s)
+    axes.set_xlabel("time since first touch [s]")
 
 
 def limit_y(axes: Axes, low: float, high: float) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,15 +19,6 @@ if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from boulder_sweep.impact.trajectory import Trajectory
-
-
-from typing import NamedTuple
-
-
 class Shape(NamedTuple):
     """One thing to draw; lengths in metres."""
 
@@ -36,7 +27,7 @@ class Shape(NamedTuple):
     style: str
     """What it is, key of `STYLES`."""
     points: tuple[tuple[float, float], ...]
-    """Corners; tail and head of an arrow; centre of a circle; place of a text."""
+    """Corners; tail and head of an arrow; centre of a circle; position of a text."""
     text: str = ""
     radius: float = 0.0
 
@@ -56,7 +47,7 @@ class Style(NamedTuple):
 STYLES: dict[str, Style] = {
     "soil": Style(fill="#EADFCB"),
     "wedge": Style(fill="#CBB48A", line="#A68A5B", width=0.8),
-    "first_place": Style(line="#8A8A8A", width=1.0, dash=(4.0, 3.0)),
+    "initial": Style(line="#8A8A8A", width=1.0, dash=(4.0, 3.0)),
     "boulder": Style(fill="#A9ABB0", line="#4B4D52", width=1.4),
     "centre": Style(fill="#222222"),
     "weight": Style(size=8.0, line="#4B4D52", width=1.8),
@@ -131,7 +122,7 @@ class SideView:
             Shape("polygon", "soil", ((w.left, w.bottom), (w.right, w.bottom), (w.right, 0.0), (w.left, 0.0))),
             Shape("line", "limit", ((line, 0.0), (line, w.top - 0.75))),
             Shape("text", "limit", ((line + 0.06, w.top - 0.8),), f"{rating}: cargo bed\nmust stop here"),
-            Shape("line", "first_place", (*box, box[0])),
+            Shape("line", "initial", (*box, box[0])),
             Shape("line", "scale", ((x, y), (x + length, y))),
             Shape("text", "scale", ((x, y + 0.08),), f"{unit / 1e3:.0f} kN"),
             Shape("text", "contact_force", ((x, y + 0.80),), "force of the vehicle"),
@@ -158,7 +149,7 @@ class SideView:
             f"boulder {boulder:5.2f} m    vehicle {vehicle:5.2f} m"
         )
 
-    def _place(self, sample: int, x: float, y: float) -> tuple[float, float]:
+    def _position(self, sample: int, x: float, y: float) -> tuple[float, float]:
         """Position of a point of the boulder, given relative to the common centre of mass, x forward and y up [m]."""
         c, theta = self.trajectory.motion.constants, float(self.trajectory.rotation_rad[sample])
         sin, cos = math.sin(theta), math.cos(theta)
@@ -169,13 +160,13 @@ class SideView:
         c, design = self.trajectory.motion.constants, self.trajectory.motion.design
         left, right, low, high = -c.c_x, design.L - c.c_x, -c.c_y, design.H - c.c_y
         corners = ((left, low), (right, low), (right, high), (left, high))
-        own = self._place(sample, 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y)
+        centre = self._position(sample, 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y)
         weight = design.rho_b * design.L * design.W * design.H * G
-        tip = (own[0], own[1] - weight * self.metres_per_newton)
+        tip = (centre[0], centre[1] - weight * self.metres_per_newton)
         return [
-            Shape("polygon", "boulder", tuple(self._place(sample, *corner) for corner in corners)),
-            Shape("circle", "centre", (own,), radius=0.05),
-            Shape("arrow", "weight", (own, tip)),
+            Shape("polygon", "boulder", tuple(self._position(sample, *corner) for corner in corners)),
+            Shape("circle", "centre", (centre,), radius=0.05),
+            Shape("arrow", "weight", (centre, tip)),
         ]
 
     def _wedge(self, sample: int) -> list[Shape]:
@@ -184,7 +175,7 @@ class SideView:
         c, design = motion.constants, motion.design
         slope = wedge_slope(design.phi)
         levels = [k / 24 * c.d for k in range(25)]
-        near = [self._place(sample, c.l_n, c.z_0 - level) for level in levels]
+        near = [self._position(sample, c.l_n, c.z_0 - level) for level in levels]
         far = [(x + (c.d - level) * slope, y) for (x, y), level in zip(near, levels, strict=True)]
         return [Shape("polygon", "wedge", (*near, *far[::-1]))]
 
@@ -198,7 +189,7 @@ class SideView:
             if abs(length) < SHORTEST_ARROW_M:
                 continue
             # Pressed forward the soil pushes on the far face; pressed back, on the near one.
-            x, y = self._place(sample, c.l_n if length < 0.0 else c.l_n - design.L, c.z_0 - float(z))
+            x, y = self._position(sample, c.l_n if length < 0.0 else c.l_n - design.L, c.z_0 - float(z))
             arrows.append(Shape("arrow", "soil_force", ((x - length, y), (x, y))))
         return arrows
 
@@ -207,7 +198,7 @@ class SideView:
         if length < SHORTEST_ARROW_M:
             return []
         c, design = self.trajectory.motion.constants, self.trajectory.motion.design
-        head = self._place(sample, -c.c_x, design.e + c.z_0)
+        head = self._position(sample, -c.c_x, design.e + c.z_0)
         return [Shape("arrow", "contact_force", ((head[0] - length, head[1]), head))]
 
 

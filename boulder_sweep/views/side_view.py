@@ -1,23 +1,30 @@
-"""The side view drawn by matplotlib: one instant, and the frames of an animation."""
+"""The side view: one instant drawn by matplotlib; animations as GIF (Pillow), MP4 (ffmpeg) and HTML with a slider."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import shutil
+import subprocess
+from collections.abc import Iterable, Iterator
+from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from boulder_sweep.errors import PictureError
+from boulder_sweep.store.files import replacing
+from boulder_sweep.text import ProgressCallback, script_data, why
 from boulder_sweep.views import figures
-from boulder_sweep.views.scene import STYLES, Shape, SideView
-from boulder_sweep.views.trajectory import require_samples
-from boulder_sweep.views.wording import NOT_A_TEST, verdict_line
+from boulder_sweep.views.scene import STYLES, Shape, SideView, samples_shown
+from boulder_sweep.views.time_curves import require_samples
+from boulder_sweep.views.wording import NOT_A_TEST, design_line, verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from boulder_sweep.impact.trajectory import Trajectory
+
 
 WIDTH_IN = 7.6
 HEAD_PT, HEAD_PT_PER_M = 9.0, 40.0
@@ -66,7 +73,7 @@ def stage(fig: Figure, view: SideView) -> Axes:
     axes.set_aspect("equal")
     axes.set_axis_off()
     draw(axes, view.ground(), behind=True)
-    fig.suptitle(verdict_line(view.trajectory), x=0.01, ha="left", fontsize=11.0, fontweight="bold")
+    figures.headline(fig, verdict_line(view.trajectory), size=11.0)
     fig.text(0.99, 0.01, NOT_A_TEST, ha="right", fontsize=7.5, color=figures.GREY)
     return axes
 
@@ -111,3 +118,190 @@ def draw(axes: Axes, shapes: Iterable[Shape], *, behind: bool = False) -> list[A
         artists[-1].set_clip_on(True)
         order += 0.001
     return artists
+
+
+KINDS = (".gif", ".mp4", ".html")
+EVERY_S = 0.005
+"""Time between two frames [s]."""
+MOST_FRAMES = 120
+FRAMES_PER_S = 20
+"""Frames per second of playing: with 5 ms between frames, ten times slower than real time."""
+LAST_FRAME_S = 1.5
+"""How long a GIF shows its last frame before it starts again [s]."""
+COLOURS = 48
+"""Colours of a GIF; the drawing needs few."""
+FILM_DPI = 84
+SWATCH = 40
+"""Height of a strip of each colour in the picture that the palette of a GIF is taken from."""
+
+
+def animate(trajectory: Trajectory, path: str | Path, progress: ProgressCallback | None = None) -> None:
+    """Animate the side view: truck, boulder, soil wedge and forces to scale over time.
+
+    Parameters
+    ----------
+    trajectory
+        The impact.
+    path
+        File to write: .gif, .mp4 (needs the program ffmpeg), or .html, one file with a player and a slider.
+    progress
+        Called with how many frames of how many are drawn.
+
+    Raises
+    ------
+    PictureError
+        There is nothing to draw, the kind is unknown, ffmpeg or matplotlib is missing, or the file cannot be written.
+    """
+    target = checked_animation(path)
+    require_samples(trajectory)
+    kind = target.suffix.lower()
+    try:
+        with replacing(target) as file:
+            if kind == ".html":
+                file.write(page(trajectory).encode())
+            elif kind == ".gif":
+                _write_gif(trajectory, file, progress)
+            else:
+                _write_mp4(trajectory, target, Path(file.name), progress)
+    except OSError as problem:
+        raise PictureError(f"{path} cannot be written: {why(problem)}") from problem
+
+
+def checked_animation(path: str | Path) -> Path:
+    """Return the path of an animation if it can be written there.
+
+    Raises
+    ------
+    PictureError
+        The kind is unknown, its folder does not exist or holds the result of a run, or ffmpeg is missing.
+    """
+    target = figures.checked_kind(path, KINDS)
+    if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+        raise PictureError(
+            f"{path}: an MP4 animation needs the program ffmpeg, which is not installed; "
+            f"{target.with_suffix('.gif').name} or {target.with_suffix('.html').name} need nothing more"
+        )
+    return target
+
+
+def frames(trajectory: Trajectory, progress: ProgressCallback | None = None) -> Iterator[np.ndarray]:
+    """Draw the frames of an animation one by one; `progress` is called with how many of how many are drawn.
+
+    Yields
+    ------
+    ndarray of uint8, shape (height, width, 3)
+        One picture; height and width are even, as video formats require.
+    """
+    figures.require_matplotlib()
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    view = SideView(trajectory)
+    with matplotlib.rc_context(figures.STYLE):
+        fig = Figure(figsize=(WIDTH_IN, height_of(view)), dpi=FILM_DPI, layout="constrained")
+        canvas = FigureCanvasAgg(fig)
+        axes = stage(fig, view)
+        title = axes.set_title(view.caption(0), fontsize=8.5, fontweight="normal", family="monospace")
+        canvas.draw()
+        fig.set_layout_engine("none")  # placed once; the frames must not jump
+        chosen = samples_shown(trajectory, MOST_FRAMES, EVERY_S)
+        for drawn, sample in enumerate(chosen, start=1):
+            title.set_text(view.caption(sample))
+            moving = draw(axes, view.moving(sample))
+            canvas.draw()
+            picture = np.asarray(canvas.buffer_rgba())[..., :3]
+            height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
+            yield picture[:height, :width].copy()
+            for artist in moving:
+                artist.remove()
+            if progress is not None:
+                progress(drawn, len(chosen))
+
+
+def _write_gif(trajectory: Trajectory, target: BinaryIO, progress: ProgressCallback | None) -> None:
+    from PIL import Image  # comes with matplotlib
+
+    pictures = [Image.fromarray(picture) for picture in frames(trajectory, progress)]
+    # One palette for all, from frames spread over the film, so that every colour is in it and none flickers.
+    width, height = pictures[0].size
+    sample = pictures[:: max(1, len(pictures) // 6)]
+    colours = sorted({"#FFFFFF"} | {c for style in STYLES.values() for c in (style.fill, style.line) if c != "none"})
+    sheet = Image.new("RGB", (width, height * len(sample) + SWATCH * len(colours)))
+    for k, picture in enumerate(sample):
+        sheet.paste(picture, (0, k * height))
+    for k, colour in enumerate(colours):  # thin lines would lose theirs to the many pixels of soil and sky
+        sheet.paste(Image.new("RGB", (width, SWATCH), colour), (0, height * len(sample) + k * SWATCH))
+    palette = sheet.quantize(COLOURS)
+    reduced = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    times = [1000 // FRAMES_PER_S] * (len(reduced) - 1) + [round(1000 * LAST_FRAME_S)]
+    first, *others = reduced
+    first.save(target, "GIF", save_all=True, append_images=others, duration=times, loop=0, optimize=True)
+
+
+def _write_mp4(trajectory: Trajectory, target: Path, passing: Path, progress: ProgressCallback | None) -> None:
+    """Pipe raw frames to ffmpeg, which writes a file that is there already."""
+    film = frames(trajectory, progress)
+    first = next(film)
+    height, width = first.shape[:2]
+    command = [
+        *("ffmpeg", "-y", "-loglevel", "error"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(FRAMES_PER_S), "-i", "-"),
+        *(
+            "-an",
+            "-c:v",
+            "libx264",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+            "-f",
+            "mp4",
+            str(passing.absolute()),
+        ),
+    ]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
+        assert encoder.stdin is not None
+        try:
+            for picture in (first, *film):
+                encoder.stdin.write(picture.tobytes())
+        except BrokenPipeError:
+            pass  # it has said why and gone; its words are below
+        _, said = encoder.communicate()
+    if encoder.returncode != 0:
+        words = said.decode(errors="replace").strip()
+        raise PictureError(
+            f"{target}: ffmpeg could not make the animation: {words or f'exit code {encoder.returncode}'}"
+        )
+
+
+def page(trajectory: Trajectory) -> str:
+    """Return an HTML page that plays the side view: one file, no other resources.
+
+    The shapes of every frame travel as numbers and are drawn by the browser, so the page is small and sharp.
+    """
+    view = SideView(trajectory)
+    chosen = samples_shown(trajectory, MOST_FRAMES, EVERY_S)
+    window = view.window
+    content = {
+        "title": verdict_line(trajectory),
+        "design": design_line(trajectory),
+        "window": [window.left, window.right, window.bottom, window.top],
+        "styles": {name: style._asdict() for name, style in STYLES.items()},
+        "ground": [_plain(shape) for shape in view.ground()],
+        "captions": [view.caption(sample) for sample in chosen],
+        "frames": [[_plain(shape) for shape in view.moving(sample)] for sample in chosen],
+        "frames_per_s": FRAMES_PER_S,
+    }
+    template = (files("boulder_sweep.views") / "player.html").read_text(encoding="utf-8")
+    return template.replace("/*DATA*/null", script_data(content))
+
+
+def _plain(shape: Shape) -> dict[str, Any]:
+    """Return a shape as plain data, rounded to millimetres."""
+    plain: dict[str, Any] = {"k": shape.kind, "s": shape.style, "p": [[round(v, 3) for v in at] for at in shape.points]}
+    if shape.text:
+        plain["t"] = shape.text
+    if shape.radius:
+        plain["r"] = shape.radius
+    return plain

@@ -1,8 +1,12 @@
-"""A plane through a table of designs: two inputs across, up to two over small multiples, the rest held fixed."""
+"""A plane through a table of designs: two inputs across, up to two over small multiples, the rest held fixed.
+
+The table is read in pieces; only the rows that a picture needs are kept.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -11,10 +15,153 @@ import numpy as np
 from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME as FIELDS
-from boulder_sweep.views.pieces import DEPTH, HEIGHT, RATIO, Kept, Pieces, pieces_of, with_places
+from boulder_sweep.views.wording import RATIO
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from boulder_sweep.store.finished import FinishedRows
+
+
+DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
+VERDICT, REASON, VALIDITY, ROBUSTNESS = "verdict", "reason", "validity", "robustness"
+MOST_KEPT = 2_000_000
+"""Most rows kept: a dozen maps with as many cells as a map may have. Of more, only rows that differ in the picture."""
+_RASTER = 500
+"""Distinct positions along an axis of a map; more than it has pixels."""
+
+Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
+"""Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and those
+of `boulder_sweep.columns.OPTIONAL_COLUMNS`, `VALIDITY` and `ROBUSTNESS` are left out where the table does not have
+them."""
+
+
+def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
+    """Return a table in memory as a single piece, and a source of pieces unchanged."""
+    if callable(table):
+        return table
+    whole = table.assign(**{RATIO: table[DEPTH] / table[HEIGHT]})
+    return lambda columns: [whole]
+
+
+def with_positions(pieces: Pieces, sets: Mapping[str, Sequence[str]]) -> Pieces:
+    """Return a table whose columns of names hold the position of each name in its list instead."""
+    if not sets:
+        return pieces
+    positions = {
+        column: {name: float(position) for position, name in enumerate(names)} for column, names in sets.items()
+    }
+
+    def numbered(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
+        for piece in pieces(columns):
+            numbers = {
+                name: piece[name].astype(str).map(positions[name]).astype(float) for name in positions if name in piece
+            }
+            yield piece.assign(**numbers)
+
+    return numbered
+
+
+def finished_pieces(finished: FinishedRows) -> Pieces:
+    """Return a source of pieces of the finished rows of a result.
+
+    Parameters
+    ----------
+    finished
+        The rows; the first time they are compared with their checksums.
+    """
+    verified = False
+
+    def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
+        nonlocal verified
+        held = set(finished.columns) - finished.lacking
+        there = [name for name in columns if name in held or name not in (*OPTIONAL_COLUMNS, VALIDITY, ROBUSTNESS)]
+        stored = list(
+            dict.fromkeys(column for name in there for column in ((DEPTH, HEIGHT) if name == RATIO else (name,)))
+        )
+        for table in finished.tables(stored, verify=not verified):
+            frame = table.to_pandas()
+            yield frame.assign(**{RATIO: frame[DEPTH] / frame[HEIGHT]}) if RATIO in columns else frame
+        verified = True
+
+    return pieces
+
+
+class Kept:
+    """The rows that a picture shows, collected piece by piece.
+
+    Parameters
+    ----------
+    across, up
+        Inputs on the axes.
+    over
+        Inputs over small multiples; None where there is none.
+    levels
+        Different values of every input, ascending.
+
+    Attributes
+    ----------
+    count, passing : int
+        How many rows there are, and how many of them pass.
+    flags : Counter
+        How many of these have each flag of the column ``validity``; under ``""`` those without any.
+    grades : Counter
+        How many of these have each grade of the column ``robustness``.
+    thinned : bool
+        Whether only rows are left that can be told apart in a picture.
+    """
+
+    def __init__(self, across: str, up: str, over: Sequence[str | None], levels: Mapping[str, np.ndarray]):
+        self.count = self.passing = 0
+        self.flags: Counter[str] = Counter()
+        self.grades: Counter[str] = Counter()
+        self.thinned = False
+        self._ends = {
+            name: (levels[name].min(initial=np.inf), levels[name].max(initial=-np.inf)) for name in (across, up)
+        }
+        self._over = [name for name in over if name is not None]
+        self.columns = list(dict.fromkeys([across, up, *self._over, VERDICT, REASON, VALIDITY, ROBUSTNESS]))
+        self._parts: list[pd.DataFrame] = []
+        self._held = 0
+
+    def add(self, rows: pd.DataFrame) -> None:
+        """Add rows."""
+        self.count += len(rows)
+        if VERDICT in rows:
+            passes = rows[VERDICT] == "pass"
+            self.passing += int(passes.sum())
+            if VALIDITY in rows:
+                for words, count in rows.loc[passes, VALIDITY].astype(str).value_counts().items():
+                    self.flags.update(dict.fromkeys(str(words).split(";"), int(count)))
+            if ROBUSTNESS in rows:
+                self.grades.update(rows.loc[passes, ROBUSTNESS].dropna().astype(str).tolist())
+        if self._held == 0:
+            self._parts = [rows]  # also without any rows, for its columns
+        elif len(rows):
+            self._parts.append(rows)
+        self._held += len(rows)
+        if self._held > MOST_KEPT:
+            self._thin()
+
+    def rows(self) -> pd.DataFrame:
+        """Return the rows, in the order of the table."""
+        import pandas as pd
+
+        if len(self._parts) != 1:
+            self._parts = [pd.concat(self._parts, ignore_index=True)]
+        return self._parts[0]
+
+    def _thin(self) -> None:
+        """Of several rows at the same position, keep the one that would be drawn last."""
+        rows = self.rows()
+        pixels = rows[self._over].copy()
+        for name, (least, most) in self._ends.items():
+            share = (rows[name].to_numpy(dtype=float) - least) / max(most - least, 1e-300)
+            pixels[name] = np.round(share * _RASTER).astype(np.int32)
+        self._parts = [rows[~pixels.duplicated(keep="last").to_numpy()]]
+        self._held = len(self._parts[0])
+        self.thinned = True
+
 
 ACROSS = (RATIO, DEPTH, "boulder_width_m", "boulder_length_m", "impact_speed_m_s")
 UP = (HEIGHT, "boulder_width_m", "boulder_length_m", "vehicle_mass_kg")
@@ -50,17 +197,17 @@ class Slice:
     constants : dict of str to float
         Inputs that have one value in the whole table.
     total, count, passing : int
-        How many rows the table has, how many of them lie in the plane, and how many of these pass.
+        Rows of the table, those of them in the plane, and those of these that pass.
     thinned : bool
         Whether there were too many rows to keep them all.
     flags : dict of str to int
-        How many of those that pass have each flag of the column ``validity``; under ``""`` those without any.
+        Number of passing rows with each flag of the column ``validity``; under ``""`` those without any.
     grades : dict of str to int
-        How many of those that pass have each grade of the column ``robustness``; empty for a table without it.
+        Number of passing rows with each grade of the column ``robustness``; empty for a table without it.
     left_out : dict of str to int
-        Of which multiples only some are shown: how many values there are.
+        Inputs of which only some values are shown, each with the number of its values.
     sets : dict of str to sequence of str
-        Named soils or vehicles; their values here are places in these names.
+        Named soils or vehicles; their values here are positions in these lists.
     """
 
     rows: pd.DataFrame
@@ -120,23 +267,23 @@ def plane(
         or fewer than two inputs vary.
     """
     named = dict(sets or {})
-    pieces = with_places(pieces_of(table), named)
+    pieces = with_positions(pieces_of(table), named)
     levels, total = _levels_of(pieces, named)
     held = dict(at or {})
     chosen: dict[str, str | None] = {"across": across, "up": up, "columns": columns, "rows": rows}
     _check(levels, [name for name in chosen.values() if name], held)
     varying = _independent(levels, {*filter(None, chosen.values()), *held})
-    for place, wanted in (
+    for role, wanted in (
         ("across", ACROSS),
         ("up", UP),
         ("columns", (*named, *OVER[::-1][2:])),
         ("rows", (*named, *OVER)),
     ):
         free = [name for name in varying if name not in chosen.values() and name not in held]
-        if chosen[place] is None:
+        if chosen[role] is None:
             candidates = [name for name in wanted if name in free]
-            anything = free if place in ("across", "up") else []
-            chosen[place] = next(iter([*candidates, *anything]), None)
+            anything = free if role in ("across", "up") else []
+            chosen[role] = next(iter([*candidates, *anything]), None)
     if chosen["across"] is None or chosen["up"] is None:
         raise PictureError("a map needs two inputs that vary and are not held at a value; this table has one or none")
     fixed: dict[str, float] = {}
@@ -148,8 +295,8 @@ def plane(
             wanted_value = held.get(name, values[(len(values) - 1) // 2])
             fixed[name] = float(values[np.argmin(np.abs(values - wanted_value))])
     shown_columns, shown_rows = (
-        _some(levels, chosen[place], MOST_SETS if chosen[place] in named else n)
-        for place, n in (("columns", most[0]), ("rows", most[1]))
+        _some(levels, chosen[role], MOST_SETS if chosen[role] in named else n)
+        for role, n in (("columns", most[0]), ("rows", most[1]))
     )
     admitted = [(name, [value]) for name, value in fixed.items()]
     multiples = ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows))
@@ -158,13 +305,13 @@ def plane(
     for piece in pieces([*{*kept.columns, *fixed}]):
         keep = np.ones(len(piece), dtype=bool)
         for name, shown in admitted:
-            found = piece[name].to_numpy(dtype=float)
-            keep &= np.logical_or.reduce([_equal(found, value) for value in shown])
+            column = piece[name].to_numpy(dtype=float)
+            keep &= np.logical_or.reduce([_equal(column, value) for value in shown])
         kept.add(piece[keep])
     left_out = {
-        str(chosen[place]): len(levels[str(chosen[place])])
-        for place, shown in (("columns", shown_columns), ("rows", shown_rows))
-        if chosen[place] and len(shown) < len(levels[str(chosen[place])])
+        str(chosen[role]): len(levels[str(chosen[role])])
+        for role, shown in (("columns", shown_columns), ("rows", shown_rows))
+        if chosen[role] and len(shown) < len(levels[str(chosen[role])])
     }
     return Slice(
         rows=kept.rows(),
@@ -228,7 +375,7 @@ def select(rows: pd.DataFrame, name: str | None, value: float) -> pd.DataFrame:
 
 def _levels_of(pieces: Pieces, sets: Collection[str]) -> tuple[dict[str, np.ndarray], int]:
     """Return the different values of every input, and the number of rows; a named set stands for what it gives."""
-    found: dict[str, np.ndarray] = {}
+    levels: dict[str, np.ndarray] = {}
     total = 0
     given = [name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS, RATIO) if FIELDS[name].section not in sets]
     for piece in pieces([*given, *sets]):
@@ -236,18 +383,18 @@ def _levels_of(pieces: Pieces, sets: Collection[str]) -> tuple[dict[str, np.ndar
         for name in (*given, *sets):
             if name in piece:
                 values = piece[name].astype(float).unique()
-                found[name] = np.unique(np.concatenate([found.get(name, values), values]))
-    return {name: _levels(values) for name, values in found.items()}, total
+                levels[name] = np.unique(np.concatenate([levels.get(name, values), values]))
+    return {name: _levels(values) for name, values in levels.items()}, total
 
 
 def _levels(values: np.ndarray) -> np.ndarray:
     """Different values of an input, ascending; nearly equal ones count once."""
-    found = np.unique(values[np.isfinite(values)])
-    if len(found) < 2:
-        return found
-    new = np.ones(len(found), dtype=bool)
-    new[1:] = np.diff(found) > 10.0**-DIGITS * np.abs(found[1:])
-    return found[new]
+    distinct = np.unique(values[np.isfinite(values)])
+    if len(distinct) < 2:
+        return distinct
+    new = np.ones(len(distinct), dtype=bool)
+    new[1:] = np.diff(distinct) > 10.0**-DIGITS * np.abs(distinct[1:])
+    return distinct[new]
 
 
 def _equal(values: np.ndarray, value: float) -> np.ndarray:

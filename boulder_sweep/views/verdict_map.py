@@ -13,9 +13,8 @@ from boulder_sweep.columns import GRADES
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import VERDICTS
-from boulder_sweep.views.labels import USUAL, label, name_of, size_of, unbroken, value_text
-from boulder_sweep.views.pieces import ROBUSTNESS, Pieces
-from boulder_sweep.views.slices import Slice, plane, select
+from boulder_sweep.views.slices import ROBUSTNESS, Pieces, Slice, plane, select
+from boulder_sweep.views.wording import USUAL, keep_together, label, name_of, size_of, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,7 +71,7 @@ def draw_verdict_map(
     ----------
     table
         A result table, as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used. Or what
-        yields it piece by piece, see `boulder_sweep.views.pieces`.
+        yields it piece by piece, see `boulder_sweep.views.slices`.
     path
         Picture to write (.png, .svg, .pdf).
     title
@@ -143,11 +142,11 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
     colours = ListedColormap([colour for _, colour, _ in CLASSES])
     norm = BoundaryNorm(np.arange(len(CLASSES) + 1) - 0.5, len(CLASSES))
     x, y = (rows[name].to_numpy(dtype=float) / size_of(name, units) for name in (shown.across, shown.up))
-    x_levels, x_place = np.unique(np.round(x, 9), return_inverse=True)
-    y_levels, y_place = np.unique(np.round(y, 9), return_inverse=True)
+    x_levels, x_index = np.unique(np.round(x, 9), return_inverse=True)
+    y_levels, y_index = np.unique(np.round(y, 9), return_inverse=True)
     cells = np.full((len(y_levels), len(x_levels)), -1, dtype=np.int16)
-    cells[y_place, x_place] = codes
-    filled = len(np.unique(y_place.astype(np.int64) * max(len(x_levels), 1) + x_place))
+    cells[y_index, x_index] = codes
+    filled = len(np.unique(y_index.astype(np.int64) * max(len(x_levels), 1) + x_index))
     gridded = (
         not shown.thinned
         and filled == len(rows)
@@ -160,7 +159,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
         axes.pcolormesh(_edges(x_levels), _edges(y_levels), masked, **style)
         for grade, hatch in _hatches(shown).items():
             graded = np.zeros(cells.shape, dtype=bool)
-            graded[y_place, x_place] = rows[ROBUSTNESS].astype(str).to_numpy() == grade
+            graded[y_index, x_index] = rows[ROBUSTNESS].astype(str).to_numpy() == grade
             if graded.any():
                 covered = np.ma.masked_array(np.zeros(cells.shape), ~graded)
                 drawn = axes.pcolor(_edges(x_levels), _edges(y_levels), covered, facecolor="none", hatch=hatch)
@@ -203,9 +202,9 @@ def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, whic
         lines = []
         for column, column_value in enumerate(shown.column_values):
             parts = _panel_title(shown, row_value, column_value, units)
-            name = figures.broken(fig, ", ".join(parts), map_in, **style)
+            name = figures.break_lines(fig, ", ".join(parts), map_in, **style)
             if "\n" in name:
-                name = figures.broken(fig, "\n".join(parts), map_in, **style)
+                name = figures.break_lines(fig, "\n".join(parts), map_in, **style)
             grid[row, column].set_title(name, **style)
             lines.append(name.count("\n"))
         further += max(lines) * LINE_IN["map"]
@@ -236,14 +235,14 @@ def _legend(fig: Any, present: set[int], shown: Slice, *, beside: bool) -> float
         graded = [Patch(color=colour, label=f"pass: {ROBUST}")] if shown.grades.get(ROBUST) else []
         graded += [Patch(**style, hatch=hatch, label=f"pass: {grade}") for grade, hatch in hatches.items()]
         handles = [*graded, *handles[1:]]
-    place, columns = ("outside right upper", 1) if beside else ("outside upper right", len(handles))
-    drawn = fig.legend(handles=handles, loc=place, ncols=columns, handlelength=1.2, columnspacing=1.2)
+    position, columns = ("outside right upper", 1) if beside else ("outside upper right", len(handles))
+    drawn = fig.legend(handles=handles, loc=position, ncols=columns, handlelength=1.2, columnspacing=1.2)
     return float(drawn.get_window_extent().width / fig.dpi)
 
 
 def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     """Say what is shown, what all designs have in common, and what a pass means, each on a new line."""
-    fixed = ", ".join(unbroken(_held(shown, name, value, units)) for name, value in shown.fixed.items())
+    fixed = ", ".join(keep_together(_held(shown, name, value, units)) for name, value in shown.fixed.items())
     words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
     if shown.grades:
@@ -251,7 +250,7 @@ def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     for name, count in shown.left_out.items():
         words.append(f"{name_of(name)}: {count} values, not all shown")
     same = [
-        unbroken(_held(shown, name, value, units))
+        keep_together(_held(shown, name, value, units))
         for name, value in shown.constants.items()
         if (name, value) not in USUAL
     ]
@@ -266,7 +265,7 @@ def _flagged(shown: Slice) -> str:
     shares = {name: count / shown.passing for name, count in shown.flags.items()}
     inside = shares.pop("", 0.0)
     most = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
-    named = ", ".join(unbroken(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
+    named = ", ".join(keep_together(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
     if not named:
         return "No pass lies outside what the model was tested on"
     return f"Of the passes {1.0 - inside:.0%} lie outside what the model was tested on: {named}"

@@ -7,11 +7,12 @@ from pathlib import Path
 
 from boulder_sweep import load, need, read, run, uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.crash_tests.fitting import fit_pulse, read_pulse
+from boulder_sweep.crash_tests.fitting import fit_pulse
+from boulder_sweep.crash_tests.pulse import read_pulse
 from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.settings.overrides import ALL_OPINIONS
-from boulder_sweep.views.validation import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
+from boulder_sweep.views.crash_curves import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
 from boulder_sweep.views.verdict_map import draw_verdict_map
 from boulder_sweep.views.wording import terms_line
 from docs.studies.answers import SITE, UNCERTAIN

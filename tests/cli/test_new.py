@@ -9,13 +9,14 @@ import pytest
 
 from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.fields import FIELDS
-from boulder_sweep.settings.starter import CLASSES, UNITS, UNPUBLISHED, starter
+from boulder_sweep.settings.shown_units import SYSTEMS
+from boulder_sweep.settings.starter import CLASSES, UNPUBLISHED, starter
 
 OF_THE_PAPER = [vehicle for vehicle, (code, _) in CLASSES.items() if code == "M"]
 
 
 @pytest.mark.parametrize("vehicle", OF_THE_PAPER)
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", SYSTEMS)
 def test_the_file_is_valid_and_only_the_speed_beyond_the_fitted_one_has_a_note(tmp_path, vehicle, units):
     path = tmp_path / "new.yaml"
     path.write_text(starter("new", vehicle, units))
@@ -47,7 +48,7 @@ def test_other_vehicles_have_mass_and_speed_and_ask_for_what_is_not_published(tm
     assert sweep.constants["vehicle_mass_kg"] == pytest.approx(masses_kg[code], rel=3e-3)
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", SYSTEMS)
 def test_every_entry_is_in_it_and_every_optional_line_holds(tmp_path, units):
     text = starter("new", units=units)
     path = tmp_path / "new.yaml"
@@ -165,7 +166,7 @@ def test_a_class_or_a_file_that_there_is_not(sweep, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("vehicle", ["M40", "H50"])
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", SYSTEMS)
 def test_values_are_in_the_units_asked_for(vehicle, units):
     own = {
         "si": {"m", "kg", "kg/m^3", "MN/m^3", "kN/m", "kN*s/m", "kPa", "km/h"},
@@ -195,7 +196,7 @@ def test_it_says_what_to_measure_for_a_vehicle_without_published_values(sweep, t
     code, out, err = sweep("new", "--class", vehicle, "--units", "us", "h.yaml")
     assert (code, err) == (0, "")
     lines = out.splitlines()
-    assert lines[0] == f"h.yaml: fill in three entries; none is published for {vehicle}."
+    assert lines[0] == f"h.yaml: fill in three entries; no values are published for {vehicle}."
     assert "  vehicle.spring, vehicle.damper: from a crash against a rigid wall. Measure the" in lines
     assert f"    sweep fit-vehicle PULSE.csv --mass '{mass}'" in lines
     assert lines[-1] == "Then: sweep check h.yaml"

@@ -55,11 +55,11 @@ def test_a_line_break_within_a_line_cannot_make_another_line(capsys):
 
 
 def test_the_commands_write_through_these_functions_only():
-    """But for the bar and the table of `rich`, and the version."""
+    """But for the bar and the table of `rich`, and the version, which click prints."""
     for path in Path(boulder_sweep.cli.__file__).parent.glob("*.py"):
         source = path.read_text()
         direct = re.findall(r"(?<![\w.])print\(|click\.echo\(|sys\.std(?:out|err)\.write", source)
-        expected = {"output.py": ["print("] * 2, "options.py": ["click.echo("]}
+        expected = {"output.py": ["print("] * 2}
         assert direct == expected.get(path.name, []), path.name
 
 

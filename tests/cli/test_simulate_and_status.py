@@ -252,7 +252,7 @@ def test_status_of_a_folder_moved_from_its_settings_file(sweep, possible_grid, m
     Path("small-grid.sweep").rename("archive/old.sweep")
     assert resumed_by(sweep, "archive/old.sweep") == ("sweep run grid.yaml -o archive/old.sweep --resume", [])
     monkeypatch.chdir("archive")
-    missing = ["note     there is no grid.yaml; name the settings file where it is now"]
+    missing = ["note     there is no grid.yaml; give its present path instead"]
     assert resumed_by(sweep, "old.sweep") == ("sweep run grid.yaml -o old.sweep --resume", missing)
     found = json.loads(sweep("status", "old.sweep", "--json")[1])
     assert found["settings_missing"] == "grid.yaml"
@@ -268,7 +268,7 @@ def test_status_of_a_moved_folder_whose_settings_file_was_named_by_its_whole_pat
     command = f"sweep run {whole} -o new.sweep --resume"
     assert resumed_by(sweep, "new.sweep") == (command, [])
     whole.rename("other.yaml")
-    missing = [f"note     there is no {whole}; name the settings file where it is now"]
+    missing = [f"note     there is no {whole}; give its present path instead"]
     assert resumed_by(sweep, "new.sweep") == (command, missing)
 
 

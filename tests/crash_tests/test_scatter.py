@@ -7,8 +7,9 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from boulder_sweep.crash_tests.cases import rigid_wall_test
-from boulder_sweep.crash_tests.fitting import Pulse, fit_pulse
-from boulder_sweep.crash_tests.fitting.scatter import Scatter, integrated, scatter_of, summed
+from boulder_sweep.crash_tests.fitting import fit_pulse
+from boulder_sweep.crash_tests.pulse import Pulse
+from boulder_sweep.crash_tests.scatter import Scatter, integrate_noise, scatter_of, sum_scatters
 
 PAPER = rigid_wall_test()
 TIMES = np.arange(200) * 1e-3
@@ -76,7 +77,7 @@ def test_covariance_of_integrated_noise(times: int) -> None:
     weights = np.where(at[:, None] >= at, (at[:, None] - at) ** (times - 1), 0.0)
     means = weights.reshape(blocks, -1, fine).mean(axis=1)
     middles, widths = at.reshape(blocks, -1).mean(axis=1), np.full(blocks, 1.0 / blocks)
-    found = integrated(middles, widths, times)
+    found = integrate_noise(middles, widths, times)
     assert found == pytest.approx(means @ means.T / fine, rel=1e-2, abs=1e-3 * found.max())
     # What sets neighbouring blocks apart is small beside what they share.
     last = np.diff(np.eye(blocks), n=times, axis=0)[-1]
@@ -87,10 +88,10 @@ def test_signals_at_other_instants_count_as_fully_correlated() -> None:
     rng = np.random.default_rng(1)
     noise, weights = rng.normal(size=40), rng.normal(size=(40, 2))
     same = [Scatter(noise, weights)] * 2
-    bound = summed(same, together=False)
+    bound = sum_scatters(same, together=False)
     assert bound == pytest.approx(4.0 * weights.T @ weights)
     other = [Scatter(noise, weights), Scatter(noise, rng.normal(size=(40, 2)))]
-    least = np.linalg.eigvalsh(summed(other, together=False) - summed(other, together=True))[0]
+    least = np.linalg.eigvalsh(sum_scatters(other, together=False) - sum_scatters(other, together=True))[0]
     assert least > 0.0
 
 

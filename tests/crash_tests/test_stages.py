@@ -11,9 +11,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from boulder_sweep.cli.main import execute
-from boulder_sweep.crash_tests.fitting import FitError, Pulse, fit_pulse, fit_stages
-from boulder_sweep.crash_tests.fitting.pulse import RESPONSES
-from boulder_sweep.crash_tests.stiffening_wall import StiffeningWall
+from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
+from boulder_sweep.crash_tests.pulse import RESPONSES, Pulse
+from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
+from boulder_sweep.errors import FitError
 from boulder_sweep.settings import load
 
 TRUCK = StiffeningWall(6800.0, 13.4, 3103.3e3, 138.91e3, 9e6, 0.5)

@@ -19,7 +19,6 @@ _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/s
 _DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
-_STAGES = "boulder_sweep/crash_tests/stiffening_wall.py"
 _RESISTANCE = "boulder_sweep/soils.py"
 _GROUND = "boulder_sweep/soils.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
@@ -100,7 +99,7 @@ MUTATIONS = (
     Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
     Mutation((111,), _SECOND, "k_m=c.k_m * (k_2 / c.k_v)", "k_m=c.k_m"),
     Mutation((111,), _DYNAMICS, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
-    Mutation((111,), _STAGES, "(a_2 - w.a * v_2) * odd", "(a_2 + w.a * v_2) * odd"),
+    Mutation((111,), _WALL, "(a_2 - w.a * v_2) * odd", "(a_2 + w.a * v_2) * odd"),
     Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),
     Mutation((121,), _PLASTIC, "F_n = behind - ahead", "F_n = -behind - ahead"),
     Mutation((122,), _PLASTIC, "= max(front, u - y)", "= max(front, u)"),

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import boulder_sweep
-from boulder_sweep.cli.explain import why_lines
 from boulder_sweep.cli.main import execute
+from boulder_sweep.cli.simulate import why_lines
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.settings import load
 

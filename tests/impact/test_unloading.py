@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 import boulder_sweep
-from boulder_sweep.cli.explain import explain as explain_command
+from boulder_sweep.cli.simulate import explain as explain_command
 from boulder_sweep.columns import AT_REST
 from boulder_sweep.errors import NothingToMeasureError
 from boulder_sweep.impact.explanation import explain

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from boulder_sweep.settings import SettingsError, load
-from boulder_sweep.settings.source import MAX_BYTES
+from boulder_sweep.settings.loader import MAX_BYTES
 from tests.counting import calls_of
 
 

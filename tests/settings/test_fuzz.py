@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from boulder_sweep.settings import Problem, SettingsError, Sweep, load_text
-from boulder_sweep.settings.source import decode
+from boulder_sweep.settings.loader import decode
 from boulder_sweep.settings.units import EXPECTED, UnitError, factor
 
 ROOT = Path(__file__).parents[2]

@@ -6,8 +6,7 @@ import jsonschema
 import pytest
 
 from boulder_sweep.settings.problems import ProblemList
-from boulder_sweep.settings.tree import Mapping, Node, Scalar
-from boulder_sweep.settings.yaml_reader import parse
+from boulder_sweep.settings.tree import Mapping, Node, Scalar, parse
 from docs.studies.json_schema import FILE, schema, text
 
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,7 @@ import pytest
 import boulder_sweep
 from boulder_kernels import DesignTable
 from boulder_kernels.layered import LayeredTable
-from boulder_sweep.cli.explain import why_lines
+from boulder_sweep.cli.simulate import why_lines
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.judge.evaluation import evaluation_of

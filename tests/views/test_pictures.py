@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import itertools
+import math
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -20,13 +21,13 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import PictureError
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
-from boulder_sweep.settings import load_text
+from boulder_sweep.settings import load, load_text
 from boulder_sweep.views import figures
-from boulder_sweep.views.energy import LAYERS
 from boulder_sweep.views.figures import checked_kind
-from boulder_sweep.views.trajectory import AFTER_PEAK, unreliable_from
+from boulder_sweep.views.time_curves import AFTER_PEAK, LAYERS, unreliable_from
 from boulder_sweep.views.verdict_map import CLASSES
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 Draw = Callable[[Trajectory, Path], None]
 
 DRAWERS: dict[str, Draw] = {
@@ -72,6 +73,13 @@ def test_the_rebound_is_shaded(held: Trajectory, overturned: Trajectory, tmp_pat
     assert has_colour(picture(tmp_path / "held.png"), AFTER_PEAK, least=20_000)
     assert unreliable_from(overturned)[0] == overturned.motion.outcome.t_limit
     assert "20°" in unreliable_from(overturned)[1]
+
+
+def test_the_rebound_in_plastic_soil_is_not_shaded(tmp_path: Path) -> None:
+    plastic = simulate(load(CONFIGS / "rwg.yaml", ["model.unloading=plastic"]))
+    assert unreliable_from(plastic) == (math.inf, "")
+    plastic.plot(tmp_path / "plastic.png")
+    assert not has_colour(picture(tmp_path / "plastic.png"), AFTER_PEAK, least=20_000)
 
 
 @pytest.fixture
@@ -151,7 +159,7 @@ def test_a_caption_tells_all_of_the_ground_within_the_picture(drawn: list[Figure
 @pytest.mark.parametrize("inches", [0.01, 0.5, 2.0])
 def test_a_broken_text_loses_nothing_but_spaces(words: str, inches: float) -> None:
     fig = Figure()
-    found = figures.broken(fig, words, inches)
+    found = figures.break_lines(fig, words, inches)
     assert found.replace("\n", "").replace(" ", "") == words.replace("\n", "").replace(" ", "")
     lines = found.split("\n")
     for line in lines:

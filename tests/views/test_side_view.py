@@ -18,7 +18,7 @@ from boulder_sweep.errors import PictureError
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
-from boulder_sweep.views import animation
+from boulder_sweep.views import side_view
 from boulder_sweep.views.scene import SLICES, STYLES, Shape, SideView, samples_shown
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -113,7 +113,7 @@ def test_samples_of_a_film(held: Trajectory) -> None:
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> Trajectory:
     """A film of four frames."""
-    monkeypatch.setattr(animation, "MOST_FRAMES", 4)
+    monkeypatch.setattr(side_view, "MOST_FRAMES", 4)
     return simulate(crash_test("rwg"), horizon_s=0.12)
 
 
@@ -143,7 +143,7 @@ def test_page_holds_everything_itself(short: Trajectory, tmp_path: Path) -> None
 def test_a_name_cannot_break_out_of_the_page() -> None:
     sweep, name = crash_test("rwg"), "</script><!--<script>alert(1)</script>\u2028\x1b"
     object.__setattr__(sweep, "name", name)
-    text = animation.page(simulate(sweep, horizon_s=0.02))
+    text = side_view.page(simulate(sweep, horizon_s=0.02))
     assert text.count("</script>") == text.count("<script>") == 1
     assert "<!--" not in text
     assert json.loads(re.search(r"const data = (.*);\n", text)[1])["title"].startswith(f"{name}: ")

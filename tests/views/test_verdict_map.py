@@ -16,10 +16,9 @@ from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings import load_text
-from boulder_sweep.views.labels import label, value_text
-from boulder_sweep.views.pieces import Kept, Pieces, pieces_of
-from boulder_sweep.views.slices import Slice, plane
+from boulder_sweep.views.slices import Kept, Pieces, Slice, pieces_of, plane
 from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
+from boulder_sweep.views.wording import label, value_text
 
 GRID = """\
 name: small grid
@@ -197,7 +196,7 @@ def test_a_table_in_pieces_gives_the_same_picture(table, tmp_path, monkeypatch, 
 
 
 def test_of_too_many_rows_those_are_kept_that_a_picture_can_tell_apart(monkeypatch, tmp_path):
-    monkeypatch.setattr("boulder_sweep.views.pieces.MOST_KEPT", 1000)
+    monkeypatch.setattr("boulder_sweep.views.slices.MOST_KEPT", 1000)
     rng = np.random.default_rng(0)
     n = 5000
     table = pd.DataFrame(dict.fromkeys(INPUT_COLUMNS, np.ones(n))).assign(

@@ -1,4 +1,4 @@
-"""``sweep new``: a commented settings file to start from."""
+"""Settings files: ``sweep new`` writes one to start from, ``sweep check`` finds every mistake at once."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.options import OutputPath
+from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, load_sweep, set_option
 from boulder_sweep.cli.output import show
 
-EXAMPLES = """\b
+NEW_EXAMPLES = """\b
 Examples:
   sweep new
   sweep new my-site.yaml
   sweep new --class M40 --units us -o my-site.yaml
 """
 DEFAULT = "my-site.yaml"
-SYSTEMS = ("si", "us")
 
 
-@click.command("new", short_help="Write a commented settings file to start from.", epilog=EXAMPLES)
+@click.command("new", short_help="Write a commented settings file to start from.", epilog=NEW_EXAMPLES)
 @click.argument("file", type=OutputPath(dir_okay=False, path_type=Path), required=False)
 @click.option("--class", "vehicle", metavar="CLASS", help="Class of the vehicle in ASTM F2656, such as M40 [M30].")
 @click.option("--units", type=click.Choice(SYSTEMS), help="Units of the values [si].")
@@ -63,12 +62,12 @@ def new(file: Path | None, vehicle: str | None, units: str | None, output: Path 
 
 
 def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
-    """Say which entries of a vehicle nobody has published, and how to find them."""
+    """Return which entries of a vehicle have no published values, and how to measure them."""
     from boulder_sweep.settings.starter import CATEGORIES, CLASSES
 
     mass = CATEGORIES[CLASSES[vehicle][0]].mass[units]
     return [
-        f"{file}: fill in three entries; none is published for {vehicle}.",
+        f"{file}: fill in three entries; no values are published for {vehicle}.",
         "  vehicle.spring, vehicle.damper: from a crash against a rigid wall. Measure the",
         "    deceleration of the vehicle over time (or its displacement), then",
         f"    sweep fit-vehicle PULSE.csv --mass '{mass}'",
@@ -84,3 +83,21 @@ def _checked_name(text: str) -> str:
     if not NAME.fullmatch(text):
         raise click.UsageError(f"the name {NAME_RULE}")
     return text
+
+
+CHECK_EXAMPLES = """\b
+Example:
+  sweep check configs/m30_sizing.yaml
+"""
+
+
+@click.command(short_help="Check a file: all mistakes at once, with their lines.", epilog=CHECK_EXAMPLES)
+@grid_argument
+@set_option
+def check(grid: str, overrides: tuple[str, ...]) -> int:
+    """Check GRID without simulating: all mistakes at once, with file, line and column."""
+    from boulder_sweep.cli import console
+
+    sweep = load_sweep(grid, overrides, quiet=False)
+    show(f"{grid}: valid", *console.grid_lines(sweep))
+    return 0

@@ -13,8 +13,7 @@ from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.text import chance_text
 from boulder_sweep.views.figures import BLUE, GREY, LIGHT_GREY, ORANGE, PALE_ORANGE, caption, figure, headline
-from boulder_sweep.views.labels import USUAL, label, name_of, size_of, unbroken, value_text
-from boulder_sweep.views.wording import terms_line
+from boulder_sweep.views.wording import USUAL, keep_together, label, name_of, size_of, terms_line, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,12 +26,12 @@ LEAST_RANGE = 0.01
 """Least width of the axis of probabilities."""
 
 
-def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0, units: str = "si") -> None:
+def draw_uncertainty(result: Uncertainty, path: str | Path, *, design_id: int = 0, units: str = "si") -> None:
     """Draw one design of a result.
 
     Parameters
     ----------
-    found
+    result
         The result.
     path
         Picture to write.
@@ -46,11 +45,11 @@ def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0
     PictureError
         No samples are kept of this design, or the picture cannot be written.
     """
-    samples = found.samples.to_pandas()
+    samples = result.samples.to_pandas()
     samples = samples[samples.design_id == design_id]
     if samples.empty:
         raise PictureError(f"no samples of design {design_id} are kept; take a file with fewer designs, or one of them")
-    row = found.arrow.slice(design_id, 1).to_pylist()[0]
+    row = result.arrow.slice(design_id, 1).to_pylist()[0]
     names = [name for name in samples.columns if name not in ("design_id", "distance")]
     changes = {name: _by_fifths(samples, name) for name in names}
     order = sorted(names, key=lambda name: float(np.ptp(changes[name])), reverse=True)
@@ -58,27 +57,27 @@ def draw_uncertainty(found: Uncertainty, path: str | Path, *, design_id: int = 0
         left, right = fig.subplots(1, 2, width_ratios=(1.1, 1.0))
         _scatter(left, samples, order, units)
         _tornado(right, changes, order, row["p_pass"])
-        name = found.sweep.name if len(found) == 1 else f"{found.sweep.name} #{design_id}"
+        name = result.sweep.name if len(result) == 1 else f"{result.sweep.name} #{design_id}"
         chance, low, high = (chance_text(row[key]) for key in ("p_pass", "p_pass_low", "p_pass_high"))
         headline(fig, f"{name}: P(pass) = {chance} ({low} to {high})")
-        caption(fig, _caption(found, row, names, units))
+        caption(fig, _caption(result, row, names, units))
 
 
-def _caption(found: Uncertainty, row: Mapping[str, Any], uncertain: Sequence[str], units: str) -> str:
+def _caption(result: Uncertainty, row: Mapping[str, Any], uncertain: Sequence[str], units: str) -> str:
     """Say which design it is, with the means of its uncertain inputs, and what a pass means."""
-    sets = [f"{axis.name}: {row[axis.name]}" for axis in found.sweep.axes if axis.labels]
-    follows = () if "impact_height_m" in found.sweep.plan.given else ("impact_height_m",)
+    sets = [f"{axis.name}: {row[axis.name]}" for axis in result.sweep.axes if axis.labels]
+    follows = () if "impact_height_m" in result.sweep.plan.given else ("impact_height_m",)
     values = {
-        name: unbroken(value_text(name, row[name], units))
+        name: keep_together(value_text(name, row[name], units))
         for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS)
         if row.get(name) is not None and name not in follows and (name, row[name]) not in USUAL
     }
-    design = ", ".join([*map(unbroken, sets), *(words for name, words in values.items() if name not in uncertain)])
+    design = ", ".join([*map(keep_together, sets), *(words for name, words in values.items() if name not in uncertain)])
     means = ", ".join(values[name] for name in uncertain if name in values)
-    of = f"Design #{row['design_id']} of #0 to #{len(found) - 1}" if len(found) > 1 else "Design"
-    least = json.loads(found.arrow.schema.metadata[b"boulder_sweep.question"])["margin"]
+    of = f"Design #{row['design_id']} of #0 to #{len(result) - 1}" if len(result) > 1 else "Design"
+    least = json.loads(result.arrow.schema.metadata[b"boulder_sweep.question"])["margin"]
     margin = f" Here a pass also has a margin of at least {least:.0%}." if least else ""
-    return f"{of}: {design}. Means of the uncertain inputs: {means}.\n{terms_line(found.sweep.resolved())}{margin}"
+    return f"{of}: {design}. Means of the uncertain inputs: {means}.\n{terms_line(result.sweep.resolved())}{margin}"
 
 
 def _by_fifths(samples: pd.DataFrame, name: str) -> np.ndarray:
@@ -103,14 +102,14 @@ def _scatter(axes: Axes, samples: pd.DataFrame, order: list[str], units: str) ->
 
 def _tornado(axes: Axes, changes: dict[str, np.ndarray], order: list[str], p_pass: float) -> None:
     """Draw the chance where an input lies in its lowest and in its highest fifth."""
-    for place, name in enumerate(reversed(order)):
+    for position, name in enumerate(reversed(order)):
         low, high = changes[name][0], changes[name][-1]
         for value, colour, words in ((low, PALE_ORANGE, "lowest fifth (low)"), (high, BLUE, "highest fifth (high)")):
-            bar = "" if place else words
-            axes.barh(place, value - p_pass, left=p_pass, height=0.55, color=colour, label=bar)
+            bar = "" if position else words
+            axes.barh(position, value - p_pass, left=p_pass, height=0.55, color=colour, label=bar)
         axes.annotate(
             f"low {chance_text(low)}, high {chance_text(high)}",
-            (0.02, place + 0.3),
+            (0.02, position + 0.3),
             xycoords=("axes fraction", "data"),
             va="bottom",
             fontsize=8,

@@ -24,23 +24,23 @@ NAMED_STEPS_MS = {False: (16.0, 8.0), True: (2.0, 1.0, 0.5)}
 WORDS = {"as_printed": "as printed", "corrected": "corrected", "mixed": "readings of the file"}
 
 
-def draw_tradeoff(found: Tradeoff, path: str | Path) -> None:
+def draw_tradeoff(result: Tradeoff, path: str | Path) -> None:
     """Draw a panel for each reading.
 
     Parameters
     ----------
-    found
+    result
         What was measured.
     path
         Picture to write.
     """
-    names = list(dict.fromkeys(point.method.readings for point in found.points))
+    names = list(dict.fromkeys(point.method.readings for point in result.points))
     with figure(path, 5.4 * len(names), 5.0) as fig:
         panels = fig.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
-            _panel(axes, [point for point in found.points if point.method.readings == name])
-            own = " (this file)" if name == found.own_readings else ""
-            axes.set_title(f"{WORDS.get(name, name)}{own}")
+            _panel(axes, [point for point in result.points if point.method.readings == name])
+            this_file = " (this file)" if name == result.own_readings else ""
+            axes.set_title(f"{WORDS.get(name, name)}{this_file}")
             axes.set_xlabel("CPU time per design, one core [µs]")
         panels[0].set_ylabel("error of the largest rotation [deg]\n99 % of designs; thin line up to the largest")
         handles, labels = panels[0].get_legend_handles_labels()
@@ -76,10 +76,10 @@ def _panel(axes: Axes, points: list[Point]) -> None:
             words = "error for each design" if estimate else "closed form"
             words += ", yield located" if located else ""
         these = [p for p in points if (p.method.soil_elements, p.method.error_estimate, p.method.locate_yield) == group]
-        _way(axes, these, colour, marker, words)
+        _method(axes, these, colour, marker, words)
 
 
-def _way(axes: Axes, points: list[Point], colour: str, marker: str, words: str) -> None:
+def _method(axes: Axes, points: list[Point], colour: str, marker: str, words: str) -> None:
     """Draw one method over its steps."""
     cost = [p.cpu_us for p in points]
     usual = [max(p.rotation_p99_deg, LEAST_DEG) for p in points]

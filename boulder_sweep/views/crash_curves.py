@@ -1,4 +1,4 @@
-"""The simulated curves of the paper's figures, redrawn; and all results of `validate` as files."""
+"""Curves of crash tests: the simulated ones of the paper's figures, with all results of `validate`; a fitted pulse."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.crash_tests.cases import NAMES
-from boulder_sweep.crash_tests.comparison import simulated_signal
+from boulder_sweep.crash_tests.measured import simulated_signal
+from boulder_sweep.crash_tests.pulse import RESPONSES, UNITS
+from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
+from boulder_sweep.crash_tests.statements import CLOSE_UNTIL_S, PAPERS_N
 from boulder_sweep.store.files import replacing
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, BLUE, GREY, ORANGE
@@ -19,11 +22,13 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from boulder_sweep.crash_tests.convergence import Convergence
     from boulder_sweep.crash_tests.measured import TimeHistory
+    from boulder_sweep.crash_tests.pulse import VehicleFit
     from boulder_sweep.crash_tests.rigid_wall import RigidWall
+    from boulder_sweep.crash_tests.statements import Convergence
     from boulder_sweep.crash_tests.validation import Validation
     from boulder_sweep.impact.trajectory import Trajectory
+
 
 STYLES: dict[str, dict[str, Any]] = {
     "corrected": {"color": BLUE},
@@ -35,16 +40,15 @@ SIGNALS = (
     ("vehicle_displacement", "Displacement of the vehicle", "displacement [m]"),
 )
 FIGURES = {"abg": ("12 to 14", "figures_12_to_14_abg.png"), "rwg": ("16 to 18", "figures_16_to_18_rwg.png")}
-CLOSE_UNTIL_S = 0.1
 
 
-def write_validation(found: Validation, folder: Path) -> list[Path]:
+def write_validation(result: Validation, folder: Path) -> list[Path]:
     """Write pictures and Parquet files.
 
     Parameters
     ----------
-    found
-        What `validate` found.
+    result
+        What `validate` result.
     folder
         Where to; made if it does not exist.
 
@@ -61,14 +65,14 @@ def write_validation(found: Validation, folder: Path) -> list[Path]:
     figures.require_matplotlib()
     figures.make_folder(folder)
     written = [folder / "figure_10_rigid_wall.png"]
-    draw_rigid_wall(found.wall, written[0])
+    draw_rigid_wall(result.wall, written[0])
     for test, (_, name) in FIGURES.items():
-        own = {preset: t for (t_name, preset), t in found.trajectories.items() if t_name == test}
-        draw_crash_test(test, own, folder / name)
+        by_preset = {preset: t for (t_name, preset), t in result.trajectories.items() if t_name == test}
+        draw_crash_test(test, by_preset, folder / name)
         written.append(folder / name)
-    draw_convergence(found.convergence, folder / "convergence.png")
+    draw_convergence(result.convergence, folder / "convergence.png")
     written.append(folder / "convergence.png")
-    return [*written, *_write_tables(found, folder)]
+    return [*written, *_write_tables(result, folder)]
 
 
 def draw_crash_test(
@@ -98,7 +102,7 @@ def draw_crash_test(
             f" (Figures {FIGURES[test][0]})" if test in FIGURES and measured is None else ""
         )
         words = ", ".join(f"{t.verdict} ({preset.replace('_', ' ')})" for preset, t in trajectories.items())
-        fig.suptitle(f"{title}: {words}", x=0.01, ha="left", fontsize=11.0, fontweight="bold")
+        figures.headline(fig, f"{title}: {words}", size=11.0)
 
 
 def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory | None) -> None:
@@ -115,10 +119,9 @@ def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measu
     if measured is not None:
         axes.plot(measured.time_s, measured.signals[name], ".", color=GREY, markersize=3.5, label="measured")
     end = max(float(trajectory.time_s[-1]) for trajectory in trajectories.values())
-    axes.set_xlim(0.0, end)
+    figures.time_axis(axes, end)
     axes.set_title(title)
     axes.set_ylabel(label)
-    axes.set_xlabel("time since first touch [s]")
     overturned = any(math.isfinite(t.motion.outcome.t_limit) for t in trajectories.values())
     if overturned:
         axes.axvspan(CLOSE_UNTIL_S, end, color="#F4F0EC", zorder=-2, linewidth=0)
@@ -151,20 +154,14 @@ def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
         )
         for axes, (values, title, label, when, peak, words) in zip(row, curves, strict=True):
             axes.plot(time, values, color=BLUE)
-            axes.set_xlim(0.0, time[-1])
+            figures.time_axis(axes, float(time[-1]))
             axes.set_title(title)
             axes.set_ylabel(label)
-            axes.set_xlabel("time since first touch [s]")
             bottom, top = axes.get_ylim()
             axes.set_ylim(bottom - (0.06 * (top - bottom) if peak < 0.0 else 0.0), top + 0.08 * (top - bottom))
             figures.mark_peak(axes, when, peak, words.format(peak).replace("-", "−"), BLUE, below=peak < 0.0)
-        fig.suptitle(
-            f"Rigid wall (Figure 10): {wall.mass_kg:.0f} kg at {wall.speed_m_s:g} m/s, Maxwell element of the paper",
-            x=0.01,
-            ha="left",
-            fontsize=11.0,
-            fontweight="bold",
-        )
+        words = f"Rigid wall (Figure 10): {wall.mass_kg:.0f} kg at {wall.speed_m_s:g} m/s, Maxwell element of the paper"
+        figures.headline(fig, words, size=11.0)
 
 
 def draw_convergence(study: Convergence, path: Path) -> None:
@@ -177,26 +174,21 @@ def draw_convergence(study: Convergence, path: Path) -> None:
             order = study.order("rwg", preset)
             words = f"{preset.replace('_', ' ')}: order {order:.1f}"
             axes.loglog(n, gap, marker="o", markersize=4.5, label=words, **style)
-        axes.axvline(5000, color=GREY, linewidth=0.9, linestyle=":")
-        axes.annotate("N of the paper", (5000, axes.get_ylim()[1]), fontsize=8.5, color=GREY, ha="right", va="top")
+        axes.axvline(PAPERS_N, color=GREY, linewidth=0.9, linestyle=":")
+        axes.annotate("N of the paper", (PAPERS_N, axes.get_ylim()[1]), fontsize=8.5, color=GREY, ha="right", va="top")
         axes.set_xlabel("number N of soil elements")
         axes.set_ylabel("|largest rotation − closed form| [deg]")
         axes.set_title("Rockville White Granite: element sums against N → ∞")
         axes.legend()
 
 
-def draw_overlay(test: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory, path: Path) -> None:
-    """Draw a user's own test data over the simulation."""
-    draw_crash_test(test, trajectories, path, measured)
-
-
-def _write_tables(found: Validation, folder: Path) -> list[Path]:
+def _write_tables(result: Validation, folder: Path) -> list[Path]:
     """Write figures, statements, convergence and time histories to Parquet files."""
     import pandas as pd
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    content = found.to_dict()
+    content = result.to_dict()
     flat = [{k: v for k, v in row.items() if k != "readings"} for row in content["crash_tests"]]
     frames = {
         "crash_tests.parquet": pd.DataFrame(flat),
@@ -209,7 +201,7 @@ def _write_tables(found: Validation, folder: Path) -> list[Path]:
             frame.to_parquet(file)
         written.append(folder / name)
     parts = []
-    for (test, preset), trajectory in found.trajectories.items():
+    for (test, preset), trajectory in result.trajectories.items():
         part = trajectory.to_arrow(energy=True).replace_schema_metadata(None)
         for column, text in (("preset", preset), ("test", test)):
             words = pa.array([text] * len(part)).dictionary_encode()
@@ -218,3 +210,57 @@ def _write_tables(found: Validation, folder: Path) -> list[Path]:
     with replacing(folder / "trajectories.parquet") as file:
         pq.write_table(pa.concat_tables(parts).unify_dictionaries(), file, compression="zstd")
     return [*written, folder / "trajectories.parquet"]
+
+
+ORDER = ("displacement", "velocity", "acceleration")
+POINTS = 400
+
+
+def draw_fit(fit: VehicleFit, path: str | Path) -> None:
+    """Draw every signal of a pulse with the fitted response, and the residuals below it.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    path
+        Picture to write (.png, .svg, .pdf).
+
+    Raises
+    ------
+    PictureError
+        The picture cannot be written, or matplotlib is not installed.
+    """
+    names = [name for name in ORDER if name in fit.pulse.signals]
+    residuals = fit.residuals
+    fine = np.linspace(0.0, float(fit.pulse.time_s[-1]), POINTS)
+    with figures.figure(path, max(3.4 * len(names), 5.6), 4.9) as fig:
+        grid = fig.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(2.4, 1.0))
+        for (above, below), name in zip(grid.T, names, strict=True):
+            unit = UNITS[name].replace("^2", "²")
+            above.plot(fit.pulse.time_s, fit.pulse.signals[name], ".", color=GREY, markersize=3.0, label="measured")
+            above.plot(fine, RESPONSES[name](fit.wall, fine), color=ORANGE, label="Maxwell element")
+            above.set_title(name.capitalize())
+            above.set_ylabel(f"{name} [{unit}]")
+            below.plot(fit.pulse.time_s, residuals[name], ".", color=GREY, markersize=3.0)
+            below.axhline(0.0, color=BLACK, linewidth=0.8)
+            reach = 1.15 * float(np.nanmax(np.abs(residuals[name])))
+            below.set_ylim(-reach or -1.0, reach or 1.0)
+            below.set_ylabel(f"residual [{unit}]")
+            figures.time_axis(below, float(fine[-1]))
+            below.locator_params(axis="x", nbins=5)  # more numbers run into one another
+        grid[0, 0].legend(loc="best")
+        figures.headline(fig, fit_line(fit), size=10.5)
+        if fit.warnings:
+            first = "Caution: " + fit.warnings[0].split(":")[0]
+            figures.caption(fig, first, size=8.5, colour=ORANGE)
+
+
+def fit_line(fit: VehicleFit) -> str:
+    """Spring and damper with their standard errors on one line."""
+    spring = f"spring {fit.wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"
+    damper = f"damper {fit.wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN·s/m"
+    wall = fit.wall
+    if isinstance(wall, StiffeningWall):
+        spring += f", {wall.second_spring_N_m / 1e3:.1f} kN/m from {wall.second_spring_from_m:.3f} m"
+    return f"{spring}, {damper}"

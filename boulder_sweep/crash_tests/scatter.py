@@ -6,7 +6,7 @@ response can follow. The noise of each signal is therefore taken as white noise 
 better, white noise integrated once (velocity, displacement) or twice (displacement), and both variances are estimated
 by restricted maximum likelihood (Patterson & Thompson 1971, Biometrika 58, 545-554), which allows for what the fit has
 absorbed. Samples are first averaged over blocks, within which a filter may correlate them as it likes. What correlation
-is left between neighbouring blocks counts as that of an autoregression of first order (prewhitening as of Andrews &
+is left between neighbouring blocks counts as that of an autoregression of first order (prewhitening as by Andrews &
 Monahan 1992, Econometrica 60, 953-966).
 
 The signals may come from one instrument: what they have in common is summed over equal and neighbouring instants, as
@@ -68,9 +68,9 @@ def scatter_of(name: str, times_s: np.ndarray, residuals: np.ndarray, jacobian: 
     best, covariance = _likeliest(means, slopes, counts, np.zeros((len(parts), len(parts))))
     bar = best - CLEARLY
     for times in INTEGRATED[name]:
-        deviance, found = _likeliest(means, slopes, counts, integrated(middles, widths, times))
+        deviance, candidate = _likeliest(means, slopes, counts, integrate_noise(middles, widths, times))
         if deviance < min(best, bar):
-            best, covariance = deviance, found
+            best, covariance = deviance, candidate
     root = np.linalg.cholesky(covariance)
     one, other = np.linalg.solve(root, slopes), np.linalg.solve(root, means)
     noise = other - one @ np.linalg.lstsq(one, other, rcond=1e-12)[0]
@@ -81,7 +81,7 @@ def scatter_of(name: str, times_s: np.ndarray, residuals: np.ndarray, jacobian: 
     return Scatter(noise, np.sqrt((1.0 + r) / (1.0 - r)) * (root.T @ sums))
 
 
-def integrated(middles: np.ndarray, widths: np.ndarray, times: int) -> np.ndarray:
+def integrate_noise(middles: np.ndarray, widths: np.ndarray, times: int) -> np.ndarray:
     """Covariance of white noise integrated once or twice from t = 0 on and averaged over blocks, shape (m, m).
 
     Parameters
@@ -122,7 +122,7 @@ def _likeliest(
     return float(deviances[best]), scales[best] * (white + ratios[best] * drift)
 
 
-def summed(scatters: list[Scatter], *, together: bool) -> np.ndarray:
+def sum_scatters(scatters: list[Scatter], *, together: bool) -> np.ndarray:
     """Covariance of the gradient of the sum of squares, over all signals, shape (p, p).
 
     Parameters
@@ -149,8 +149,8 @@ def _in_common(one: Scatter, other: Scatter) -> np.ndarray:
     if one is other:
         return np.eye(m)
     size = max(float(np.linalg.norm(one.noise) * np.linalg.norm(other.noise)), TINY)
-    found = np.zeros((m, m))
+    correlation = np.zeros((m, m))
     for lag in range(-min(LAGS, m - 1), min(LAGS, m - 1) + 1):
         shared = float(one.noise[max(lag, 0) : m + min(lag, 0)] @ other.noise[max(-lag, 0) : m - max(lag, 0)])
-        found += (1.0 - abs(lag) / (LAGS + 1)) * shared / size * np.eye(m, k=-lag)
-    return found
+        correlation += (1.0 - abs(lag) / (LAGS + 1)) * shared / size * np.eye(m, k=-lag)
+    return correlation

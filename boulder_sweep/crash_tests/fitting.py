@@ -8,25 +8,15 @@ have it. What is fitted are the logarithms of sqrt(k/m) and of c/sqrt(k m), and 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from boulder_sweep.crash_tests.fitting.pulse import Pulse, SignalMisfit, VehicleFit
-from boulder_sweep.errors import FitError
-
-if TYPE_CHECKING:
-    from boulder_sweep.crash_tests.fitting.pulse import Pulse, SignalMisfit
-    from boulder_sweep.crash_tests.rigid_wall import RigidWall
-
-
 from dataclasses import dataclass
 from typing import Any
 
-from boulder_sweep.crash_tests.fitting.pulse import RESPONSES, Pulse, SignalMisfit
-from boulder_sweep.crash_tests.fitting.scatter import scatter_of, summed
-from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.stiffening_wall import StiffeningWall
+import numpy as np
+
+from boulder_sweep.crash_tests.pulse import RESPONSES, Pulse, SignalMisfit, VehicleFit
+from boulder_sweep.crash_tests.rigid_wall import RigidWall, StiffeningWall
+from boulder_sweep.crash_tests.scatter import scatter_of, sum_scatters
+from boulder_sweep.errors import FitError
 
 RATIO_BOUNDS = (2e-3, 2e2)
 """Range of c/sqrt(k m) that is searched; at its ends one of the two elements is as good as rigid."""
@@ -67,10 +57,18 @@ class FitProblem:
         """Residuals of all signals as multiples of their scales."""
         return np.concatenate([values / scales[name] for name, values in self.by_signal(unknowns).items()])
 
+    def scatter(self, residuals: dict[str, np.ndarray]) -> dict[str, float]:
+        """Return the scale of each signal by which its residuals are divided: their root mean square, never zero."""
+        return {name: max(rms(values), 1e-9 * self.range(name)) for name, values in residuals.items()}
+
+    def misfits(self, residuals: dict[str, np.ndarray]) -> dict[str, SignalMisfit]:
+        """Describe the residuals of every signal."""
+        return {name: misfit_of(values, self.range(name)) for name, values in residuals.items()}
+
     def start(self, scales: dict[str, float]) -> np.ndarray:
         """Best of a grid of vehicles; the response is proportional to the speed, which so follows from each."""
         last = float(self.pulse.time_s[-1])
-        best, found = math.inf, np.zeros(3)
+        best, unknowns = math.inf, np.zeros(3)
         for rate in np.geomspace(0.1, 200.0, 31) / last:
             for ratio in np.geomspace(*RATIO_BOUNDS, 21):
                 unit = RigidWall(self.mass_kg, 1.0, self.mass_kg * rate**2, ratio * rate * self.mass_kg)
@@ -83,8 +81,8 @@ class FitProblem:
                 speed = self.speed_m_s if self.speed_m_s is not None else max(float(one @ other / (one @ one)), 1e-6)
                 misfit = float(np.sum((other - speed * one) ** 2))
                 if misfit < best:
-                    best, found = misfit, np.array([math.log(rate), math.log(ratio), speed])
-        return found if self.speed_m_s is None else found[:2]
+                    best, unknowns = misfit, np.array([math.log(rate), math.log(ratio), speed])
+        return unknowns if self.speed_m_s is None else unknowns[:2]
 
     def bounds(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Range of the unknowns."""
@@ -97,7 +95,7 @@ class FitProblem:
         """Covariance of the unknowns, shape (p, p).
 
         The sandwich of least squares, (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, with the covariance Σ of the residuals of all signals as
-        `boulder_sweep.crash_tests.fitting.scatter` finds it from them.
+        `boulder_sweep.crash_tests.scatter` finds it from them.
         """
         n = len(unknowns)
         steps = 1e-6 * np.maximum(np.abs(unknowns), 1.0)
@@ -113,7 +111,7 @@ class FitProblem:
             times = self.pulse.time_s[self.known[name]]
             scatters.append(scatter_of(name, times, residuals / scales[name], jacobian))
         masks = list(self.known.values())
-        middle = summed(scatters, together=all(np.array_equal(mask, masks[0]) for mask in masks))
+        middle = sum_scatters(scatters, together=all(np.array_equal(mask, masks[0]) for mask in masks))
         inverse = np.linalg.pinv(bread, rcond=self.least_share, hermitian=True)
         return np.asarray(inverse @ middle @ inverse)
 
@@ -158,10 +156,10 @@ def warnings_of(
     spring_error_N_m, damper_error_N_s_m
         Standard errors.
     """
-    found: list[str] = []
+    warnings: list[str] = []
     for name, misfit in misfits.items():
         if misfit.systematic_share > SYSTEMATIC_SHARE and misfit.correlation > GO_TOGETHER:
-            found.append(
+            warnings.append(
                 f"the {name} is off by {misfit.systematic_share:.0%} of its range even with the noise averaged out: "
                 f"this front is not a spring and a damper in series (it may stiffen as it is crushed); "
                 f"use the constants only for impacts that crush it about as far"
@@ -169,27 +167,29 @@ def warnings_of(
     ratio = wall.damper_N_s_m / math.sqrt(wall.spring_N_m * wall.mass_kg)
     rigid_damper, rigid_spring = ratio > 0.5 * RATIO_BOUNDS[1], ratio < 2.0 * RATIO_BOUNDS[0]
     if rigid_damper:
-        found.append("the pulse shows no lasting crush: a spring alone fits as well, and the damper is not determined")
+        warnings.append(
+            "the pulse shows no lasting crush: a spring alone fits as well, and the damper is not determined"
+        )
     if rigid_spring:
-        found.append("the pulse shows no spring: a damper alone fits as well, and the spring is not determined")
+        warnings.append("the pulse shows no spring: a damper alone fits as well, and the spring is not determined")
     unsure = (
         ("spring", spring_error_N_m / wall.spring_N_m, rigid_spring),
         ("damper", damper_error_N_s_m / wall.damper_N_s_m, rigid_damper),
     )
     for name, share, said in unsure:
         if share > UNSURE and not said:
-            found.append(f"the pulse does not determine the {name}: its standard error is {share:.0%} of it")
+            warnings.append(f"the pulse does not determine the {name}: its standard error is {share:.0%} of it")
     last = float(pulse.time_s[-1])
     if last < wall.peak_force_time_s:
-        found.append(
+        warnings.append(
             f"the pulse ends at {last:.3f} s, before the force peaks ({wall.peak_force_time_s:.3f} s by this fit)"
         )
     elif last < wall.max_displacement_time_s < math.inf:
-        found.append(
+        warnings.append(
             f"the pulse ends at {last:.3f} s, before the vehicle stops "
             f"({wall.max_displacement_time_s:.3f} s by this fit)"
         )
-    return tuple(found)
+    return tuple(warnings)
 
 
 PASSES = 4
@@ -240,11 +240,11 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
         )
         unknowns = solved.x
         residuals = problem.by_signal(unknowns)
-        scales = {name: max(rms(values), 1e-9 * problem.range(name)) for name, values in residuals.items()}
+        scales = problem.scatter(residuals)
     wall = problem.wall(unknowns)
     if not math.isfinite(solved.cost):
         raise FitError(f"{pulse.name}: no vehicle comes near this pulse")
-    misfits = {name: misfit_of(values, problem.range(name)) for name, values in residuals.items()}
+    misfits = problem.misfits(residuals)
     spring_error, damper_error, speed_error = problem.standard_errors(unknowns, scales)
     return VehicleFit(
         pulse=pulse,
@@ -328,12 +328,12 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
     Parameters
     ----------
     pulse, mass_kg, speed_m_s
-        As of `boulder_sweep.crash_tests.fitting.fit_pulse`.
+        See `fit_pulse`.
 
     Raises
     ------
     FitError
-        As of `fit_pulse`; or two springs fit no better than one, because the front does not stiffen or the pulse does
+        As `fit_pulse` does; or two springs fit no better than one, because the front does not stiffen or the pulse does
         not reach its second spring.
     """
     one = fit_pulse(pulse, mass_kg, speed_m_s=speed_m_s)
@@ -341,9 +341,9 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
         raise _no_second(one)
     problem = StagedProblem(pulse, float(mass_kg), speed_m_s)
     scales = {name: misfit.rms for name, misfit in one.misfits.items()}
-    unknowns, scales = _solved(problem, one, scales)
+    unknowns, scales = _solve(problem, one, scales)
     residuals, wall = problem.by_signal(unknowns), problem.wall(unknowns)
-    misfits = {name: misfit_of(values, problem.range(name)) for name, values in residuals.items()}
+    misfits = problem.misfits(residuals)
     if wall.stage is None or _gain(one, misfits, residuals) <= 0.0:
         raise _no_second(one)
     n, covariance = len(unknowns), problem.covariance(unknowns, scales)
@@ -375,7 +375,7 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
     )
 
 
-def _solved(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -> tuple[np.ndarray, dict[str, float]]:
+def _solve(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -> tuple[np.ndarray, dict[str, float]]:
     """Solve from several starts, and once more from the best with the weights of its own scatter."""
     from scipy.optimize import least_squares  # heavy, and only this function needs it
 
@@ -392,9 +392,8 @@ def _solved(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -
         return least_squares(problem.residuals, np.clip(start, low, high), bounds=(low, high), args=(scales,), **tight)
 
     starts = [np.array([*known, math.log(ratio), share * crush]) for ratio, share in STARTS]
-    best = min((solved(start) for start in starts), key=lambda found: found.cost)
-    residuals = problem.by_signal(best.x)
-    scales = {name: max(rms(values), 1e-9 * problem.range(name)) for name, values in residuals.items()}
+    best = min((solved(start) for start in starts), key=lambda fit: fit.cost)
+    scales = problem.scatter(problem.by_signal(best.x))
     return solved(best.x).x, scales
 
 

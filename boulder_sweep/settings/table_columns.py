@@ -1,19 +1,27 @@
-"""The column names of a table of designs: inputs in any unit that fits, and text that is carried along."""
+"""The columns of a table of designs: inputs in any unit that fits, and text that is carried along."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
 from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.designs import Label
 from boulder_sweep.settings.fields import INPUTS, Field
-from boulder_sweep.settings.problems import Position, ProblemList, nearest, shorten
-from boulder_sweep.settings.source import refuse
+from boulder_sweep.settings.leaf import outside
+from boulder_sweep.settings.problems import Position, ProblemList, nearest, refuse, shorten
 from boulder_sweep.settings.units import UnitError, factor
 
 MAX_COLUMNS = 1000
+MAX_ALIKE = 5
+"""Most problems reported of one column, and of lines with a wrong number of cells."""
+MAX_TEXT = 200
+"""Longest text that is carried along, in characters."""
 _ID = re.compile(r"(.*_)?(id|no|nr|number|name|label|comment|note)", re.IGNORECASE)
 """Names of unknown columns that may hold numbers: those of others could be a misspelled input."""
 _LABEL = re.compile(r"\w[\w .+/()#-]{0,79}")
@@ -56,14 +64,14 @@ def read_header(names: list[str], positions: list[Position], problems: ProblemLi
     """Return what every column is, None for those that cannot be used; mistakes go to `problems`."""
     columns: list[TableColumn | None] = []
     for name, position in zip(names, positions, strict=True):
-        found = _column(name)
-        if isinstance(found, TableColumn):
-            same = [other for other in columns if other is not None and _key(other) == _key(found)]
+        column = _column(name)
+        if isinstance(column, TableColumn):
+            same = [other for other in columns if other is not None and _key(other) == _key(column)]
             if same:
-                found = f"gives the same as column {same[0].name}" if same[0].name != name else "appears twice"
-        if isinstance(found, str):
-            problems.add(position, shorten(name) or "(empty)", found)
-        columns.append(found if isinstance(found, TableColumn) else None)
+                column = f"gives the same as column {same[0].name}" if same[0].name != name else "appears twice"
+        if isinstance(column, str):
+            problems.add(position, shorten(name) or "(empty)", column)
+        columns.append(column if isinstance(column, TableColumn) else None)
     return columns
 
 
@@ -133,3 +141,47 @@ def _meant(name: str) -> str:
         if word in (stem, field.key, *field.also):
             return f"{stem}, with its unit at the end" if field.unit != "1" else stem
     return ""
+
+
+class Alike:
+    """Reports problems of one kind up to a limit, then counts them."""
+
+    def __init__(self, problems: ProblemList) -> None:
+        self.problems = problems
+        self.counts: Counter[tuple[str, str]] = Counter()
+        self.last: dict[tuple[str, str], Position] = {}
+
+    def add(self, kind: str, position: Position, key: str, message: str, most: int = MAX_ALIKE) -> None:
+        """Report a problem, or count it if there were enough of its kind and key."""
+        self.counts[kind, key] += 1
+        self.last[kind, key] = Position(position.file, position.line)
+        if self.counts[kind, key] <= most:
+            self.problems.add(position, key, message)
+
+    def finish(self) -> None:
+        """Say how many more there are."""
+        for (kind, key), count in self.counts.items():
+            if kind and count > MAX_ALIKE:
+                self.problems.add(self.last[kind, key], key, f"and {count - MAX_ALIKE} more {kind} like these")
+
+
+def check_values(values: np.ndarray, field: Field) -> list[tuple[int, str]]:
+    """Return (row, what is wrong) for values that are not finite or not admitted."""
+    bound = field.admitted
+    assert bound is not None
+    wrong = np.flatnonzero(~((values >= bound.low) & (values <= bound.high)))
+    return [
+        (int(row), outside(float(values[row]), field) if np.isfinite(values[row]) else "is not a finite number")
+        for row in wrong
+    ]
+
+
+def label_of(texts: list[str]) -> Label:
+    """Return texts, one a row, as codes and words; fit to be printed."""
+    words, codes = np.unique(np.array([shorten(text, MAX_TEXT) for text in texts], dtype=object), return_inverse=True)
+    return Label(codes.astype(np.int32), tuple(words.tolist()))
+
+
+def to_input_unit(values: np.ndarray, column: TableColumn) -> np.ndarray:
+    """Return values in the unit of the input."""
+    return values if column.factor == 1 else values * float(column.factor)

@@ -190,4 +190,4 @@ class VehicleFit:
         PictureError
             The picture cannot be written, or matplotlib is not installed.
         """
-        draw("vehicle_fit", "draw_fit", self, path)
+        draw("crash_curves", "draw_fit", self, path)

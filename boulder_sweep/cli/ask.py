@@ -1,0 +1,253 @@
+"""What a grid answers: ``sweep need``, ``sweep uncertainty``, ``sweep capacity``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+import click
+
+from boulder_sweep.cli.options import (
+    OUTPUT,
+    cluster_options,
+    grid_argument,
+    jobs_option,
+    json_option,
+    load_sweep,
+    margin_option,
+    quiet_option,
+    refuse_missing,
+    refuse_units_of_json,
+    refuse_unwritable,
+    second_opinion_option,
+    set_option,
+    units_option,
+)
+from boulder_sweep.cli.output import say, show
+from boulder_sweep.cli.progress import kernels_for, working
+from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
+from boulder_sweep.text import counted
+
+NEED_EXAMPLES = """\b
+Examples:
+  sweep need configs/site.yaml
+  sweep need configs/site.yaml --margin '25 %' --plot depths.png
+  sweep need configs/site.yaml --robust
+  sweep need configs/site.yaml --least height -o heights.parquet
+  sweep need configs/uncertain_site.yaml --probability 0.95 --least mass
+  sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
+"""
+
+
+@click.command("need", short_help="The least depth (or any input) that passes.", epilog=NEED_EXAMPLES)
+@grid_argument
+@click.option("--least", metavar="KEY", help="Input whose smallest passing value is wanted [embedment_depth].")
+@click.option("--most", metavar="KEY", help="Input whose largest passing value is wanted, e.g. speed.")
+@margin_option
+@click.option("--probability", metavar="P", help="Probability of passing, e.g. 0.95, if inputs have distributions.")
+@click.option(
+    "--open-readings", is_flag=True, help="With --probability: treat all readings of the paper as equally likely."
+)
+@click.option(
+    "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
+)
+@click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
+@click.option(
+    "--robust",
+    is_flag=True,
+    help="Count only passes that stand under all second opinions, --margin not asked of these.",
+)
+@click.option(
+    "--other-readings",
+    "both_readings",
+    is_flag=True,
+    help="Also answer by the other readings of the paper: takes longer.",
+)
+@jobs_option
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
+@click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Design chart (.png, .svg or .pdf).")
+@quiet_option
+@cluster_options
+@units_option
+@set_option
+@json_option
+def need(
+    grid: str,
+    out: str | None,
+    picture: str | None,
+    units: str,
+    quiet: bool,
+    overrides: tuple[str, ...],
+    as_json: bool,
+    **question: Any,
+) -> int:
+    """Find the least KEY that passes, for every combination of the other inputs of GRID.
+
+    If KEY is an axis of the grid, the axis is the search range; otherwise the usual range, for depths from 0.35 of the
+    height to where the truck would go over the boulder. Every answer has a bracket: the value that passes and the next
+    one, which does not, both judged as in `sweep run`. A row of which nothing passes is `blocked_by_overlap` if the
+    truck goes over the boulder at the end of the range (overlap below criterion.min_overlap), and `never` if not.
+    """
+    from boulder_sweep.answers.need import need as find
+    from boulder_sweep.answers.need_printing import need_lines
+
+    refuse_units_of_json(units, as_json)
+    sweep = load_sweep(grid, overrides, quiet)
+    refuse_unwritable(out, picture)
+    with working(quiet, kernels_for(sweep), of="designs" if question["probability"] is None else "values") as progress:
+        result = find(sweep, **question, progress=progress)
+    if as_json:
+        show(json.dumps(result.to_dict()))
+    else:
+        show(*need_lines(result, units=units, file=grid))
+    if not quiet:
+        counts = ", ".join(f"{word} {count:,}" for word, count in result.counts().items())
+        say(f"{counted(len(result), 'row')}: {counts}; {counted(result.simulated, 'simulation')}")
+    if out is not None:
+        result.write(out)
+    if picture is not None:
+        result.plot(picture, units=units)
+    return EXIT_SOME_ROWS_FAILED if result.errors else EXIT_DONE
+
+
+UNCERTAINTY_EXAMPLES = """\b
+Examples:
+  sweep uncertainty configs/uncertain_site.yaml
+  sweep uncertainty configs/uncertain_site.yaml --plot chances.png
+  sweep uncertainty configs/uncertain_site.yaml --rare -o chances.parquet
+  sweep uncertainty configs/uncertain_site.yaml --doubts
+  sweep uncertainty --published
+"""
+
+
+@click.command(
+    "uncertainty", short_help="The probability of passing with uncertain inputs.", epilog=UNCERTAINTY_EXAMPLES
+)
+@click.argument("grid", type=click.Path(), required=False)
+@click.option("--half-width", default="0.01", metavar="P", help="Largest half-width of the interval [0.01].")
+@click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
+@margin_option
+@click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
+@second_opinion_option
+@click.option(
+    "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
+@jobs_option
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; indices and samples next to it.")
+@click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
+@click.option(
+    "--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot and --doubts [0]."
+)
+@click.option("--published", is_flag=True, help="List published spreads with their sources; takes no GRID.")
+@quiet_option
+@cluster_options
+@units_option
+@set_option
+@json_option
+def uncertainty(
+    grid: str | None,
+    second_opinion: bool,
+    doubts: bool,
+    out: str | None,
+    picture: str | None,
+    design: int,
+    published: bool,
+    units: str,
+    quiet: bool,
+    overrides: tuple[str, ...],
+    as_json: bool,
+    **question: Any,
+) -> int:
+    """Estimate the probability of passing for every design of GRID, in which some inputs have distributions.
+
+    An input takes a distribution instead of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Sampling continues
+    until the interval is narrow enough.
+    """
+    if published:
+        return _show_published(grid, units, as_json)
+    if grid is None:
+        raise click.MissingParameter(param_hint="'GRID'", param_type="argument")
+    from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
+    from boulder_sweep.answers.uncertainty import uncertainty as estimate
+
+    refuse_units_of_json(units, as_json)
+    from boulder_sweep.settings.overrides import ALL_OPINIONS
+
+    sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet)
+    refuse_missing(sweep, grid, design)
+    refuse_unwritable(out, picture)
+    with working(quiet, kernels_for(sweep)) as progress:
+        result = estimate(sweep, **question, progress=progress)
+    parts = []
+    if doubts:
+        from boulder_sweep.answers.doubts import doubts as divide
+
+        parts = divide(sweep, design=design, seed=question["seed"], jobs=question["jobs"])
+    if as_json:
+        show(json.dumps(result.to_dict() | ({"doubts": [asdict(part) for part in parts]} if doubts else {})))
+    else:
+        show(*uncertainty_lines(result, units=units), *(["", *doubt_lines(parts)] if doubts else []))
+    if not quiet:
+        drawn = sum(result.arrow["p_pass_designs"].to_pylist())
+        say(f"{counted(len(result), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {question['seed']}")
+    if out is not None:
+        for file in result.write(out):
+            say(f"written  {file}")
+    if picture is not None:
+        result.plot(picture, design, units=units)
+    return 0
+
+
+def _show_published(grid: str | None, units: str, as_json: bool) -> int:
+    """List published spreads with their sources."""
+    if grid is not None or units != "si":
+        other = "GRID" if grid is not None else f"--units {units}"
+        raise click.UsageError(f"--published lists spreads as their sources state them; leave out {other}")
+    from boulder_sweep.answers.published import PUBLISHED
+
+    if as_json:
+        show(json.dumps({"published": [spread._asdict() for spread in PUBLISHED]}))
+        return 0
+    for spread in PUBLISHED:
+        show(f"{spread.input:<24}{spread.cov:<14}{spread.of}", f"{'':<38}{spread.source}")
+    return 0
+
+
+CAPACITY_EXAMPLES = """\b
+Examples:
+  sweep capacity configs/crash_tests.yaml
+  sweep capacity configs/site.yaml -o withstands.parquet
+"""
+
+
+@click.command("capacity", short_help="Which truck and soil every design withstands.", epilog=CAPACITY_EXAMPLES)
+@grid_argument
+@jobs_option
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all designs.")
+@quiet_option
+@units_option
+@set_option
+@json_option
+def capacity(
+    grid: str, jobs: int | None, out: str | None, units: str, quiet: bool, overrides: tuple[str, ...], as_json: bool
+) -> int:
+    """Find how far speed, mass of the truck and friction angle may change before each verdict does.
+
+    Also names the highest ASTM F2656 class whose nominal speed (30, 40, 50 mph) is withstood. The class is
+    simulated; the standard rates by test.
+    """
+    from boulder_sweep.answers.printing import reserve_lines
+    from boulder_sweep.answers.reserves import reserves
+
+    refuse_units_of_json(units, as_json)
+    sweep = load_sweep(grid, overrides, quiet)
+    refuse_unwritable(out)
+    with working(quiet, kernels_for(sweep)) as progress:
+        result = reserves(sweep, jobs=jobs, progress=progress)
+    show(*([json.dumps(result.to_dict())] if as_json else reserve_lines(result, units=units)))
+    if out is not None:
+        result.write(out)
+    errors = result.arrow["verdict"].to_pylist().count("error")
+    return EXIT_SOME_ROWS_FAILED if errors else EXIT_DONE
