@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.uncertainty import uncertainty as uncertainty
     from boulder_sweep.impact.simulation import Trajectory as Trajectory
     from boulder_sweep.impact.simulation import simulate as simulate
+    from boulder_sweep.judge.quantiles import at_values as at_values
     from boulder_sweep.report.comparison import compare as compare
     from boulder_sweep.report.export import export as export
     from boulder_sweep.report.writing import write_explorer as write_explorer
@@ -37,6 +38,7 @@ _PUBLIC = {
     "boulder_sweep.answers.need": ("Need", "need"),
     "boulder_sweep.answers.uncertainty": ("Uncertainty", "uncertainty"),
     "boulder_sweep.impact.simulation": ("Trajectory", "simulate"),
+    "boulder_sweep.judge.quantiles": ("at_values",),
     "boulder_sweep.report.comparison": ("compare",),
     "boulder_sweep.report.export": ("export",),
     "boulder_sweep.report.writing": ("write_explorer", "write_report"),

@@ -23,6 +23,7 @@ from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_
 from boulder_sweep.columns import OPTIONAL_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.backends import THREADING
@@ -190,7 +191,7 @@ def need(
         The number of jobs is not a whole number, or out of range.
     """
     if probability is None:
-        sweep.require_values()
+        sweep = at_values(sweep)
     if least and most:
         raise QuestionError("use either --least or --most, not both")
     word = most or least or "embedment_depth"

@@ -18,6 +18,7 @@ from boulder_sweep.answers.result import Result
 from boulder_sweep.answers.search import FAILS, HOLDS, Search, search
 from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
 from boulder_sweep.designs import block_of
+from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import call
 from boulder_sweep.text import ProgressCallback
@@ -110,7 +111,7 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
     from boulder_sweep.answers.tables import joined_tables
     from boulder_sweep.store.provenance import file_metadata, identity
 
-    sweep.require_values()
+    sweep = at_values(sweep)
     judges = judges_of(sweep)
     judges.final.warm_up()
     if progress is not None:

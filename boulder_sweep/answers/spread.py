@@ -6,10 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import betainccinv, betaincinv, ndtr, ndtri
 
 from boulder_sweep.answers.moving import moving_of
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.quantiles import values_of
 from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.fields import BY_NAME
 
@@ -101,48 +101,3 @@ def _drawn(
         if own is not None and rows.any():
             found[rows] = drawn(own, mean[rows], z[rows])
     return found
-
-
-def values_of(
-    spread: Distribution, mean: np.ndarray, z: np.ndarray, ends: tuple[np.ndarray, np.ndarray] | None = None
-) -> np.ndarray:
-    """Return the quantiles of a distribution at standard normal numbers.
-
-    Parameters
-    ----------
-    spread
-        The distribution.
-    mean
-        Means, before truncation where that is possible, shape (n,).
-    z
-        Standard normal numbers, shape (n,).
-    ends
-        Ends in place of its own, shape (n,) each, of a distribution that has moved; see `moving`.
-    """
-    low, high = (np.broadcast_to(end, mean.shape) for end in ends or (spread.low, spread.high))
-    if spread.kind == "normal":
-        return _truncated(mean, spread.deviation(mean), low, high, z)
-    if spread.kind == "lognormal":
-        variance = np.log1p((spread.deviation(mean) / mean) ** 2)
-        with np.errstate(divide="ignore"):
-            low, high = np.log(low), np.log(high)
-        return np.exp(_truncated(np.log(mean) - 0.5 * variance, np.sqrt(variance), low, high, z))
-    width = high - low
-    if spread.kind == "uniform":
-        return low + width * ndtr(z)
-    if spread.kind == "triangular":
-        share = (spread.own_mode - spread.low) / (spread.high - spread.low)
-        rising, falling = np.sqrt(share * ndtr(z)), 1.0 - np.sqrt((1.0 - share) * ndtr(-z))
-        return low + width * np.where(ndtr(z) < share, rising, falling)
-    at, deviation = (mean - low) / width, spread.deviation(mean) / width
-    total = at * (1.0 - at) / deviation**2 - 1.0
-    a, b = at * total, (1.0 - at) * total
-    return low + width * np.where(z < 0.0, betaincinv(a, b, ndtr(z)), betainccinv(a, b, ndtr(-z)))
-
-
-def _truncated(mean: np.ndarray, deviation: np.ndarray, low: np.ndarray, high: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Truncated normal distribution; each half is computed from its own tail, so that no digits are lost."""
-    below, above = (low - mean) / deviation, (high - mean) / deviation
-    lower = ndtri(ndtr(below) + ndtr(z) * (ndtr(above) - ndtr(below)))
-    upper = -ndtri(ndtr(-above) + ndtr(-z) * (ndtr(-below) - ndtr(-above)))
-    return np.clip(mean + deviation * np.where(z < 0.0, lower, upper), low, high)

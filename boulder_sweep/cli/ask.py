@@ -10,6 +10,7 @@ import click
 
 from boulder_sweep.cli.options import (
     OUTPUT,
+    at_option,
     cluster_options,
     grid_argument,
     jobs_option,
@@ -22,6 +23,7 @@ from boulder_sweep.cli.options import (
     refuse_unwritable,
     second_opinion_option,
     set_option,
+    take_values,
     units_option,
 )
 from boulder_sweep.cli.output import say, show
@@ -56,7 +58,7 @@ Examples:
 @click.option(
     "--robust",
     is_flag=True,
-    help="Count only passes that stand under all second opinions, --margin not asked of these.",
+    help="Count only passes that stand under all second opinions (without the margin).",
 )
 @click.option(
     "--other-readings",
@@ -70,6 +72,7 @@ Examples:
 @quiet_option
 @cluster_options
 @units_option
+@at_option
 @set_option
 @json_option
 def need(
@@ -77,6 +80,7 @@ def need(
     out: str | None,
     picture: str | None,
     units: str,
+    at: str | None,
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
@@ -94,6 +98,10 @@ def need(
 
     refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet)
+    if question["probability"] is None:
+        sweep = take_values(sweep, at, quiet)
+    elif at is not None:
+        raise click.UsageError("--at and --probability cannot be used together")
     refuse_unwritable(out, picture)
     with working(quiet, kernels_for(sweep), of="designs" if question["probability"] is None else "values") as progress:
         result = find(sweep, **question, progress=progress)
@@ -228,10 +236,18 @@ Examples:
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all designs.")
 @quiet_option
 @units_option
+@at_option
 @set_option
 @json_option
 def capacity(
-    grid: str, jobs: int | None, out: str | None, units: str, quiet: bool, overrides: tuple[str, ...], as_json: bool
+    grid: str,
+    at: str | None,
+    jobs: int | None,
+    out: str | None,
+    units: str,
+    quiet: bool,
+    overrides: tuple[str, ...],
+    as_json: bool,
 ) -> int:
     """Find how far speed, mass of the truck and friction angle may change before each verdict does.
 
@@ -242,7 +258,7 @@ def capacity(
     from boulder_sweep.answers.reserves import reserves
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet)
+    sweep = take_values(load_sweep(grid, overrides, quiet), at, quiet)
     refuse_unwritable(out)
     with working(quiet, kernels_for(sweep)) as progress:
         result = reserves(sweep, jobs=jobs, progress=progress)

@@ -44,6 +44,11 @@ set_option = click.option(
     help="Replace one entry of the file, e.g. --set vehicle.speed='50 mph' (may be repeated).",
 )
 jobs_option = click.option("--jobs", type=JOBS, help="Threads [default: all cores].")
+at_option = click.option(
+    "--at",
+    metavar="QUANTILE",
+    help="Value of uncertain inputs: unfavourable quantile, p5 [default], p10, ..., or mean.",
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
 units_option = click.option("--units", type=click.Choice(SYSTEMS), default="si", show_default=True, help="Units shown.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No notes.")
@@ -97,6 +102,18 @@ def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
     if not quiet:
         for note in sweep.notes:
             say(f"note: {note}")
+    return sweep
+
+
+def take_values(sweep: Sweep, at: str | None, quiet: bool) -> Sweep:
+    """Return settings with one value for every uncertain input, and print these values."""
+    from boulder_sweep.judge.quantiles import at_values, words_of
+
+    sweep = at_values(sweep, at)
+    if sweep.taken_at and not quiet:
+        from boulder_sweep.cli.console import wrap
+
+        say("\n".join(wrap(f"note: {words_of(sweep)}")))
     return sweep
 
 

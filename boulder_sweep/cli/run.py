@@ -13,6 +13,7 @@ import click
 from boulder_sweep.cli.options import (
     JOBS,
     OUTPUT,
+    at_option,
     cluster_options,
     grid_argument,
     json_option,
@@ -20,6 +21,7 @@ from boulder_sweep.cli.options import (
     result_argument,
     second_opinion_option,
     set_option,
+    take_values,
     talk_options,
 )
 from boulder_sweep.cli.output import say, show
@@ -51,6 +53,7 @@ Examples:
 @click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing.")
 @click.option("--accuracy", metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
 @second_opinion_option
+@at_option
 @cluster_options
 @set_option
 @json_option
@@ -61,6 +64,7 @@ def run(
     overrides: tuple[str, ...],
     accuracy: str | None,
     second_opinion: bool,
+    at: str | None,
     dry_run: bool,
     as_json: bool,
     quiet: bool,
@@ -79,7 +83,7 @@ def run(
 
     chosen = [] if accuracy is None else [f"--accuracy={accuracy}"]
     chosen += [ALL_OPINIONS] if second_opinion else []
-    sweep = load_sweep(grid, (*overrides, *chosen), quiet)
+    sweep = take_values(load_sweep(grid, (*overrides, *chosen), quiet), at, quiet)
     target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
         return _dry_run(sweep, target, options, as_json)
@@ -99,7 +103,7 @@ def run(
                 target,
                 progress=shown,
                 command=shlex.join(["sweep", *sys.argv[1:]]),
-                resume_command=_resume_command(grid, target, overrides, accuracy, second_opinion, options),
+                resume_command=_resume_command(grid, target, overrides, accuracy, second_opinion, at, options),
                 **options,
             )
         except Interrupted as stop:
@@ -135,6 +139,7 @@ def _resume_command(
     overrides: Sequence[str],
     accuracy: str | None,
     second_opinion: bool,
+    at: str | None,
     options: dict[str, Any],
 ) -> str:
     """Return the command that resumes this run."""
@@ -144,6 +149,7 @@ def _resume_command(
             words += [f"--{name}", str(options[name])]
     words += ["--accuracy", accuracy] if accuracy else []
     words += ["--second-opinion"] if second_opinion else []
+    words += ["--at", at] if at else []
     for override in overrides:
         words += ["--set", override]
     return shlex.join([*words, "--resume"])

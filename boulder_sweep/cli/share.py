@@ -13,10 +13,12 @@ import click
 
 from boulder_sweep.cli.options import (
     OUTPUT,
+    at_option,
     load_sweep,
     refuse_missing,
     result_argument,
     set_option,
+    take_values,
     units_option,
 )
 from boulder_sweep.cli.output import say, show
@@ -212,9 +214,16 @@ Examples:
 @click.option("-o", "--output", "page", type=OUTPUT, metavar="F.html", help="The page [default: NAME.html].")
 @click.option("--no-open", is_flag=True, help="Write the page and do not open it.")
 @units_option
+@at_option
 @set_option
 def explore(
-    case: str | None, design: int, page: str | None, no_open: bool, units: str, overrides: tuple[str, ...]
+    case: str | None,
+    design: int,
+    page: str | None,
+    no_open: bool,
+    at: str | None,
+    units: str,
+    overrides: tuple[str, ...],
 ) -> int:
     """Write a page with one design of CASE and open it in the browser.
 
@@ -227,7 +236,9 @@ def explore(
 
     if case is None and overrides:
         raise click.UsageError("--set changes entries of a file: name one")
-    sweep = example() if case is None else load_sweep(case, overrides, quiet=False)
+    if case is None and at is not None:
+        raise click.UsageError("--at is for a file with uncertain inputs: name one")
+    sweep = example() if case is None else take_values(load_sweep(case, overrides, quiet=False), at, quiet=False)
     refuse_missing(sweep, case or sweep.name, design)
     target = Path(page or f"{sweep.name.replace('/', '-').replace(' ', '-')}.html")
     written = write_explorer(sweep, design, target, units=units, command=_command())

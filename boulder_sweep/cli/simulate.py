@@ -11,12 +11,14 @@ import click
 
 from boulder_sweep.cli.options import (
     OUTPUT,
+    at_option,
     json_option,
     load_sweep,
     refuse_missing,
     refuse_unwritable_history,
     result_argument,
     set_option,
+    take_values,
     talk_options,
     units_option,
 )
@@ -50,6 +52,7 @@ Examples:
 @click.option("--all", "every", is_flag=True, help="Print every column of the outcome as well.")
 @click.option("--animate", type=OUTPUT, metavar="F.gif|.mp4|.html", help="Animate the side view.")
 @units_option
+@at_option
 @set_option
 @json_option
 @talk_options
@@ -62,6 +65,7 @@ def simulate(
     every: bool,
     animate: str | None,
     units: str,
+    at: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
     quiet: bool,
@@ -70,7 +74,7 @@ def simulate(
     """Simulate one design of CASE with its time history, beyond the rotation limit and to the end."""
     from boulder_sweep.cli import console
 
-    sweep = load_sweep(case, overrides, quiet)
+    sweep = take_values(load_sweep(case, overrides, quiet), at, quiet)
     number = design or 0
     refuse_missing(sweep, case, number)
     refuse_unwritable_history(plot, trajectory, energy, animate)

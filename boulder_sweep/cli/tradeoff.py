@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, cluster_options, grid_argument, json_option, set_option
+from boulder_sweep.cli.options import (
+    OUTPUT,
+    at_option,
+    cluster_options,
+    grid_argument,
+    json_option,
+    set_option,
+    take_values,
+)
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -47,12 +55,14 @@ Examples:
 )
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
 @cluster_options
+@at_option
 @set_option
 @json_option
 def tradeoff(
     grid: str,
     out: str | None,
     quiet: bool,
+    at: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
     **options: Any,
@@ -69,7 +79,7 @@ def tradeoff(
 
     if math.isnan(options["seconds"]):
         raise click.UsageError("--seconds nan: give a number of seconds")
-    sweep = load(grid, overrides)
+    sweep = take_values(load(grid, overrides), at, quiet)
     if out is not None:
         from boulder_sweep.views.figures import make_folder, require_matplotlib
 

@@ -40,6 +40,7 @@ from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, OVERTURNS, Judged
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
@@ -121,7 +122,7 @@ def simulate(
     longer holds: what is shown there is how it goes wrong.
     """
     sweep = _as_sweep(design)
-    sweep.require_values()
+    sweep = at_values(sweep)
     sweep = _changed(sweep, readings, soil_elements, step_s, horizon_s)
     block = sweep.block(design_id, design_id + 1)
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}

@@ -13,6 +13,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.evaluation import control_of, known_control, readings_of
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import Named, answer_of
 from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
@@ -125,7 +126,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
     """
     target = checked_page(page)
     check_system(units)
-    sweep.require_values()
+    sweep = at_values(sweep)
     if not 0 <= number < sweep.n_designs:
         held = counted(sweep.n_designs, "design")
         raise ReportError(f"{sweep.name} holds {held}, numbered from 0; there is no {number}")

@@ -255,6 +255,8 @@ def resume_command(sweep: Sweep, out: Location, jobs: int | None, backend: str, 
         words += ["--backend", backend]
     if scheduler is not None:
         words += ["--scheduler", scheduler]
+    if sweep.taken_at:
+        words += ["--at", next(iter(sweep.taken_at.values())).partition(" ")[0]]
     return shlex.join([*words, *_overrides(sweep), "--resume"])
 
 

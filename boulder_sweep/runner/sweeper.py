@@ -16,6 +16,7 @@ from boulder_sweep.errors import BoulderSweepError, ClusterLostError, Computatio
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner.assembly import COMMIT_EVERY_S
 from boulder_sweep.runner.backends import available_cores, check_backend, check_count, check_jobs, start_failure
@@ -115,7 +116,7 @@ def run(
     begun = time.monotonic()
     out = location_of(out)
     _check_arguments(sweep, jobs, rows_per_part, commit_every_s, progress)
-    sweep.require_values()
+    sweep = at_values(sweep)
     check_backend(backend, scheduler)
     again = resume_command or default_resume_command(sweep, out, jobs, backend, scheduler)
     jobs = jobs or (1 if sweep.n_designs == 1 else available_cores())
@@ -204,7 +205,7 @@ def estimate(
         The number of jobs is not a whole number, or out of range.
     """
     check_jobs(jobs)
-    sweep.require_values()
+    sweep = at_values(sweep)
     accuracy = accuracy_of(sweep)
     evaluation = evaluation_of(sweep, accuracy, simulate)
     folder = None if out is None else location_of(out)

@@ -13,9 +13,9 @@ import numpy as np
 
 from boulder_sweep.designs import DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
-from boulder_sweep.settings.fields import BY_NAME, INPUTS
+from boulder_sweep.settings.fields import INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
-from boulder_sweep.settings.problems import Problem, SettingsError
+from boulder_sweep.settings.problems import Problem
 
 MAX_LISTED = 1000
 """Longest axis that `Sweep.resolved` lists value by value."""
@@ -101,6 +101,9 @@ class Sweep:
         Uncertain inputs by column name; their means are the values in `constants` and `axes`.
     correlation : float
         Correlation of friction angle and subgrade reaction, where both are uncertain.
+    taken_at : dict of str to str
+        What uncertain inputs were taken at where one value was needed, by column name: ``mean``, or a quantile and the
+        side of the distribution, such as ``p5 low``; see `boulder_sweep.at_values`.
     partial_factor : float
         Partial factor on tan(friction angle). The friction angles in `constants`, `axes` and `table` are design
         values: the factor has been applied to them.
@@ -120,6 +123,7 @@ class Sweep:
     solver: SolverSettings = field(default_factory=SolverSettings)
     distributions: dict[str, Distribution | SetDistributions] = field(default_factory=dict)
     correlation: float = 0.0
+    taken_at: dict[str, str] = field(default_factory=dict)
     partial_factor: float = 1.0
     notes: tuple[Problem, ...] = ()
     overrides: tuple[str, ...] = ()
@@ -158,20 +162,6 @@ class Sweep:
         """
         return self.plan.block(start, stop)
 
-    def require_values(self) -> None:
-        """Refuse uncertain inputs, for everything that computes one outcome per design.
-
-        Raises
-        ------
-        SettingsError
-            An input has a distribution.
-        """
-        takers = "'sweep uncertainty' and 'sweep need --probability'"
-        message = f"has a distribution, which only {takers} take; give a value, a list or a range"
-        if self.distributions:
-            positions = ((name, spread.position) for name, spread in self.distributions.items())
-            raise SettingsError(Problem(p.file, p.line, p.column, BY_NAME[name].path, message) for name, p in positions)
-
     def resolved(self) -> dict[str, Any]:
         """Return everything that decides the results as plain data: defaults filled in, units in the names.
 
@@ -193,6 +183,8 @@ class Sweep:
         if self.distributions:
             spreads = {name: spread.to_dict() for name, spread in self.distributions.items()}
             more = {"distributions": spreads, "correlation": self.correlation}
+        if self.taken_at:
+            more = {"taken_at": dict(self.taken_at)}
         if self.plan.labels:
             more["labels"] = {name: _texts_listed(label) for name, label in self.plan.labels.items()}
         if self.partial_factor != 1.0:

@@ -24,6 +24,7 @@ from boulder_sweep.errors import NothingToMeasureError
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.pilot import sampled_designs
+from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import pool
 from boulder_sweep.settings.model import UNLOADINGS
@@ -294,7 +295,7 @@ def measure(
         No design of the sample can be computed, or its soil is not elastic.
     """
     begun = time.monotonic()
-    sweep.require_values()
+    sweep = at_values(sweep)
     if sweep.model.unloading != UNLOADINGS[0]:
         raise NothingToMeasureError(
             f"{sweep.name}: model.unloading is {sweep.model.unloading}, and the methods that are compared here are "

@@ -20,7 +20,8 @@ from boulder_sweep.answers.need_printing import need_lines
 from boulder_sweep.answers.trials import Judges, judges_of
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.settings import SettingsError, Sweep, load_text
+from boulder_sweep.judge.quantiles import at_values
+from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import DEPTH, passes, random_designs, site
 
@@ -317,9 +318,9 @@ def test_a_partial_factor_on_the_angle_that_is_asked_for_is_refused() -> None:
         need(factored, "friction_angle")
 
 
-def test_distributions_are_refused() -> None:
-    with pytest.raises(SettingsError, match="distribution"):
-        need(site(friction="{mean: 38 deg, sd: 3 deg}"))
+def test_distributions_are_taken_at_their_unfavourable_quantiles() -> None:
+    uncertain = site(friction="{mean: 38 deg, sd: 3 deg}")
+    assert need(uncertain).arrow.equals(need(at_values(uncertain)).arrow)
 
 
 def test_tolerance_makes_the_lattice() -> None:

@@ -16,7 +16,8 @@ from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.settings import SettingsError, Sweep, load
+from boulder_sweep.judge.quantiles import at_values
+from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import random_designs, site
 
@@ -136,6 +137,6 @@ def test_threads_do_not_matter() -> None:
     assert one.arrow.equals(two.arrow)
 
 
-def test_distributions_are_refused() -> None:
-    with pytest.raises(SettingsError, match="distribution"):
-        reserves(site(friction="{mean: 38 deg, sd: 3 deg}"))
+def test_distributions_are_taken_at_their_unfavourable_quantiles() -> None:
+    uncertain = site(friction="{mean: 38 deg, sd: 3 deg}")
+    assert reserves(uncertain).arrow.equals(reserves(at_values(uncertain)).arrow)

@@ -10,10 +10,11 @@ from scipy import stats
 from scipy.special import ndtr
 
 import boulder_sweep
-from boulder_sweep.answers.spread import Spread, values_of
+from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import uncertain_rows
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.quantiles import values_of
 from boulder_sweep.settings import SettingsError, load_text
 from boulder_sweep.settings.distributions import Distribution
 from tests.answers.designs import site

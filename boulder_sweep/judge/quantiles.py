@@ -1,0 +1,195 @@
+"""Files with uncertain inputs where one value of each is needed: an unfavourable quantile, or the mean.
+
+Which end of a distribution is unfavourable is found by simulation: designs spread over the sweep are judged with an
+input at its low and at its high quantile, all others at their medians, and that end is taken at which more of them are
+worse off.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.accuracy import Accuracy, steps_of
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.pilot import sampled_rows
+from boulder_sweep.settings.distributions import SetDistributions
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.problems import shorten
+
+if TYPE_CHECKING:
+    from boulder_sweep.judge.judged import Judged
+    from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.distributions import Distribution
+
+MEAN, UNFAVOURABLE = "mean", "p5"
+"""What ``--at`` may be beside other percentages, and its default."""
+DESIGNS = 64
+"""Most designs that decide which end of a distribution is unfavourable."""
+LOW, HIGH = "low", "high"
+
+
+def at_values(sweep: Sweep, at: str | None = None) -> Sweep:
+    """Return a sweep in which every uncertain input has one value; one without such inputs as it is.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    at
+        ``p5``, the default: the quantile of 5 % on the unfavourable side of each input, found by simulation; ``p10``
+        and so on up to ``p50``; or ``mean``, the means of the file.
+
+    Returns
+    -------
+    Sweep
+        With `Sweep.taken_at`, which says for each input what was taken. Quantiles are those of each input alone: a
+        correlation has no part in them.
+
+    Raises
+    ------
+    QuestionError
+        `at` is none of these, or is given and no input has a distribution.
+    """
+    if not sweep.distributions:
+        if at is not None:
+            raise QuestionError(f"{sweep.name}: no input has a distribution, so there is nothing to take at {at}")
+        return sweep
+    at = UNFAVOURABLE if at is None else at
+    if at == MEAN:
+        return _with_quantiles(sweep, {}, dict.fromkeys(sweep.distributions, MEAN))
+    share = _share(at)
+    sides = {name: _unfavourable(sweep, name, share) for name in sweep.distributions}
+    normals = {name: _normal(share, side) for name, side in sides.items()}
+    return _with_quantiles(sweep, normals, {name: f"{at} {side}" for name, side in sides.items()})
+
+
+def _share(at: str) -> float:
+    """Read ``p5`` as 0.05."""
+    found = re.fullmatch(r"p(\d{1,2}(?:\.\d+)?)", at)
+    if found is None or not 0.0 < float(found[1]) <= 50.0:
+        raise QuestionError(f"'{shorten(at)}' is not mean, p5 or another quantile from above p0 to p50")
+    return float(found[1]) / 100.0
+
+
+def _normal(share: float, side: str) -> float:
+    """Return the standard normal number of a quantile."""
+    from scipy.special import ndtri  # a quarter of a second, which files without distributions need not wait
+
+    return float(ndtri(share)) if side == LOW else -float(ndtri(share))
+
+
+def _unfavourable(sweep: Sweep, name: str, share: float) -> str:
+    """Return the end of the distribution of an input at which more designs are worse off."""
+    rows = sampled_rows(sweep, DESIGNS)
+    ends = []
+    for side in (LOW, HIGH):
+        normals = dict.fromkeys(sweep.distributions, 0.0) | {name: _normal(share, side)}
+        taken = _with_quantiles(sweep, normals, {})
+        accuracy = Accuracy("fast", steps_of(taken)["fast"], error_estimate=False)
+        evaluation = dataclasses.replace(evaluation_of(taken, accuracy, proved=False), second_opinion=())
+        ends.append(evaluation(taken.plan.selection(rows)))
+    (low, low_turned), (high, high_turned) = map(_reserves, ends)
+    # Where the verdict has no margin, as of a boulder that hardly overlaps the bumper, the rotation tells.
+    worse_low = (low < high) | ((low == high) & (low_turned > high_turned))
+    worse_high = (high < low) | ((low == high) & (high_turned > low_turned))
+    return HIGH if worse_high.sum() > worse_low.sum() else LOW
+
+
+def _reserves(judged: Judged) -> tuple[np.ndarray, np.ndarray]:
+    """Return what designs have left before a limit, below -1 where they overturn, and how far they turn [deg].
+
+    The reserve is the margin, for designs that overturn the less the earlier, and 0 where there is neither.
+    """
+    margin, time = judged["margin"], judged["time_to_limit_s"]
+    overturned = np.where(np.isnan(time), 0.0, -1.0 - 1.0 / np.maximum(time, 1e-3))
+    return np.where(np.isnan(margin), overturned, margin), np.nan_to_num(judged["max_rotation_deg"], nan=0.0)
+
+
+def _with_quantiles(sweep: Sweep, normals: dict[str, float], taken_at: dict[str, str]) -> Sweep:
+    """Return a sweep with inputs at the quantiles of standard normal numbers, the others at their means."""
+
+    def at(name: str, means: np.ndarray) -> np.ndarray:
+        spread = sweep.distributions.get(name)
+        if spread is None or name not in normals:
+            return means
+        if not isinstance(spread, SetDistributions):
+            return values_of(spread, means, np.full(len(means), normals[name]))
+        z = np.array([normals[name]])
+        each = zip(spread.each, means[:, None], strict=True)
+        return np.concatenate([mean if own is None else values_of(own, mean, z) for own, mean in each])
+
+    constants = {name: float(at(name, np.array([value]))[0]) for name, value in sweep.constants.items()}
+    axes = []
+    for axis in sweep.axes:
+        if axis.sets:
+            axes.append(dataclasses.replace(axis, sets={name: at(name, values) for name, values in axis.sets.items()}))
+        else:
+            axes.append(dataclasses.replace(axis, values=at(axis.name, axis.values)))
+    return dataclasses.replace(
+        sweep, constants=constants, axes=tuple(axes), distributions={}, correlation=0.0, taken_at=taken_at
+    )
+
+
+def words_of(sweep: Sweep) -> str:
+    """Return the values that uncertain inputs were taken at, in words; empty where there were none."""
+    columns = sweep.constants | {name: values for axis in sweep.axes for name, values in axis.columns.items()}
+    parts = []
+    for name, how in sweep.taken_at.items():
+        values, unit = np.unique(columns[name]), BY_NAME[name].unit
+        ends = f"{values[0]:.4g}" if len(values) == 1 else f"{values[0]:.4g} to {values[-1]:.4g}"
+        parts.append(f"{BY_NAME[name].path} {ends}{'' if unit == '1' else f' {unit}'} ({how})")
+    return "uncertain inputs taken at one value each: " + ", ".join(parts) if parts else ""
+
+
+def values_of(
+    spread: Distribution, mean: np.ndarray, z: np.ndarray, ends: tuple[np.ndarray, np.ndarray] | None = None
+) -> np.ndarray:
+    """Return the quantiles of a distribution at standard normal numbers.
+
+    Parameters
+    ----------
+    spread
+        The distribution.
+    mean
+        Means, before truncation where that is possible, shape (n,).
+    z
+        Standard normal numbers, shape (n,).
+    ends
+        Ends in place of its own, shape (n,) each, of a distribution that has moved; see `moving`.
+    """
+    from scipy.special import betainccinv, betaincinv, ndtr
+
+    low, high = (np.broadcast_to(end, mean.shape) for end in ends or (spread.low, spread.high))
+    if spread.kind == "normal":
+        return _truncated(mean, spread.deviation(mean), low, high, z)
+    if spread.kind == "lognormal":
+        variance = np.log1p((spread.deviation(mean) / mean) ** 2)
+        with np.errstate(divide="ignore"):
+            low, high = np.log(low), np.log(high)
+        return np.exp(_truncated(np.log(mean) - 0.5 * variance, np.sqrt(variance), low, high, z))
+    width = high - low
+    if spread.kind == "uniform":
+        return low + width * ndtr(z)
+    if spread.kind == "triangular":
+        share = (spread.own_mode - spread.low) / (spread.high - spread.low)
+        rising, falling = np.sqrt(share * ndtr(z)), 1.0 - np.sqrt((1.0 - share) * ndtr(-z))
+        return low + width * np.where(ndtr(z) < share, rising, falling)
+    at, deviation = (mean - low) / width, spread.deviation(mean) / width
+    total = at * (1.0 - at) / deviation**2 - 1.0
+    a, b = at * total, (1.0 - at) * total
+    return low + width * np.where(z < 0.0, betaincinv(a, b, ndtr(z)), betainccinv(a, b, ndtr(-z)))
+
+
+def _truncated(mean: np.ndarray, deviation: np.ndarray, low: np.ndarray, high: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Truncated normal distribution; each half is computed from its own tail, so that no digits are lost."""
+    from scipy.special import ndtr, ndtri
+
+    below, above = (low - mean) / deviation, (high - mean) / deviation
+    lower = ndtri(ndtr(below) + ndtr(z) * (ndtr(above) - ndtr(below)))
+    upper = -ndtri(ndtr(-above) + ndtr(-z) * (ndtr(-below) - ndtr(-above)))
+    return np.clip(mean + deviation * np.where(z < 0.0, lower, upper), low, high)
