@@ -24,7 +24,7 @@ WAY_OUT = {
     "foot": "soil that presses on a rounded foot also lifts, which is not modelled: bed it in concrete, cut it flat, "
     "or bury it deeper and test",
     "shape": "the boulder fills less than 95 % of the box of its length, width and height, and no box of the same mass "
-    "stands for it: choose a boulder more like a box",
+    "stands for it: give its profile (boulder.profile or boulder.taper)",
 }
 """What to do about the reasons that more accuracy or a longer simulation does not resolve."""
 GRADES = ("robust", "sensitive", "open")

@@ -26,9 +26,10 @@ import numpy as np
 
 from boulder_kernels import DesignTable
 from boulder_kernels.design import G
-from boulder_kernels.layered import LayeredTable
+from boulder_kernels.layered import LayeredTable, OutlinedTable
 from boulder_sweep import elementary
 from boulder_sweep.settings.model import WATER_KG_M3, Ground
+from boulder_sweep.settings.shape import Shape
 
 
 def passive_coefficient(phi: np.ndarray) -> np.ndarray:
@@ -104,7 +105,7 @@ def slope_factor(phi: np.ndarray, slope: float) -> np.ndarray:
     return ((1.0 - sin) / falling) ** 2
 
 
-def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0) -> Any:
+def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0, shape: Shape | None = None) -> Any:
     """Return n designs with the ultimate resistance of a law in the soil as it lies.
 
     Parameters
@@ -117,12 +118,16 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0)
         The rest.
     turned
         Change of the friction angles of the deeper layers [rad].
+    shape
+        Shape of the boulders; boxes by default.
 
     Returns
     -------
-    DesignTable or LayeredTable
-        The former where the resistance is proportional to depth.
+    DesignTable, LayeredTable or OutlinedTable
+        The first where the resistance is proportional to depth, the last where boulders are no boxes.
     """
+    if shape is not None and not shape.is_box:
+        return beside_outlines(with_soil(table, law, ground, turned), law, shape)
     if ground.is_usual:
         return with_law(table, law)
     slope = np.radians(ground.slope_deg)
@@ -168,6 +173,56 @@ def layers_of(table: DesignTable, law: str, ground: Ground, turned: float = 0.0)
     return found
 
 
+def outlines_of(table: Any, shape: Shape) -> np.ndarray:
+    """Return the outlines of n boulders of a shape as `boulder_kernels.outline` takes them, shape (n, P, 4)."""
+    sides = np.stack([table.H, table.W, table.L, table.L], axis=1)
+    points = np.array([(point.height, point.width, point.near, point.far) for point in shape.points])
+    return np.ascontiguousarray(points * sides[:, None, :])
+
+
+SLICES = 16
+"""Slices of the buried depth in which the law that depends on the width takes that of their middle."""
+
+
+def beside_outlines(table: Any, law: str, shape: Shape) -> OutlinedTable:
+    """Return n designs in some soil with boulders of a shape (Eq 145).
+
+    A law that depends on the width takes the local one, slice by slice (`SLICES`): the pressure is no line along the
+    depth then. All others leave the pressure as it is beside a box.
+    """
+    plain_table = plain(table)
+    if isinstance(table, LayeredTable):
+        layers = table.layers
+    else:
+        slope = kp_squared(table) * table.rho_s * G
+        layers = np.zeros((table.d.size, 1, 6))
+        layers[:, 0] = np.stack(
+            [np.full_like(slope, np.inf), table.rho_s, table.phi, table.beta, 0.0 * slope, slope], axis=1
+        )
+    if law == "width_capped":
+        layers = _by_local_width(plain_table, layers, shape)
+    return OutlinedTable(*plain_table, np.ascontiguousarray(layers), outlines_of(plain_table, shape))
+
+
+def _by_local_width(table: DesignTable, layers: np.ndarray, shape: Shape) -> np.ndarray:
+    """Return layers cut into slices, with the law that depends on the width by that of the middle of each."""
+    n, count = table.d.size, layers.shape[1]
+    cuts = table.d[:, None] * np.arange(1, SLICES) / SLICES
+    bottoms = np.sort(np.concatenate([layers[:, :, 0], cuts], axis=1), axis=1)
+    tops = np.concatenate([np.zeros((n, 1)), bottoms[:, :-1]], axis=1)
+    own = (layers[:, None, :, 0] <= tops[:, :, None]).sum(axis=2).clip(max=count - 1)
+    found = np.take_along_axis(layers, own[:, :, None], axis=1)
+    found[:, :, 0] = bottoms
+    middle = 0.5 * (np.minimum(tops, table.d[:, None]) + np.minimum(bottoms, table.d[:, None]))
+    heights, widths = np.array([(point.height, point.width) for point in shape.points]).T
+    share = np.interp((table.d[:, None] - middle) / table.H[:, None], heights, widths)
+    for m in range(found.shape[1]):
+        here = table._replace(phi=found[:, m, 2])
+        factor = width_capped(here._replace(W=table.W * share[:, m])) / width_capped(here)
+        found[:, m, 4:] *= factor[:, None]
+    return found
+
+
 def plain(table: Any) -> DesignTable:
-    """Return designs without the layers that they may have."""
+    """Return designs without the layers and outlines that they may have."""
     return DesignTable(*table[: len(DesignTable._fields)])

@@ -235,7 +235,8 @@ class Boulders:
     def mass(self, index: np.ndarray, places: np.ndarray, others: Sides) -> np.ndarray:
         """Mass of boulders [kg]."""
         sides = self.sides(places, others)
-        return np.prod([sides[side] for side in SIDES], axis=0) * self.rows["boulder_density_kg_m3"][index]
+        solid = np.prod([sides[side] for side in SIDES], axis=0) * self.rows["boulder_density_kg_m3"][index]
+        return self.asked.sweep.model.shape.filled * solid
 
     def certified(self, others: Sides) -> _SizedBrackets:
         """Return what the search finds for other sides and depths, one for each row, with the sweep's accuracy."""

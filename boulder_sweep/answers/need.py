@@ -224,8 +224,8 @@ def need(
         variants = tuple(judges_of(one, least_margin, compared=True) for one in every_reading(sweep))
     if robust and not can_be_asked(sweep):
         raise QuestionError(
-            "--robust: second opinions know rock of given density, elastic, dry, level, uniform soil without cohesion, "
-            "one spring of the vehicle and corrected readings only"
+            "--robust: second opinions know boxes of rock of given density, elastic, dry, level, uniform soil without "
+            "cohesion, one spring of the vehicle and corrected readings only"
         )
     if robust and drawn:
         raise QuestionError("--robust and --probability cannot be used together")
@@ -325,7 +325,9 @@ def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: in
 
     answers = [question.answered(start, stop) for question in asked]
     names = [question.sweep.model.preset for question in asked]
-    return answer_table(asked[0].key, start, answers, names), sum(answer.simulated for answer in answers)
+    return answer_table(asked[0].key, start, answers, names, asked[0].sweep.model.shape.filled), sum(
+        answer.simulated for answer in answers
+    )
 
 
 def _metadata(asked: Question | LightestQuestion, least_margin: float) -> dict[bytes, bytes]:

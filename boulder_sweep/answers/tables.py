@@ -38,10 +38,12 @@ if TYPE_CHECKING:
     from boulder_sweep.judge.judged import Judged
 
 _IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
-MASS = ("boulder_mass_kg", "kg", "mass of the boulder, L W H times its density")
+MASS = ("boulder_mass_kg", "kg", "mass of the boulder, its volume times its density")
 
 
-def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Sequence[str]) -> pa.Table:
+def answer_table(
+    key: Key, start: int, answers: Sequence[Answers], readings: Sequence[str], filled: float = 1.0
+) -> pa.Table:
     """Return answers as a table: the inputs, the answer and its bracket, the outcome at the answer.
 
     Parameters
@@ -54,6 +56,8 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
         Answers with the readings of the sweep, then with others.
     readings
         Names of the readings, in the same order.
+    filled
+        Volume of the boulders over that of the boxes of their sides.
     """
     own = answers[0]
     block = replace(own.block, start=start, stop=start + len(own.block))
@@ -73,7 +77,7 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
         ("passes_at", unit, "the same as the answer: judged as a run judges it", _numbers(own.passes)),
         ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(own.kind, WORDS)),
         ("passes_within", unit, "where it fails again further on: all stretches that pass", _words(own.stretches)),
-        *([] if BOULDER_MASS in block.columns else [(*MASS, number_array(boulder_mass(block)))]),
+        *([] if BOULDER_MASS in block.columns else [(*MASS, number_array(filled * boulder_mass(block)))]),
     ]
     for other, name in zip(answers[1:], readings[1:], strict=True):
         columns += [

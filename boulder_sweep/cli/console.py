@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 def grid_lines(sweep: Sweep) -> list[str]:
     """Return a description of the designs: how many, and over which axes."""
     count = counted(sweep.n_designs, "design")
-    words = sweep.model.ground.words
-    ground = [f"  {words}"] if words else []
+    ground = [f"  {words}" for words in (sweep.model.ground.words, sweep.model.shape.words) if words]
     if sweep.table is not None:
         carried = f", with {', '.join(sweep.table.labels)}" if sweep.table.labels else ""
         return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep), *ground]

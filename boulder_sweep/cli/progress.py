@@ -28,6 +28,8 @@ COMPILED = {
     "springs-design": ("impact.simulate", "SecondSpring", 20.0),
     "layers-table": ("lanes.run_lanes", "LayeredLanes", 20.0),
     "layers-design": ("impact.simulate", "SoilProfile", 30.0),
+    "outlines-table": ("table.run_rows", "OutlinedPieces", 30.0),
+    "outlines-design": ("impact.simulate", "OutlinedPieces", 30.0),
     "plastic-table": ("impact.simulate_motion", "Memory", 30.0),
     "plastic-design": ("impact.simulate_motion", "Memory", 30.0),
 }
@@ -42,6 +44,8 @@ def kernels_for(sweep: Sweep, of: Literal["table", "design"] = "table") -> str:
 
     if sweep.model.unloading != "elastic":
         return f"plastic-{of}"
+    if not sweep.model.shape.is_box:
+        return f"outlines-{of}"
     if not sweep.model.ground.is_proportional:
         return f"layers-{of}"
     if SECOND_SPRING in sweep.plan.columns:

@@ -22,6 +22,7 @@ from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
+from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
 from boulder_sweep.store.manifest import load as load_manifest
 from boulder_sweep.store.provenance import differences, identity, judged_by
@@ -140,7 +141,13 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     model = sweep.model
     laws = model.second_opinion if can_be_asked(sweep) else ()
     evaluation = Evaluation(
-        readings, control, limits, resistance=model.resistance, ground=model.ground, second_opinion=laws
+        readings,
+        control,
+        limits,
+        resistance=model.resistance,
+        ground=model.ground,
+        second_opinion=laws,
+        shape=model.shape,
     )
     judged = evaluation(block)
     again = part_table(block, judged, {}).to_pylist()[0]
@@ -172,6 +179,7 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
             unloading=UNLOADINGS[control.unloading],
             second_opinion=tuple(model.get("second_opinion", ())),
             foot=model["foot"],
+            profile=Shape.of_list(model.get("profile", [])).points,
             rock_assumed=model.get("rock_assumed", False),
             **ground.fields(),
         ),

@@ -20,6 +20,7 @@ from boulder_kernels.modes import (
     TURNING_BACK,
     TURNING_FORWARD,
 )
+from boulder_kernels.outlined_soil import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import PlasticConstants, at_sample
 from boulder_kernels.samples import evaluate_samples
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
@@ -227,7 +228,14 @@ def soil_profile(record: Record, sample: int, slices: int, c: Constants) -> Soil
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:
     """What layers or elements press with at ratios of the depth, per ratio [N]; of elements, those they lie in."""
     soil, front, back = c.soil, 0.0, 0.0
-    if isinstance(soil, SoilLayers):
+    if isinstance(soil, OutlinedElements):
+        soil = soil.elements
+    if isinstance(soil, OutlinedPieces):
+        at = np.searchsorted(soil.to, ratio)
+        width = soil.w_0[at] + soil.w_1[at] * ratio
+        spring, drag = soil.K[at] * ratio * width, soil.R[at] * width
+        ultimate = (soil.P_0[at] + soil.P_1[at] * ratio) * width
+    elif isinstance(soil, SoilLayers):
         at = np.searchsorted(soil.to, ratio)
         spring, ultimate, drag = soil.K[at] * ratio, soil.P_0[at] + soil.P_1[at] * ratio, soil.R[at]
     else:

@@ -22,7 +22,7 @@ from boulder_kernels import (
 )
 from boulder_kernels.design import design_at
 from boulder_kernels.embedded import step_errors
-from boulder_kernels.layered import LayeredTable
+from boulder_kernels.layered import LAYERED
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.table import (
     SAFETY,
@@ -128,11 +128,11 @@ def simulate(
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    designs = designs_of(block, None, sweep.model.resistance, sweep.model.ground)
+    designs = designs_of(block, None, sweep.model.resistance, sweep.model.ground, sweep.model.shape)
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep)).with_all_opinions()
     decided = evaluation.judged(designs)
-    layered = isinstance(designs.table, LayeredTable)
+    layered = isinstance(designs.table, LAYERED)
     control = _control(evaluation.control, how, float(decided["step_s"][0]), layered=layered)
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
+from boulder_kernels.design import Body
+from boulder_kernels.outlined_soil import body_beside, is_outlined
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
 from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY, SPENT
@@ -39,6 +41,19 @@ class Motion:
     record: Record
     outcome: Outcome
     second: SecondSpring | None = None
+
+    @property
+    def body(self) -> Body:
+        """The boulder as a rigid body."""
+        return body_beside(self.design, getattr(self.constants, "soil", None))
+
+    @property
+    def outline(self) -> np.ndarray:
+        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; of a box that of the box."""
+        soil, half = getattr(self.constants, "soil", None), 0.5 * self.design.L
+        if soil is not None and is_outlined(soil):
+            return np.asarray(soil.outline)
+        return np.array([[z, self.design.W, half, half] for z in (0.0, self.design.H)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +135,8 @@ class Trajectory:
         """Work out the whole time history from what the kernels recorded."""
         record, c = motion.record, motion.constants
         x_b, v_b, theta, omega, x_v, v_v = record.states.T
-        along, up = 0.5 * motion.design.L - c.c_x, 0.5 * motion.design.H - c.c_y
+        body = motion.body
+        along, up = body.x - c.c_x, body.y - c.c_y
         forces = forces_along(record, motion.design, motion.readings, c, motion.second)
         return cls(
             name=name,

@@ -25,6 +25,7 @@ from boulder_sweep.judge.refinement import RowStates, finer_controls
 from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS, Ground
+from boulder_sweep.settings.shape import Shape
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
@@ -78,6 +79,8 @@ class Evaluation:
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
     can_be_asked
         Whether second opinions know such designs.
+    shape
+        Shape of the boulders.
     """
 
     readings: Readings
@@ -91,6 +94,7 @@ class Evaluation:
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
     can_be_asked: bool = False
+    shape: Shape = field(default_factory=Shape)
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -106,18 +110,22 @@ class Evaluation:
             n rows, in the same order.
         """
         if not block.reasons.any:
-            return self.judged(designs_of(block, None, self.resistance, self.ground))
+            return self.judged(self.designs(block))
         codes = np.asarray(block.reasons.codes)
         computable = codes == 0
         refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1, self.columns)
         if not computable.any():
             return joined([refused])
-        both = joined([self.judged(designs_of(block, computable, self.resistance, self.ground)), refused])
+        both = joined([self.judged(self.designs(block, computable)), refused])
         # In `both` the refused rows follow the others; restore the order of the block.
         place = np.empty(len(codes), dtype=np.int64)
         place[computable] = np.arange(computable.sum())
         place[~computable] = np.arange(computable.sum(), len(codes))
         return both.rows(place)
+
+    def designs(self, block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
+        """Return the designs of a block, or some of them, as the kernels take them."""
+        return designs_of(block, rows, self.resistance, self.ground, self.shape)
 
     def judged(self, designs: Designs) -> Judged:
         """Simulate and judge designs that can be computed.
@@ -169,7 +177,7 @@ class Evaluation:
         passing = judged.verdict == PASS
         if not self.can_be_asked or not passing.any():
             return judged
-        return self._graded(judged, designs_of(block, passing, self.resistance, self.ground), SECOND_OPINIONS)
+        return self._graded(judged, self.designs(block, passing), SECOND_OPINIONS)
 
     def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
         longest = self.control.longest_horizon or LONGEST_HORIZON * self.control.horizon
@@ -217,7 +225,7 @@ class Evaluation:
         """Load or compile the kernels by simulating one step of a plain design."""
         begun = time.monotonic()
         springs = PLAIN_SPRINGS if self.second_spring else None
-        table = with_soil(PLAIN_DESIGN.table, self.resistance, self.ground)
+        table = with_soil(PLAIN_DESIGN.table, self.resistance, self.ground, shape=self.shape)
         plain = PLAIN_DESIGN._replace(table=table, springs=springs)
         self.simulate(plain.table, self.readings, self.control._replace(horizon=self.control.h), *plain.laws)
         if self.second_opinion:
@@ -270,6 +278,7 @@ def evaluation_of(
         ground=sweep.model.ground,
         second_opinion=sweep.model.second_opinion if can_be_asked(sweep) else (),
         can_be_asked=can_be_asked(sweep),
+        shape=sweep.model.shape,
     )
 
 

@@ -22,7 +22,7 @@ from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings.model import RESISTANCES
-from boulder_sweep.soils import with_soil
+from boulder_sweep.soils import plain, with_soil
 
 if TYPE_CHECKING:
     from boulder_kernels import Control
@@ -105,9 +105,9 @@ def firmness_of(sweep: Sweep) -> Firmness:
     def by(law: str, change: float = 0.0) -> DesignTable:
         """Return the designs by a law, with all friction angles changed [rad]."""
         phi = np.maximum(given.phi + change, least)
-        return with_soil(given._replace(phi=phi), law, ground, change)
+        return with_soil(given._replace(phi=phi), law, ground, change, sweep.model.shape)
 
-    given, ground = plain_designs(sweep, count).table, sweep.model.ground
+    given, ground = plain(plain_designs(sweep, count).table), sweep.model.ground
     least = math.radians(LEAST_ANGLE_DEG)
     table = designs.table
     found = verdicts(table, readings)

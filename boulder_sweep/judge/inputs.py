@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_kernels import DesignTable, SecondSprings
+from boulder_kernels.layered import OutlinedTable
+from boulder_kernels.outline import FAR, HEIGHT, NEAR
 from boulder_sweep.columns import BOULDER_MASS
-from boulder_sweep.designs import SECOND_SPRING, solidity_of
+from boulder_sweep.designs import LEAST_SOLIDITY, SECOND_SPRING, solidity_of
 from boulder_sweep.settings.model import RESISTANCES, Ground
+from boulder_sweep.settings.shape import Shape
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
@@ -46,7 +49,9 @@ class Designs(NamedTuple):
     springs: SecondSprings | None = None
     """Second springs of the vehicles, SI, where the file gives them."""
     fills: np.ndarray | None = None
-    """`solidity` where the file gives masses; None of boxes."""
+    """`solidity` where the file gives masses or a shape; None of boxes."""
+    rocks: np.ndarray | None = None
+    """Density of the rock where the file gives masses, so that it is not that of what is simulated [kg/m^3]."""
 
     @property
     def size(self) -> int:
@@ -60,12 +65,28 @@ class Designs(NamedTuple):
         if springs is not None:
             springs = SecondSprings(*(np.ascontiguousarray(column[chosen]) for column in springs))
         fills = None if self.fills is None else self.fills[chosen]
-        return Designs(table, self.bed_offset[chosen], springs, fills)
+        rocks = None if self.rocks is None else self.rocks[chosen]
+        return Designs(table, self.bed_offset[chosen], springs, fills, rocks)
 
     @property
     def solidity(self) -> np.ndarray:
         """Volume of each boulder over that of the box of its sides, shape (n,)."""
         return np.ones(self.size) if self.fills is None else self.fills
+
+    @property
+    def length(self) -> np.ndarray:
+        """Distance from where the vehicle strikes each boulder to its far face, where that is farthest [m], (n,)."""
+        if not isinstance(self.table, OutlinedTable):
+            return self.table.L
+        table, outlines = self.table, self.table.outlines
+        blow = np.minimum(table.d + table.e, table.H)
+        near = [np.interp(z, one[:, HEIGHT], one[:, NEAR]) for z, one in zip(blow, outlines, strict=True)]
+        return np.array(near) + outlines[:, :, FAR].max(axis=1)
+
+    @property
+    def has_known_shape(self) -> np.ndarray:
+        """Whether what is simulated has the shape of each boulder, bool, shape (n,)."""
+        return (self.solidity >= LEAST_SOLIDITY) | isinstance(self.table, OutlinedTable)
 
     @property
     def laws(self) -> tuple[SecondSprings, ...]:
@@ -74,7 +95,11 @@ class Designs(NamedTuple):
 
 
 def designs_of(
-    block: DesignBlock, rows: np.ndarray | None = None, resistance: str = RESISTANCES[0], ground: Ground | None = None
+    block: DesignBlock,
+    rows: np.ndarray | None = None,
+    resistance: str = RESISTANCES[0],
+    ground: Ground | None = None,
+    shape: Shape | None = None,
 ) -> Designs:
     """Return the designs of a block.
 
@@ -88,6 +113,8 @@ def designs_of(
         Law of the ultimate resistance of the soil.
     ground
         Layers, water, cohesion and slope of the soil; none by default.
+    shape
+        Shape of the boulders; boxes by default.
     """
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
@@ -96,14 +123,18 @@ def designs_of(
         springs = SecondSprings(
             _values(block, SECOND_SPRING, rows), _values(block, "vehicle_second_spring_from_m", rows)
         )
-    fills = None
+    fills, rocks, shape = None, None, shape or Shape()
+    if not shape.is_box:
+        fills = np.full(len(columns["L"]), shape.filled)
     if BOULDER_MASS in block.columns:
         mass, sides = _values(block, BOULDER_MASS, rows), (columns["L"], columns["W"], columns["H"])
-        fills = solidity_of(mass, columns["rho_b"], *sides)
-        # The box has the mass of the boulder.
-        columns["rho_b"] = mass / (sides[0] * sides[1] * sides[2])
-    table = with_soil(DesignTable(**columns), resistance, ground or Ground())
-    return Designs(table, _values(block, "bed_offset_m", rows), springs, fills)
+        rocks = columns["rho_b"]
+        fills = solidity_of(mass, rocks, *sides)
+        # What is simulated has the mass of the boulder.
+        volume = sides[0] * sides[1] * sides[2]
+        columns["rho_b"] = mass / (volume if shape.is_box else volume * shape.filled)
+    table = with_soil(DesignTable(**columns), resistance, ground or Ground(), shape=shape)
+    return Designs(table, _values(block, "bed_offset_m", rows), springs, fills, rocks)
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

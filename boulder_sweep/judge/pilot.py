@@ -159,7 +159,7 @@ def sampled_designs(sweep: Sweep, count: int) -> Designs:
 
 def plain_designs(sweep: Sweep, count: int) -> Designs:
     """Return the same designs in the soil that their inputs describe, by the paper's law of the resistance."""
-    return designs_of(*_sampled(sweep, count))
+    return designs_of(*_sampled(sweep, count), shape=sweep.model.shape)
 
 
 def _sampled(sweep: Sweep, count: int) -> tuple[DesignBlock, np.ndarray]:

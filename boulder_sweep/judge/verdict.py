@@ -7,8 +7,8 @@ for the page of a report:
 2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
 3. ``fail / overturns``: the rotation reached its limit. A small penetration does not change that.
 4. ``fail / penetration``: the truck's cargo bed ends further behind the boulder than its rating allows.
-5. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts.
-6. ``undecided / shape``: by its mass the boulder fills less than 95 % of the box of its sides.
+5. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts, or small.
+6. ``undecided / shape``: by its mass the boulder fills less than 95 % of the box of its sides, and has no profile.
 7. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
 8. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
 9. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
@@ -34,7 +34,6 @@ import boulder_kernels.verdict as verdicts
 from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
 from boulder_kernels.verdict import RULINGS, VerdictLimits, write_rulings
 from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, Rows
-from boulder_sweep.designs import LEAST_SOLIDITY
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import (
     CRUSH,
@@ -55,7 +54,7 @@ from boulder_sweep.judge.judged import (
 )
 from boulder_sweep.judge.robustness import grades_without_asking, is_studied
 from boulder_sweep.judge.validity import TESTED_ROTATION_DEG, flagged
-from boulder_sweep.settings.model import FEET, Criterion, Model
+from boulder_sweep.settings.model import Criterion, Model
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -202,8 +201,8 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     status = np.asarray(outcomes.status)
     table = designs.table
     flat = np.full(designs.size, float(limits.flat_foot))
-    known = (designs.solidity >= LEAST_SOLIDITY).astype(float)
-    sizes = np.stack([table.L, table.H, table.d, table.e_bumper, designs.bed_offset, flat, known])
+    known = designs.has_known_shape.astype(float)
+    sizes = np.stack([designs.length, table.H, table.d, table.e_bumper, designs.bed_offset, flat, known])
     rulings = np.empty((len(RULINGS), len(status)))
     given = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1 : len(OutcomeTable._fields)]))
     if not limits.guarded:
@@ -265,7 +264,7 @@ def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
         tested_rotation=math.radians(tested),
         studied=is_studied(sweep),
         proved=proved,
-        flat_foot=sweep.model.foot == FEET[0],
+        flat_foot=sweep.model.stands_flat,
     )
 
 

@@ -16,14 +16,28 @@ from boulder_sweep.settings.model import (
     RESISTANCES,
     SECOND_OPINIONS,
     SWITCHES,
+    Bound,
     Layer,
     ReadingChoice,
 )
 from boulder_sweep.settings.numbers import NumberError, read_count, split_number
 from boulder_sweep.settings.problems import did_you_mean, shorten
+from boulder_sweep.settings.shape import ProfilePoint, Shape
 from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 
 MOST_LAYERS = 100
+MOST_POINTS = 100
+_REACH = Bound(0.0, 20.0, "a length")
+PROFILE_FIELDS = {
+    key: Field("boulder.profile", key, key, "m", meaning, _REACH)
+    for key, meaning in (
+        ("height", "height over the foot"),
+        ("width", "width at that height"),
+        ("length", "length at that height"),
+        ("near", "in place of length: reach towards the vehicle from the middle of the foot"),
+        ("far", "in place of length: reach away from the vehicle"),
+    )
+}
 LAYER_FIELDS = {
     field.key: field
     for field in (
@@ -87,6 +101,98 @@ def _read_layer(node: Node) -> Layer:
     if mistakes:
         raise LeafError(mistakes)
     return Layer(**values)
+
+
+def read_profile(node: Node) -> tuple[ProfilePoint, ...]:
+    """Read ``[{height: 0 m, width: 1.2 m, length: 1.1 m}, ...]``, or ``near`` and ``far`` in place of ``length``.
+
+    Returns
+    -------
+    tuple of ProfilePoint
+        In metres; see `shares_of`.
+
+    Raises
+    ------
+    LeafError
+        With every mistake in the list.
+    """
+    keys = ", ".join(PROFILE_FIELDS)
+    if not isinstance(node, Sequence) or not 2 <= len(node.items) <= MOST_POINTS or node.unit is not None:
+        raise _wrong(
+            node, f"must be a list of 2 to {MOST_POINTS} points from the foot up, each a block of keys: {keys}"
+        )
+    points: list[ProfilePoint] = []
+    mistakes: list[Mistake] = []
+    for item in node.items:
+        try:
+            point = _read_point(item)
+        except LeafError as error:
+            mistakes.extend(error.mistakes)
+            continue
+        if not points and not mistakes and point.height != 0.0:
+            mistakes.append(Mistake(item.position, f"the first point is the foot, at 0 m, not {point.height:g} m"))
+        if points and point.height <= points[-1].height:
+            message = f"is {point.height:g} m high, not above the point before it ({points[-1].height:g} m)"
+            mistakes.append(Mistake(item.position, message))
+        points.append(point)
+    if (
+        not mistakes
+        and not max(point.width for point in points) * max(point.near + point.far for point in points) > 0.0
+    ):
+        mistakes.append(Mistake(node.position, "has neither width nor length"))
+    if not mistakes and not Shape(shares_of(tuple(points))).stands_up:
+        message = "its centre of mass does not lie over its foot: it would fall over by itself"
+        mistakes.append(Mistake(node.position, message))
+    if mistakes:
+        raise LeafError(mistakes)
+    return tuple(points)
+
+
+def _read_point(node: Node) -> ProfilePoint:
+    """Read one point of a profile."""
+    keys = ", ".join(PROFILE_FIELDS)
+    if not isinstance(node, Mapping):
+        raise _wrong(node, f"a point must be a block of keys: {keys}")
+    values: dict[str, float] = {}
+    mistakes: list[Mistake] = []
+    for entry in node:
+        field = PROFILE_FIELDS.get(entry.key)
+        if field is None:
+            hint = did_you_mean(entry.key, tuple(PROFILE_FIELDS))
+            message = f"'{shorten(entry.key)}' is not a key of a point ({keys}){hint}"
+            mistakes.append(Mistake(entry.position, message))
+            continue
+        try:
+            values[entry.key] = read_single(entry.value, field)
+        except LeafError as error:
+            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
+    given = set(node.entries)
+    if "length" in given and given & {"near", "far"}:
+        mistakes.append(Mistake(node.position, "give length, or near and far, not both"))
+    wanted = ("height", "width", *(("near", "far") if given & {"near", "far"} else ("length",)))
+    missing = [key for key in wanted if key not in given]
+    if missing:
+        mistakes.append(Mistake(node.position, f"the point lacks {', '.join(missing)}"))
+    if mistakes:
+        raise LeafError(mistakes)
+    half = 0.5 * values.get("length", 0.0)
+    return ProfilePoint(values["height"], values["width"], values.get("near", half), values.get("far", half))
+
+
+def sides_of(points: tuple[ProfilePoint, ...]) -> dict[str, float]:
+    """Return length, width and height [m] of the box around a profile in metres, by the keys of the file."""
+    return {
+        "length": max(point.near for point in points) + max(point.far for point in points),
+        "width": max(point.width for point in points),
+        "height": points[-1].height,
+    }
+
+
+def shares_of(points: tuple[ProfilePoint, ...]) -> tuple[ProfilePoint, ...]:
+    """Return a profile in metres as shares of the box around it."""
+    sides = sides_of(points)
+    L, W, H = sides["length"], sides["width"], sides["height"]
+    return tuple(ProfilePoint(one.height / H, one.width / W, one.near / L, one.far / L) for one in points)
 
 
 def read_setting(node: Node, field: Field) -> Any:
@@ -201,6 +307,7 @@ _READERS: dict[str, Callable[[Node], Any]] = {
     "readings": _read_readings,
     "soil_elements": _read_soil,
     "layers": read_layers,
+    "profile": read_profile,
     "accuracy": _read_accuracy,
     "second_opinion": _read_second_opinion,
 }

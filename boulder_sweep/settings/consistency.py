@@ -9,7 +9,8 @@ from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import MOST_SOLIDITY
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
-from boulder_sweep.settings.model import ROCK_KG_M3, WATER_KG_M3, Layer, SolverSettings
+from boulder_sweep.settings.model import ROCK_KG_M3, UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
+from boulder_sweep.settings.shape import Shape
 
 SLIDES = "or the ground slides"
 """What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""
@@ -58,6 +59,7 @@ def check_pairs(entries: Entries) -> None:
         entries.problems.add(entries.key_position("vehicle", key), f"vehicle.{key}", message)
     _check_impact_height(entries, bumper)
     _check_second_spring(entries)
+    _check_shape(entries)
     _check_mass(entries)
     _check_solver(entries)
     _check_uncertain(entries)
@@ -93,6 +95,19 @@ def _check_second_spring(entries: Entries) -> None:
         entries.problems.add(entries.key_position("vehicle", both[0].key), both[0].path, message)
 
 
+def shape_in(entries: Entries) -> Shape:
+    """Return the shape of the boulders, as far as it can be read."""
+    return Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
+
+
+def _check_shape(entries: Entries) -> None:
+    """Report plastic soil beside a boulder that is no box."""
+    key = "profile" if "profile" in entries.settings else "taper"
+    if not shape_in(entries).is_box and entries.settings.get("unloading", UNLOADINGS[0]) != UNLOADINGS[0]:
+        message = f"plastic soil knows boxes only; remove boulder.{key} or model.unloading"
+        entries.problems.add(entries.key_position("boulder", key), f"boulder.{key}", message)
+
+
 def _check_mass(entries: Entries) -> None:
     """Report boulders that are all heavier than solid boxes of their size."""
     density = entries.values("boulder_density_kg_m3")
@@ -102,10 +117,12 @@ def _check_mass(entries: Entries) -> None:
         return
     assumed = "" if len(density) else " assumed for it (give boulder.density)"
     rock = float(density.max()) if len(density) else ROCK_KG_M3
-    box = rock * math.prod(float(side.max()) for side in sides)
+    shape = shape_in(entries)
+    box = rock * math.prod(float(side.max()) for side in sides) * shape.filled
+    solid = "a solid box of this size" if shape.is_box else "solid rock of this profile"
     if mass.min() > MOST_SOLIDITY * box:
         message = (
-            f"{mass.min():g} kg is {mass.min() / box:.2f} times the mass of a solid box of this size, {box:.6g} kg at "
+            f"{mass.min():g} kg is {mass.min() / box:.2f} times the mass of {solid}, {box:.6g} kg at "
             f"the density of {rock:g} kg/m^3{assumed}; at most {MOST_SOLIDITY:g} times can be a mistake of measurement"
         )
         entries.problems.add(entries.key_position("boulder", "mass"), "boulder.mass", message)

@@ -10,7 +10,7 @@ import numpy as np
 
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.choices import read_setting
+from boulder_sweep.settings.choices import read_setting, shares_of, sides_of
 from boulder_sweep.settings.distribution_reader import read_input
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_single
@@ -18,6 +18,7 @@ from boulder_sweep.settings.problems import Position, ProblemList, nearest, shor
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 if TYPE_CHECKING:
+    from boulder_sweep.settings.shape import ProfilePoint
     from boulder_sweep.settings.sweep import DesignList
 
 
@@ -71,6 +72,20 @@ class Entries:
             self.problems.add(problem.position, "vehicle.spring", problem.message)
         for section in fields.SECTIONS:
             self._read_block(section)
+        if "profile" in self.settings:
+            self._take_sides(self.settings["profile"])
+
+    def _take_sides(self, points: tuple[ProfilePoint, ...]) -> None:
+        """Take the sides of the boulder from its profile, which must not be given beside it."""
+        position = self.key_position("boulder", "profile")
+        for key in ("length", "width", "height", "taper"):
+            if f"boulder.{key}" in self.given:
+                message = "is part of boulder.profile; remove one of them"
+                self.problems.add(self.key_position("boulder", key), f"boulder.{key}", message)
+        for key, value in sides_of(points).items():
+            self.given.add(f"boulder.{key}")
+            self.leaves[f"boulder_{key}_m"] = Leaf(np.array([value]), False, position)
+        self.settings["profile"] = shares_of(points)
 
     def _read_table(self) -> None:
         node = self.root.get("table")

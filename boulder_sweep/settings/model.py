@@ -9,6 +9,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 from boulder_sweep.columns import RATINGS
+from boulder_sweep.settings.shape import ProfilePoint, Shape, tapered
 
 PRESETS = ("as_printed", "corrected")
 
@@ -353,6 +354,22 @@ class Model:
         kind="a shape of the foot",
         also=("base", "underside", "bottom"),
     )
+    profile: tuple[ProfilePoint, ...] = setting(
+        "boulder.profile",
+        "",
+        "width and length of a boulder that is no box, over its height, from the foot up",
+        (),
+        also=("shape", "outline", "section", "sections"),
+    )
+    taper: float = setting(
+        "boulder.taper",
+        "1",
+        "width and length of the top over those of the foot; width and length given are those of the larger end",
+        1.0,
+        admitted=Bound(0.05, 20.0, "0.8 for a top of four fifths of the foot"),
+        usual=Usual(0.5, 1.5, "usual boulders"),
+        also=("tapering", "batter"),
+    )
     rock_assumed: bool = False
     """Whether the density of the rock is `ROCK_KG_M3` because the file gives the mass of the boulders only."""
 
@@ -366,6 +383,16 @@ class Model:
     def ground(self) -> Ground:
         """In what the soil differs from the paper's."""
         return Ground(self.layers, self.cohesion_kPa, self.water_table_m, self.slope_deg)
+
+    @property
+    def shape(self) -> Shape:
+        """Shape of the boulders."""
+        return Shape(self.profile) if self.profile else tapered(self.taper)
+
+    @property
+    def stands_flat(self) -> bool:
+        """Whether the boulders stand on a foot that is modelled."""
+        return self.foot == FEET[0] and self.shape.stands_flat
 
     @property
     def preset(self) -> str:

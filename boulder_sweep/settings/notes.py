@@ -17,6 +17,7 @@ from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.problems import Position, Problem
 
 if TYPE_CHECKING:
+    from boulder_sweep.settings.model import Model
     from boulder_sweep.settings.sweep import Sweep
 
 # Constant of horizontal subgrade reaction [MN/m^3] over friction angle [deg] of the two families in use.
@@ -69,12 +70,17 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Proble
         if off.any():
             message = _unusual("embedment_ratio", ratio[off])
             yield _note(positions["embedment_depth_m"], "site.embedment_depth", f"depth over height: {message}")
-    message = _on_mass(values, groups, sweep.model.rock_assumed)
+    message = _on_mass(values, groups, sweep.model)
     if message:
         yield _note(positions[BOULDER_MASS], "boulder.mass", message)
     message = _off_front(values, groups, sweep.model.calibrated_crush_m)
     if message:
         yield _note(positions["vehicle_spring_N_m"], "vehicle.spring", message)
+    if not sweep.model.shape.stands_flat:
+        message = (
+            f"its foot is less than half as wide or long as the largest section: undecided (foot), {WAY_OUT['foot']}"
+        )
+        yield _note(Position(str(sweep.path)), "boulder", message)
     limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
     if usual is not None and limit > usual.high:
         yield _note(Position(str(sweep.path)), "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}")
@@ -89,7 +95,7 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Proble
         yield _note(positions["subgrade_reaction_MN_m3"], "soil.subgrade_reaction", message)
 
 
-def _on_mass(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], rock_assumed: bool) -> str:
+def _on_mass(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], model: Model) -> str:
     """Return what is assumed of boulders that were weighed, and whether no box stands for them."""
     if BOULDER_MASS not in values:
         return ""
@@ -103,11 +109,11 @@ def _on_mass(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray
         solidity = np.array([ends[0][i] / math.prod(end[1 - i] for end in ends[1:]) for i in range(2)])
     fills = describe_share(solidity.min(), solidity.max())
     words = [f"by its mass a boulder fills {fills} of the box of its length, width and height"]
-    if rock_assumed:
+    if model.rock_assumed:
         words[0] += f" if its rock has {ROCK_KG_M3:g} kg/m^3, which is assumed: give boulder.density. No pass is robust"
-    if solidity.min() < LEAST_SOLIDITY:
+    if solidity.min() < LEAST_SOLIDITY and model.shape.is_box:
         words.append(f"below {LEAST_SOLIDITY:.0%} designs are undecided (shape): {WAY_OUT['shape']}")
-    return "; ".join(words) if len(words) > 1 or rock_assumed else ""
+    return "; ".join(words) if len(words) > 1 or model.rock_assumed else ""
 
 
 def describe_share(low: float, high: float) -> str:

@@ -67,6 +67,11 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "boulder.height": ("{from: 2.4 m, to: 3.6 m, step: 0.2 m}", "{from: 8 ft, to: 12 ft, step: 6 in}"),
     "boulder.density": ("2600 kg/m^3", "162 pcf"),
     "boulder.mass": ("18200 kg", "40000 lb"),
+    "boulder.profile": (
+        "[{height: 0 m, width: 1.8 m, length: 1.7 m}, {height: 3 m, width: 1.2 m, length: 1.1 m}]",
+        "[{height: 0 ft, width: 6 ft, length: 5.5 ft}, {height: 10 ft, width: 4 ft, length: 3.5 ft}]",
+    ),
+    "boulder.taper": ("0.8",) * 2,
     "site.embedment_ratio": ("{from: 0.45, to: 0.75, step: 0.05}",) * 2,
     "site.embedment_depth": ("2 m", "6.5 ft"),
     "site.impact_height": ("0.9 m", "3 ft"),

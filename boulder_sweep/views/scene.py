@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_kernels.design import G, wedge_slope
+from boulder_kernels.outline import FAR, HEIGHT, NEAR
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
 
@@ -102,7 +103,7 @@ class SideView:
     def rating_line(self) -> float:
         """How far the cargo bed may come: the far face of the boulder and the limit of the rating [m]."""
         rating = self.trajectory.settings["criterion"]["rating"]
-        return self.trajectory.motion.design.L + PENETRATION_LIMITS_M[rating]
+        return max(x for x, _ in self._outline()) + PENETRATION_LIMITS_M[rating]
 
     @property
     def metres_per_newton(self) -> float:
@@ -114,7 +115,7 @@ class SideView:
         """Return what does not move: soil, initial position of the boulder, line of the rating, scale of force."""
         w, design = self.window, self.trajectory.motion.design
         rating = self.trajectory.settings["criterion"]["rating"]
-        box = ((0.0, -design.d), (design.L, -design.d), (design.L, design.H - design.d), (0.0, design.H - design.d))
+        outline = self._outline()
         unit = 1000e3 if LONGEST_ARROW_M / self.metres_per_newton > 1600e3 else 500e3
         length, x, y = unit * self.metres_per_newton, w.left + 0.25, w.bottom + 0.25
         line = self.rating_line
@@ -122,7 +123,7 @@ class SideView:
             Shape("polygon", "soil", ((w.left, w.bottom), (w.right, w.bottom), (w.right, 0.0), (w.left, 0.0))),
             Shape("line", "limit", ((line, 0.0), (line, w.top - 0.75))),
             Shape("text", "limit", ((line + 0.06, w.top - 0.8),), f"{rating}: cargo bed\nmust stop here"),
-            Shape("line", "initial", (*box, box[0])),
+            Shape("line", "initial", (*((x, z - design.d) for x, z in outline), (outline[0][0], -design.d))),
             Shape("line", "scale", ((x, y), (x + length, y))),
             Shape("text", "scale", ((x, y + 0.08),), f"{unit / 1e3:.0f} kN"),
             Shape("text", "contact_force", ((x, y + 0.80),), "force of the vehicle"),
@@ -157,11 +158,10 @@ class SideView:
         return centre + x * cos + y * sin, -c.z_0 - x * sin + y * cos
 
     def _boulder(self, sample: int) -> list[Shape]:
-        c, design = self.trajectory.motion.constants, self.trajectory.motion.design
-        left, right, low, high = -c.c_x, design.L - c.c_x, -c.c_y, design.H - c.c_y
-        corners = ((left, low), (right, low), (right, high), (left, high))
-        centre = self._position(sample, 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y)
-        weight = design.rho_b * design.L * design.W * design.H * G
+        c, body = self.trajectory.motion.constants, self.trajectory.motion.body
+        corners = [(x - c.c_x, z - c.c_y) for x, z in self._outline()]
+        centre = self._position(sample, body.x - c.c_x, body.y - c.c_y)
+        weight = body.m_b * G
         tip = (centre[0], centre[1] - weight * self.metres_per_newton)
         return [
             Shape("polygon", "boulder", tuple(self._position(sample, *corner) for corner in corners)),
@@ -169,19 +169,38 @@ class SideView:
             Shape("arrow", "weight", (centre, tip)),
         ]
 
+    def _faces(self, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Near and far face at heights over the foot, in x from where the boulder is struck [m]."""
+        motion = self.trajectory.motion
+        outline, design = motion.outline, motion.design
+        struck, near = (np.interp(z, outline[:, HEIGHT], outline[:, NEAR]) for z in (design.d + design.e, heights))
+        return struck - near, struck + np.interp(heights, outline[:, HEIGHT], outline[:, FAR])
+
+    def _outline(self) -> list[tuple[float, float]]:
+        """Corners of the boulder from the near one of its foot around, x from where it is struck, z over the foot."""
+        heights = self.trajectory.motion.outline[:, HEIGHT]
+        near, far = ([*zip(side.tolist(), heights.tolist(), strict=True)] for side in self._faces(heights))
+        return [near[0], *far, *near[:0:-1]]
+
+    def _face(self, depth: float, *, is_near: bool) -> float:
+        """Where a face of the boulder is at a depth, in x from the common centre of mass [m]."""
+        motion = self.trajectory.motion
+        near, far = self._faces(np.array([motion.design.d - depth]))
+        return float((near if is_near else far)[0] - motion.constants.c_x)
+
     def _wedge(self, sample: int) -> list[Shape]:
         """The soil that moves with the boulder: a wedge cut into slices, each moving with its element."""
         motion = self.trajectory.motion
         c, design = motion.constants, motion.design
         slope = wedge_slope(design.phi)
         levels = [k / 24 * c.d for k in range(25)]
-        near = [self._position(sample, c.l_n, c.z_0 - level) for level in levels]
+        near = [self._position(sample, self._face(level, is_near=False), c.z_0 - level) for level in levels]
         far = [(x + (c.d - level) * slope, y) for (x, y), level in zip(near, levels, strict=True)]
         return [Shape("polygon", "wedge", (*near, *far[::-1]))]
 
     def _soil_forces(self, sample: int) -> list[Shape]:
         motion = self.trajectory.motion
-        c, design = motion.constants, motion.design
+        c = motion.constants
         profile = soil_profile(motion.record, sample, SLICES, c)
         arrows = []
         for z, force in zip(profile.depth_m, profile.force_N, strict=True):
@@ -189,7 +208,7 @@ class SideView:
             if abs(length) < SHORTEST_ARROW_M:
                 continue
             # Pressed forward the soil pushes on the far face; pressed back, on the near one.
-            x, y = self._position(sample, c.l_n if length < 0.0 else c.l_n - design.L, c.z_0 - float(z))
+            x, y = self._position(sample, self._face(float(z), is_near=length >= 0.0), c.z_0 - float(z))
             arrows.append(Shape("arrow", "soil_force", ((x - length, y), (x, y))))
         return arrows
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME
 from boulder_sweep.settings.model import UNLOADINGS, Ground
+from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_unit
 from boulder_sweep.text import NO_BREAK_SPACE
 
@@ -144,6 +145,7 @@ def model_words(settings: Mapping[str, Any]) -> str:
         f"resistance {law}" if law else "",
         UNLOADING_WORDS[unloading] if unloading else "",
         ground_words(settings),
+        Shape.of_list(settings["model"].get("profile", [])).words,
     )
     return ", ".join(word for word in words if word)
 

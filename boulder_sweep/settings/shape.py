@@ -1,0 +1,112 @@
+"""The shape of boulders: boxes, or a profile of width and length over the height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class ProfilePoint:
+    """One point of a profile, as shares of the height, the width and the length of the boulder.
+
+    Attributes
+    ----------
+    height : float
+        Over the foot.
+    width : float
+        Width there.
+    near, far : float
+        How far the boulder reaches there towards the vehicle and away from it, from the middle of its foot.
+    """
+
+    height: float
+    width: float
+    near: float
+    far: float
+
+
+LEAST_FOOT = 0.5
+"""A foot that is shorter or narrower than this share of the largest section counts as rounded."""
+BOX = (ProfilePoint(0.0, 1.0, 0.5, 0.5), ProfilePoint(1.0, 1.0, 0.5, 0.5))
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """The shape of the boulders of a file; between its points it is linear.
+
+    Attributes
+    ----------
+    points : tuple of ProfilePoint
+        From the foot to the top; none for a box.
+    """
+
+    points: tuple[ProfilePoint, ...] = ()
+
+    @property
+    def is_box(self) -> bool:
+        """Whether width and faces are the same at every height."""
+        return len({(point.width, point.near, point.far) for point in self.points}) <= 1
+
+    @property
+    def stands_flat(self) -> bool:
+        """Whether the foot is at least half as wide and as long as the largest section."""
+        if not self.points:
+            return True
+        foot, longest = self.points[0], max(point.near + point.far for point in self.points)
+        return foot.width >= LEAST_FOOT and foot.near + foot.far >= LEAST_FOOT * longest
+
+    @property
+    def filled(self) -> float:
+        """Volume over that of the box of height, width and length: the integral of w l, by Simpson's rule exactly."""
+        return self._integral(lambda near, far: near + far)
+
+    @property
+    def centre(self) -> float:
+        """Centre of mass before the middle of the foot, away from the vehicle, as a share of the length."""
+        return self._integral(lambda near, far: 0.5 * (far * far - near * near)) / self.filled
+
+    @property
+    def stands_up(self) -> bool:
+        """Whether the centre of mass lies over the foot."""
+        foot = (self.points or BOX)[0]
+        return -foot.near < self.centre < foot.far
+
+    def _integral(self, of_length: Any) -> float:
+        """Integral over the height of the width times something of the reaches, at most of second degree."""
+        total = 0.0
+        for low, high in pairwise(self.points or BOX):
+            middle = (0.5 * (getattr(low, name) + getattr(high, name)) for name in ("width", "near", "far"))
+            ends = ((one.width, one.near, one.far) for one in (low, high))
+            values = [w * of_length(near, far) for w, near, far in (*ends, tuple(middle))]
+            total += (high.height - low.height) / 6.0 * (values[0] + values[1] + 4.0 * values[2])
+        return total
+
+    def as_list(self) -> list[dict[str, float]]:
+        """Return the points as plain data."""
+        names = [field.name for field in fields(ProfilePoint)]
+        return [{name: getattr(point, name) for name in names} for point in self.points]
+
+    @classmethod
+    def of_list(cls, points: list[dict[str, float]]) -> Shape:
+        """Return the shape that `as_list` returned; a box of no data."""
+        return cls(tuple(ProfilePoint(**point) for point in points))
+
+    @property
+    def words(self) -> str:
+        """What it is; empty for a box."""
+        if self.is_box:
+            return ""
+        foot, top = self.points[0], self.points[-1]
+        if len(self.points) == 2 and foot.near == foot.far and top.near == top.far:
+            return f"boulder tapered, its top {top.width / foot.width:.3g} times as wide as its foot"
+        return f"boulder by a profile of {len(self.points)} points"
+
+
+def tapered(ratio: float) -> Shape:
+    """Return the shape of a boulder whose top is `ratio` times as wide and as long as its foot."""
+    if ratio == 1.0:
+        return Shape()
+    foot, top = (1.0, ratio) if ratio < 1.0 else (1.0 / ratio, 1.0)
+    return Shape((ProfilePoint(0.0, foot, 0.5 * foot, 0.5 * foot), ProfilePoint(1.0, top, 0.5 * top, 0.5 * top)))
