@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from boulder_sweep.runner.backends import BACKENDS, MOST_JOBS
+from boulder_sweep.runner.pool import BACKENDS, MOST_JOBS
 
 Command = Callable[..., Any]
 JOBS = click.IntRange(1, MOST_JOBS)
