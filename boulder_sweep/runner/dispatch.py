@@ -187,16 +187,21 @@ class Dispatcher(Generic[Item]):
 
     def _submit_some(self, next_task: Callable[[], Task[Item] | None]) -> bool:
         """Submit tasks until every thread has some; False where there may be more."""
-        while len(self._in_flight) < _TASKS_PER_THREAD * self.threads:
+        while True:
+            is_room = len(self._in_flight) < _TASKS_PER_THREAD * self.threads
+            if not is_room and (self._in_flight or self._again):
+                return False
             task = self._again.popleft() if self._again else next_task()
             if task is None:
                 return True
+            if not is_room:  # no worker is left; without another task it would not matter
+                self._again.append(task)
+                return False
             only = self._only()
             arguments = (*self._shared, *task.arguments)
             future = self._cluster.client.submit(task.function, *arguments, **task.options, workers=only, pure=False)
             self._in_flight[future] = _Submitted(task, frozenset(only or ()))
             future.add_done_callback(self._arrived.put)
-        return False
 
     def _expect_lost(self) -> None:
         """Wait again for lost results; Dask calls back at once for those that are still lost."""

@@ -97,7 +97,7 @@ class Pool:
         def next_task() -> Task[int] | None:
             """Return the next call, unless there are results enough that wait for the one of an earlier call."""
             nonlocal submitted
-            if submitted - first >= _CALLS_PER_THREAD * dispatcher.threads:
+            if submitted - first >= _CALLS_PER_THREAD * max(dispatcher.threads, 1):
                 return None
             number, one = next(numbered, (-1, None))
             if one is None:
