@@ -42,7 +42,7 @@ class Cluster:
     dashboard : str or None
         Address of the dashboard, if there is one.
     silent : set of str
-        Workers that did not answer at the beginning.
+        Workers that did not answer at the beginning, or were silent when they were last looked at.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from boulder_sweep.errors import BoulderSweepError, ClusterLostError
 from boulder_sweep.runner.cluster import Cluster, no_worker_text
@@ -245,6 +245,7 @@ class Dispatcher(Generic[Item]):
         now = self._clock()
         silent = self._silence.silent
         again = self._silence.look(now, {future: submitted.only for future, submitted in self._in_flight.items()})
+        self._cluster.silent = self._silence.silent  # the next calls on this cluster need not find it out again
         self._workers = {worker: n for worker, n in self._there.items() if worker not in self._silence.silent}
         lost = before.keys() - self._there.keys()
         if lost:
@@ -288,18 +289,6 @@ def _fetched(future: Any, limit_s: float) -> tuple[Any, Exception | None]:
         return None, problem
 
 
-class Heard(Protocol):
-    """A cluster, as far as it is asked for its workers."""
-
-    silent: set[str]
-
-    def last_seen(self) -> dict[str, float]:
-        """Return when the scheduler last heard of every worker [s]."""
-
-    def tasks_of(self, workers: Collection[str]) -> set[str]:
-        """Return the keys of tasks and results that workers have."""
-
-
 class Silence:
     """Finds out which workers are silent, and which tasks others must get.
 
@@ -319,7 +308,7 @@ class Silence:
         What has changed at the last look, for the user.
     """
 
-    def __init__(self, cluster: Heard):
+    def __init__(self, cluster: Cluster):
         self._cluster = cluster
         self.silent = set(cluster.silent)
         self.notes: list[str] = []

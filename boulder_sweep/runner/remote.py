@@ -1,6 +1,6 @@
 """A run on a cluster: each worker computes, encodes and stages its own parts; the scheduler sees short messages.
 
-The upper half is what a worker does with some rows, the lower half what the run does with what comes of them.
+`compute` is what a worker does with some rows; `ClusterWorkers` hands out rows and passes on what comes of them.
 """
 
 from __future__ import annotations

@@ -191,6 +191,9 @@ def test_calls_of_a_worker_that_hangs_are_made_by_others(cluster):
     assert cluster.looks_before in (7, 8), "found out by counting looks"
     assert {worker for worker, value in cluster.given[cluster.given_before :]} == {"a"}
     assert {value for worker, value in cluster.given if worker == "a"} == set(range(9))
+    cluster.given.clear()
+    assert list(workers((times, (value,), {}) for value in range(9))) == list(range(0, 18, 2))
+    assert {worker for worker, value in cluster.given} == {"a"}, "the next calls need not find it out again"
 
 
 def test_where_every_worker_hangs_that_is_told(cluster):
