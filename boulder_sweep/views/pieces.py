@@ -13,7 +13,7 @@ from boulder_sweep.columns import OPTIONAL_COLUMNS
 if TYPE_CHECKING:
     import pandas as pd
 
-    from boulder_sweep.store.finished import FinishedRows
+    from boulder_sweep.store.reader import FinishedRows
 
 RATIO = "embedment_ratio"
 DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"

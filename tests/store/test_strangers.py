@@ -18,9 +18,8 @@ from boulder_sweep.store import lock as locks
 from boulder_sweep.store import read, status
 from boulder_sweep.store.errors import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
 from boulder_sweep.store.files import hidden_name
-from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, load, part_name, staged_name
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import FinishedRows, read_table
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.writer import stage
 from tests.runner.grids import same_bits
