@@ -224,11 +224,9 @@ class Dispatcher(Generic[Item]):
             return None
         result, problem = self._late.pop(future) if future in self._late else _fetched(future, FETCH_S)
         if problem is not None:
-            if future.cancelled():
+            if future.cancelled() or self._cluster.client.status != "running":
                 raise ClusterLostError(self._cluster.lost_text()) from problem
-            if future.status != "error":
-                if not isinstance(problem, TimeoutError):
-                    raise problem
+            if isinstance(problem, TimeoutError) and future.status != "error":
                 self._fetch_s *= 2.0
                 future.add_done_callback(self._arrived.put)
                 return None

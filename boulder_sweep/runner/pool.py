@@ -105,18 +105,15 @@ class Pool:
             submitted = number + 1
             return Task(number, *one)
 
-        try:
-            for number, result, problem in dispatcher.outcomes(next_task):
-                if problem is not None:
-                    raise problem
-                results[number] = result
-                while first in results:
-                    yield results.pop(first)
-                    first += 1
-        except BoulderSweepError:
-            raise
-        except Exception as problem:
-            raise BackendError(f"the workers cannot answer this: {one_line(problem)}") from problem
+        for number, result, problem in dispatcher.outcomes(next_task):
+            if isinstance(problem, BoulderSweepError):
+                raise problem
+            if problem is not None:
+                raise BackendError(f"the workers cannot answer this: {one_line(problem)}") from problem
+            results[number] = result
+            while first in results:
+                yield results.pop(first)
+                first += 1
 
 
 @contextmanager

@@ -229,3 +229,26 @@ def test_calls_wait_for_a_worker_that_comes_later(cluster):
     cluster.names.clear()
     cluster.threads = lambda: dict.fromkeys(names, 1) if next(looks) > 1 else {}
     assert list(workers((times, (value,), {}) for value in range(9))) == list(range(0, 18, 2))
+
+
+def test_a_mistake_in_making_calls_is_not_blamed_on_the_workers(cluster):
+    def calls():
+        yield times, (1,), {}
+        raise ZeroDivisionError("by chance")
+
+    with pytest.raises(ZeroDivisionError, match="by chance"):
+        list(cluster("a", hung=())[1](calls()))
+
+
+@pytest.mark.parametrize("status", ["running", "closed"])
+def test_a_result_that_cannot_be_fetched_is_told(cluster, monkeypatch, status):
+    def refuse(self, timeout):
+        cluster.status = status
+        raise ConnectionError("broken off")
+
+    monkeypatch.setattr(HangingCall, "result", refuse)
+    cluster, workers = cluster("a", hung=())
+    lost = {"closed": (ClusterLostError, "the scheduler was lost")}
+    error, words = lost.get(status, (BackendError, "cannot answer this: ConnectionError: broken off"))
+    with pytest.raises(error, match=words):
+        list(workers([(times, (1,), {})]))
