@@ -20,10 +20,9 @@ from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.errors import settings_file
-from boulder_sweep.store.files import replacing
+from boulder_sweep.store.files import check_target, replacing
 from boulder_sweep.store.provenance import identity_in, judged_by, sha256_of
 from boulder_sweep.store.schema import number_array, part_table, word_array
-from boulder_sweep.store.targets import check_target
 from boulder_sweep.text import one_line, why
 
 if TYPE_CHECKING:

@@ -63,7 +63,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
             raise click.UsageError(f"--at {name} is given twice; give each column one value")
         given[name] = text
     from boulder_sweep.errors import PictureError
-    from boulder_sweep.store.finished import FinishedRows
+    from boulder_sweep.store.reader import FinishedRows
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
     from boulder_sweep.views.slices import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map

@@ -20,9 +20,8 @@ from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system
-from boulder_sweep.store.files import put_file
+from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
-from boulder_sweep.store.targets import check_target
 from boulder_sweep.text import counted, printable, why
 from boulder_sweep.views.wording import UNLOADING_WORDS
 

@@ -14,10 +14,9 @@ import boulder_sweep
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store import files, status
 from boulder_sweep.store.errors import DamagedError, LinkError
-from boulder_sweep.store.files import hidden_name, put_file, replacing
+from boulder_sweep.store.files import check_target, hidden_name, put_file, replacing
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, part_name, staged_name
-from boulder_sweep.store.targets import check_target
 from tests.store.folders import ROWS, SIZE, finished_folder, open_folder, part_bytes
 
 TOKEN = "0123456789abcdef"
