@@ -23,7 +23,7 @@ from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_
 from boulder_sweep.columns import OPTIONAL_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.judge.robustness import is_planar_default
+from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.backends import THREADING
 from boulder_sweep.runner.pool import call, pool
@@ -216,7 +216,7 @@ def need(
     variants: tuple[Judges, ...] = ()
     if open_readings:
         variants = tuple(judges_of(one, least_margin, compared=True) for one in every_reading(sweep))
-    if robust and not is_planar_default(sweep):
+    if robust and not can_be_asked(sweep):
         raise QuestionError(
             "--robust: second opinions know elastic, dry, level, uniform soil without cohesion, one spring of the "
             "vehicle and corrected readings only"

@@ -17,7 +17,7 @@ from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, Outc
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.evaluation import Evaluation, known_control
 from boulder_sweep.judge.refinement import reported_step_s
-from boulder_sweep.judge.robustness import is_planar_default
+from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
@@ -138,7 +138,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
     model = sweep.model
-    laws = model.second_opinion if is_planar_default(sweep) else ()
+    laws = model.second_opinion if can_be_asked(sweep) else ()
     evaluation = Evaluation(
         readings, control, limits, resistance=model.resistance, ground=model.ground, second_opinion=laws
     )

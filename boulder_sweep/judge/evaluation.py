@@ -22,7 +22,7 @@ from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import RowStates, finer_controls
-from boulder_sweep.judge.robustness import is_planar_default, with_second_opinions
+from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS, Ground
 from boulder_sweep.soils import with_soil
@@ -141,6 +141,7 @@ class Evaluation:
         A simulation may end with a proof of its verdict while the rotation can still grow, so its margin is one up to
         then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
+        Second opinions are asked with the reduced limit.
         """
         rows = RowStates(designs, self.control, *self._once(designs, self.control))
         for control in finer_controls(self.control):
@@ -158,22 +159,26 @@ class Evaluation:
             judged = self._margins_proved(judged, designs)
         if not self.second_opinion or (self.only and "robustness" not in self.only):
             return judged
-        return self._graded(judged, designs.rows(judged.verdict == PASS), self.second_opinion)
+        limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
+        passes = designs.rows(judged.verdict == PASS)
+        return with_second_opinions(judged, passes, self.second_opinion, self.resistance, limits, self.longest_s)
 
     def asked(self) -> Evaluation:
         """Return the same with every second opinion, where they can be asked."""
         return replace(self, second_opinion=SECOND_OPINIONS) if self.askable else self
 
     def graded(self, judged: Judged, block: DesignBlock) -> Judged:
-        """Return the judged rows of a block with every second opinion of its passes, where they can be asked."""
+        """Return the judged rows of a block with every second opinion of its passes, without a margin."""
         passing = judged.verdict == PASS
         if not self.askable or not passing.any():
             return judged
-        return self._graded(judged, designs_of(block, passing, self.resistance, self.ground), SECOND_OPINIONS)
+        passes = designs_of(block, passing, self.resistance, self.ground)
+        return with_second_opinions(judged, passes, SECOND_OPINIONS, self.resistance, self.limits, self.longest_s)
 
-    def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
-        longest = self.control.longest_horizon or LONGEST_HORIZON * self.control.horizon
-        return with_second_opinions(judged, passes, laws, self.resistance, self.limits, longest)
+    @property
+    def longest_s(self) -> float:
+        """Longest time for which a second opinion is simulated."""
+        return self.control.longest_horizon or LONGEST_HORIZON * self.control.horizon
 
     def _margins_proved(self, judged: Judged, designs: Designs) -> Judged:
         """Put margins that are not proved to last just below the one asked for; see `judged`."""
@@ -268,8 +273,8 @@ def evaluation_of(
         resistance=sweep.model.resistance,
         second_spring=SECOND_SPRING in sweep.plan.columns,
         ground=sweep.model.ground,
-        second_opinion=sweep.model.second_opinion if is_planar_default(sweep) else (),
-        askable=is_planar_default(sweep),
+        second_opinion=sweep.model.second_opinion if can_be_asked(sweep) else (),
+        askable=can_be_asked(sweep),
     )
 
 

@@ -116,7 +116,7 @@ def test_other_outcomes_do_not_change() -> None:
 )
 def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
     sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
-    assert not robustness.is_planar_default(sweep)
+    assert not robustness.can_be_asked(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     assert evaluation.second_opinion == ()
     assert not evaluation.limits.studied
