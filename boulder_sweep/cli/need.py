@@ -35,9 +35,7 @@ Examples:
     "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
 )
 @click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
-@click.option(
-    "--robust", is_flag=True, help="Count only passes that stand under every second opinion, with the margin asked for."
-)
+@click.option("--robust", is_flag=True, help="Count only passes that stand under every second opinion, with --margin.")
 @click.option("--other-readings", is_flag=True, help="Also answer by the other readings of the paper: takes longer.")
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
