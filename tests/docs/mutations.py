@@ -140,7 +140,7 @@ MUTATIONS = (
     ),
     Mutation((133,), _HEAVE, "math.exp(math.pi * math.tan(phi))", "math.exp(math.tan(phi))"),
     Mutation((133,), _OPINION, "field(work, SETS, j) + over", "over"),
-    Mutation((133,), _OPINION, "deepest = foot_rises(work, q, tau, h, f)", "deepest = tau"),
+    Mutation((133,), _OPINION, "and at_end < 0.0 and reach > capacity", "and at_end > 0.0 and reach > capacity"),
     Mutation((134,), _HEAVE, "return v / math.sqrt(v * v + f.v_s * f.v_s)", "return v / (abs(v) + f.v_s)"),
     Mutation((134,), _HEAVE, "along - omega_b * c.l_n", "along + omega_b * c.l_n"),
     Mutation((134,), _HEAVE, "SUMS + 4 * PIECES, j, max(F, 0.0)", "SUMS + 4 * PIECES, j, max(-F, 0.0)"),
