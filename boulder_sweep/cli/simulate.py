@@ -126,7 +126,7 @@ def _cautions(row: dict[str, Any]) -> list[str]:
     cautions += ["see docs/validity.md"] if cautions else []
     if row["verdict"] != "pass":
         return cautions
-    return [*grade_lines([row["robustness"]]), *cautions, f"pass: {NOT_A_RATING}"]
+    return [*grade_lines([row]), *cautions, f"pass: {NOT_A_RATING}"]
 
 
 EXPLAIN_EXAMPLES = """\b
