@@ -29,6 +29,7 @@ SCRIPTS = (
     *("walker", "controls", "choices", "player", "texts", "page"),
 )
 """Our own script, in this order."""
+NOTHING: Mapping[str, str] = {}
 MAIN = (
     "embedment_depth_m",
     "friction_angle_deg",
@@ -55,6 +56,7 @@ def assembled(
     chosen: Sequence[Mapping[str, Any]] = (),
     facts: Sequence[tuple[str, str]] = (),
     notes: Sequence[str] = (),
+    heading: Mapping[str, str] = NOTHING,
     units: str = "si",
 ) -> str:
     """Put the page together.
@@ -79,6 +81,8 @@ def assembled(
         Names and values that describe the origin of the results.
     notes
         Notes on these particular results.
+    heading
+        Project, client, author and date, as far as given.
     units
         Units shown first, ``si`` or ``us``.
 
@@ -127,6 +131,7 @@ def assembled(
         mapped=table is not None and table["mapped"],
         facts=facts,
         notes=notes,
+        heading=heading,
         settings=settings,
         lines=setting_lines(settings),
         readings=reading_words(settings),

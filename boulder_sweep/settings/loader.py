@@ -15,6 +15,7 @@ from boulder_sweep import elementary
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
 from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
+from boulder_sweep.settings.heading import SECTION, Heading, read_heading
 from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
 from boulder_sweep.settings.problems import ProblemList
@@ -66,10 +67,11 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     entries = Entries(root, path, problems)
     name = _read_name(entries)
     entries.read()
+    heading = read_heading(entries)
     check_complete(entries)
     check_pairs(entries)
     problems.raise_if_any()
-    return _build(name, entries, tuple(overrides))
+    return _build(name, heading, entries, tuple(overrides))
 
 
 def _read_name(entries: Entries) -> str:
@@ -84,7 +86,7 @@ def _read_name(entries: Entries) -> str:
     return default
 
 
-def _build(name: str, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
+def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
     """Put the checked parts together."""
     from boulder_sweep.settings.notes import notes_on
     from boulder_sweep.settings.sweep import Sweep
@@ -111,6 +113,7 @@ def _build(name: str, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
         correlation=entries.settings.get("correlation", 0.0),
         partial_factor=factor,
         overrides=overrides,
+        heading=heading,
     )
     positions = {field.name: entries.position_of(field) for field in fields.INPUTS}
     object.__setattr__(sweep, "notes", tuple(notes_on(sweep, positions)))
@@ -144,6 +147,8 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
     axes: list[Axis] = []
     count = 1
     for section in entries.root:
+        if section.key == SECTION:
+            continue
         if section.key in entries.sets:
             labels = entries.sets[section.key]
             columns = {field.name: entries.leaves[field.name].values for field in entries.inputs_of_sets(section.key)}
