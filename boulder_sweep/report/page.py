@@ -14,8 +14,9 @@ from bokeh.embed.util import standalone_docs_json_and_render_items
 from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
+from boulder_sweep.report.contents import held_at, page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, parts_of, verdict_map
+from boulder_sweep.report.sketch import sketch_of
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
@@ -96,6 +97,8 @@ def assembled(
     for plot in [*(plot for panel in panels for plot in curves(panel, parts_of(control))), verdict_map("live")]:
         document.add_root(plot)
     table = None if rows is None or kept is None else table_data(rows, kept)
+    if table is not None and rows is not None and kept is not None and chosen:
+        table["held"] = held_at(rows, kept, chosen[0]["number"])
     if table is not None and table["mapped"]:
         document.add_root(verdict_map("sweep"))
     docs, items = standalone_docs_json_and_render_items(list(document.roots))
@@ -132,6 +135,7 @@ def assembled(
         facts=facts,
         notes=notes,
         heading=heading,
+        sketch=sketch_of(chosen[0]["inputs"], settings) if chosen else None,
         settings=settings,
         lines=setting_lines(settings),
         readings=reading_words(settings),

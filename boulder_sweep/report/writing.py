@@ -94,7 +94,7 @@ def write_report(
         readings = Readings(**identity["readings"])
         text = assembled(
             title=str(settings["name"]),
-            heading={**settings.get(SECTION, {}), **heading.given()},
+            heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
             settings=settings,
             control=control,
             readings=readings,
