@@ -15,10 +15,10 @@ from boulder_sweep import elementary
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
 from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
-from boulder_sweep.settings.heading import SECTION, Heading, read_heading
+from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
-from boulder_sweep.settings.problems import ProblemList
+from boulder_sweep.settings.problems import ProblemList, shorten
 from boulder_sweep.settings.source import read_settings_text
 from boulder_sweep.settings.tree import Mapping, Scalar
 from boulder_sweep.settings.yaml_reader import parse
@@ -67,7 +67,7 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     entries = Entries(root, path, problems)
     name = _read_name(entries)
     entries.read()
-    heading = read_heading(entries)
+    heading = _read_heading(entries)
     check_complete(entries)
     check_pairs(entries)
     problems.raise_if_any()
@@ -84,6 +84,31 @@ def _read_name(entries: Entries) -> str:
         return node.text
     entries.problems.add(node.position, "name", NAME_RULE)
     return default
+
+
+def _read_heading(entries: Entries) -> Heading:
+    """Return the heading in a file; mistakes go to its problems."""
+    entry = entries.root.entries.get(SECTION)
+    if entry is None:
+        return NO_HEADING
+    node = entry.value
+    if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
+        return NO_HEADING  # a block of which every line is commented out
+    if not isinstance(node, Mapping) or node.unit is not None:
+        entries.problems.add(node.position, SECTION, f"must be a block of keys: {', '.join(Heading._fields)}")
+        return NO_HEADING
+    found: dict[str, str] = {}
+    for inner in node:
+        path, value = f"{SECTION}.{shorten(inner.key)}", inner.value
+        if inner.key not in Heading._fields:
+            entries.unknown(inner, SECTION, Heading._fields)
+        elif not isinstance(value, Scalar):
+            entries.problems.add(value.position, path, "must be one line of text, not a list or a block")
+        elif wrong := wrong_with(value.text):
+            entries.problems.add(value.position, path, wrong)
+        else:
+            found[inner.key] = value.text.strip()
+    return Heading(**found)
 
 
 def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
