@@ -41,6 +41,7 @@ def test_an_override_replaces_an_entry(tmp_path):
 def test_a_wrong_entry_is_refused_where_it_stands(block, column, words, tmp_path):
     with pytest.raises(SettingsError) as refused:
         loaded(block, tmp_path)
-    assert str(refused.value.problems[0]).startswith(
+    place = f"{tmp_path / 'site.yaml'}:{len(SITE.splitlines()) + 1}:{column}"
+    assert str(refused.value.problems[0]).startswith(f"{place}: {words}")
         f"{tmp_path / 'site.yaml'}:{len(SITE.splitlines()) + 1}:{column}: {words}"
     )
