@@ -43,5 +43,3 @@ def test_a_wrong_entry_is_refused_where_it_stands(block, column, words, tmp_path
         loaded(block, tmp_path)
     place = f"{tmp_path / 'site.yaml'}:{len(SITE.splitlines()) + 1}:{column}"
     assert str(refused.value.problems[0]).startswith(f"{place}: {words}")
-        f"{tmp_path / 'site.yaml'}:{len(SITE.splitlines()) + 1}:{column}: {words}"
-    )
