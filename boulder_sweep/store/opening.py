@@ -87,6 +87,7 @@ class ClaimedFolder:
             different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
         if different:
             raise errors.SettingsDifferError(out, different)
+        there.identity = manifest.identity  # the heading of reports may be another
         recover_merge(there, out, storage)
         # Where the storage checks content itself, reading all of it again may take hours.
         damaged = damaged_parts(out, there.parts, read_parts=not storage.checks_content)
