@@ -18,8 +18,15 @@ ColumnType = Literal["int64", "float64", "dictionary"]
 Rows = Literal["all", "judged", "computed", "free", "rated", "overturned", "passing"]
 
 VERDICTS = ("pass", "fail", "undecided", "error")
-REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override")
+REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override", "foot", "shape")
 """The reasons of every verdict but ``error``, which has reasons of its own."""
+WAY_OUT = {
+    "foot": "soil that presses on a rounded foot also lifts, which is not modelled: bed it in concrete, cut it flat, "
+    "or bury it deeper and test",
+    "shape": "the boulder fills less than 95 % of the box of its length, width and height, and no box of the same mass "
+    "stands for it: choose a boulder more like a box",
+}
+"""What to do about the reasons that more accuracy or a longer simulation does not resolve."""
 GRADES = ("robust", "sensitive", "open")
 """What is known of a pass under other forms of the model."""
 STANDINGS = ("paper", "paper;broms", "paper;width_capped", "paper;broms;width_capped")
@@ -101,8 +108,9 @@ OPTIONAL_INPUTS: tuple[ColumnSpec, ...] = (
     ColumnSpec(
         "vehicle_second_spring_from_m", "float64", "m", "crush of the vehicle's front from which its second spring acts"
     ),
+    ColumnSpec("boulder_mass_kg", "float64", "kg", "mass of the boulder as weighed"),
 )
-"""Inputs of laws that are switched off where a file does not give them: their columns are in its tables only then."""
+"""Inputs that a file may leave out without a default: their columns are in its tables only where it gives them."""
 
 OUTCOMES: tuple[OutcomeColumn, ...] = (
     OutcomeColumn(
@@ -118,8 +126,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "reason",
         "dictionary",
         "",
-        "why: empty for a pass; no_contact, overturns or penetration for a fail; horizon, error, crush or override "
-        "where undecided; or why the row could not be computed",
+        "why: empty for a pass; no_contact, overturns or penetration for a fail; horizon, error, crush, override, foot "
+        "or shape where undecided; or why the row could not be computed",
         lambda facts: facts.reason,
         rows="all",
         words=REASONS,
@@ -233,6 +241,15 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         rows="judged",
     ),
     OutcomeColumn(
+        "solidity",
+        "float64",
+        "1",
+        "volume of the boulder over that of the box of its length, width and height, by its mass and the density of "
+        "its rock; 1 where no mass is given",
+        lambda facts: facts.designs.solidity,
+        rows="judged",
+    ),
+    OutcomeColumn(
         "validity",
         "dictionary",
         "",
@@ -300,6 +317,10 @@ Null where the boulder overturns, where the vehicle still drives on at the end, 
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
 OPTIONAL_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OPTIONAL_INPUTS)
+SECOND_SPRING_COLUMNS: tuple[str, str] = ("vehicle_second_spring_N_m", "vehicle_second_spring_from_m")
+"""Those of a vehicle whose front stiffens."""
+BOULDER_MASS = "boulder_mass_kg"
+"""That of a boulder that has been weighed."""
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
 BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *AT_REST, *OPTIONAL_INPUTS)}
 

@@ -13,9 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
 
-SECOND_SPRING = "vehicle_second_spring_N_m"
+SECOND_SPRING = SECOND_SPRING_COLUMNS[0]
+SIDES = ("boulder_length_m", "boulder_width_m", "boulder_height_m")
+LEAST_SOLIDITY, MOST_SOLIDITY = 0.95, 1.05
+"""Volume of a boulder by its mass over that of the box of its sides, between which it counts as that box: sides and
+mass are not measured better. With less no box of the same mass stands for it, more is a mistake."""
 MAX_DICTIONARY = 1 << 16
 """Largest dictionary of a column; beyond that a column holds one value per row."""
 
@@ -179,6 +183,7 @@ REASONS = (
     "hood is lower than the bumper",
     "impact height is above the top of the boulder",
     "second spring of the vehicle is softer than the first",
+    "boulder is heavier than a solid box of its size and rock",
 )
 
 
@@ -216,6 +221,19 @@ def refusal(
 def refusal_of_springs(codes: np.ndarray, spring: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return the same for vehicles with a second spring, which must not be softer than the first."""
     return np.where(codes == 0, 4 * (second < spring), codes).astype(np.int8)
+
+
+def solidity_of(
+    mass: np.ndarray, density: np.ndarray, length: np.ndarray, width: np.ndarray, height: np.ndarray
+) -> np.ndarray:
+    """Return the volume of boulders of a mass [kg] and rock [kg/m^3] over that of the boxes of their sides [m]."""
+    return mass / (density * (length * width * height))
+
+
+def refusal_of_mass(codes: np.ndarray, mass: np.ndarray, density: np.ndarray, *sides: np.ndarray) -> np.ndarray:
+    """Return the same as `refusal` for boulders that were weighed."""
+    heavy = solidity_of(mass, density, *sides) > MOST_SOLIDITY
+    return np.where(codes == 0, 5 * heavy, codes).astype(np.int8)
 
 
 class DesignPlan:
@@ -261,6 +279,9 @@ class DesignPlan:
         if SECOND_SPRING in self.columns:
             springs = (self.columns[name] for name in ("vehicle_spring_N_m", SECOND_SPRING))
             self.refusals = self.combine(refusal_of_springs, self.refusals, *springs)
+        if BOULDER_MASS in self.columns:
+            weighed = (self.columns[name] for name in (BOULDER_MASS, "boulder_density_kg_m3", *SIDES))
+            self.refusals = self.combine(refusal_of_mass, self.refusals, *weighed)
 
     def combine(self, function: Callable[..., np.ndarray], *inputs: Quantity) -> Quantity:
         """Return ``function(*inputs)`` over all combinations if these are few, else per row."""
@@ -348,6 +369,9 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
     codes = refusal(height, embedment, bumper, hood, impact)
     if SECOND_SPRING in values:
         codes = refusal_of_springs(codes, values["vehicle_spring_N_m"], values[SECOND_SPRING])
+    if BOULDER_MASS in values:
+        weighed = (values[name] for name in (BOULDER_MASS, "boulder_density_kg_m3", *SIDES))
+        codes = refusal_of_mass(codes, *weighed)
     names = (*INPUT_COLUMNS, *(name for name in OPTIONAL_COLUMNS if name in values))
     columns = {name: Column(None, np.ascontiguousarray(values[name])) for name in names}
     return DesignBlock(0, len(codes), columns, Reasons(codes, REASONS))

@@ -20,7 +20,7 @@ from boulder_sweep.answers.questions import Question
 from boulder_sweep.answers.result import Result
 from boulder_sweep.answers.search import BLOCKED, WORDS
 from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, other_readings, ranges
-from boulder_sweep.columns import OPTIONAL_COLUMNS
+from boulder_sweep.columns import SECOND_SPRING_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
@@ -205,7 +205,12 @@ def need(
             "the friction angle is asked for, and partial_factor would not be applied to the answer; remove it from "
             "the file, then multiply the tangent of the answer by it"
         )
-    if key.name in OPTIONAL_COLUMNS and key.name not in sweep.plan.given:
+    if BOULDER_MASS.name in sweep.plan.given and key.name in (BOULDER_MASS.name, *SIDES, "boulder_density_kg_m3"):
+        raise QuestionError(
+            f"{key.field.path} cannot be searched beside boulder.mass, which is that of one boulder; "
+            "remove it from the file and give boulder.density"
+        )
+    if key.name in SECOND_SPRING_COLUMNS and key.name not in sweep.plan.given:
         raise QuestionError(
             f"the vehicle of {sweep.name} has no second spring; give it both vehicle.second_spring and "
             f"vehicle.second_spring_from, of which {key.field.path} is then searched"
@@ -218,8 +223,8 @@ def need(
         variants = tuple(judges_of(one, least_margin, compared=True) for one in every_reading(sweep))
     if robust and not can_be_asked(sweep):
         raise QuestionError(
-            "--robust: second opinions know elastic, dry, level, uniform soil without cohesion, one spring of the "
-            "vehicle and corrected readings only"
+            "--robust: second opinions know rock of given density, elastic, dry, level, uniform soil without cohesion, "
+            "one spring of the vehicle and corrected readings only"
         )
     if robust and drawn:
         raise QuestionError("--robust and --probability cannot be used together")

@@ -18,6 +18,7 @@ from boulder_sweep.answers.printing import (
     Cell,
     Column,
     Row,
+    foot_lines,
     grade_lines,
     head_of,
     leading,
@@ -93,6 +94,7 @@ def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "G
     if by_soil and need.others:
         lines.append("(by the readings of the file; -o writes those by the others as well)")
     remarks = [*_legend(need, file), *_grades(need), *_outside(need)]
+    remarks += foot_lines(need.sweep.model, need.arrow["reason"].unique().to_pylist())
     if need.key.name == BOULDER_MASS.name:
         remarks += _edges(need, units, file)
     return [*lines, *(part for line in remarks for part in textwrap.wrap(line, width, subsequent_indent="  "))]
@@ -112,7 +114,7 @@ def _by_soil(need: Need, rows: Sequence[Row], width: int, units: str) -> list[li
     None for the lightest boulder, which differs by soil, for a list of designs, or where no soil varies.
     """
     key, open_ = need.key, (need.key.name, *need.derived)
-    names = [name for name in HEADS if name not in open_ and varies(need.sweep, need.arrow, name)]
+    names = [name for name in HEADS if name not in (*open_, BOULDER_MASS.name) and varies(need.sweep, need.arrow, name)]
     labels = [name for name in need.sweep.plan.labels if name in need.arrow.column_names]
     soils = [((name, ""), word_of(name)) for name in labels if name == SOIL]
     soils += [(head_of(name, units), number_of(name)) for name in names if BY_NAME[name].section == SOIL]
@@ -217,7 +219,8 @@ def need_columns(need: Need, units: str = "si") -> list[Column]:
     key = need.key
     open_ = (key.name, *need.derived)
     unit, size = (key.field.unit, 1.0) if units == "si" else shown_unit(key.field.unit, units)
-    columns = leading(need.sweep, need.arrow, [name for name in HEADS if name not in open_], units)
+    names = [name for name in HEADS if name not in (*open_, BOULDER_MASS.name)]  # which has a column of its own
+    columns = leading(need.sweep, need.arrow, names, units)
     if key.name == BOULDER_MASS.name:
         columns.append((("mass", unit), _answer(key, "", size)))
         columns += [(head_of(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]

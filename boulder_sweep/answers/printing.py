@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.columns import BY_NAME as COLUMNS
-from boulder_sweep.columns import GRADES
+from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3
 from boulder_sweep.settings.shown_units import shown_unit
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.reserves import Reserve, Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
     from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.model import Model
 
 WIDTH = 80
 MOST_LINES = 40
@@ -29,6 +31,7 @@ HEADS = {
     "boulder_width_m": ("W", "m"),
     "boulder_height_m": ("H", "m"),
     "boulder_density_kg_m3": ("rock", "kg/m³"),
+    "boulder_mass_kg": ("stone", "kg"),
     "embedment_depth_m": ("depth", "m"),
     "embedment_ratio": ("ratio", "d/H"),
     "impact_height_m": ("blow", "m"),
@@ -67,6 +70,16 @@ def grade_lines(rows: Iterable[Row]) -> list[str]:
     occurring = {(row["robustness"], meaning_of(row)) for row in rows if row["robustness"]}
     ranked = sorted(occurring, key=lambda found: (GRADES.index(found[0]), found[1]))
     words = [f"{word}: {meaning}" for word, meaning in ranked]
+    return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
+
+
+def foot_lines(model: Model, reasons: Iterable[str | None] = ()) -> list[str]:
+    """Return on which foot boulders stand, of what rock they are if that is assumed, and what to do about reasons."""
+    words = [FOOT_WORDS[model.foot]]
+    if model.rock_assumed:
+        words.append(f"rock: {ROCK_KG_M3:g} kg/m^3 assumed (boulder.density); no pass is robust")
+    occurring = set(reasons)
+    words += [f"undecided ({reason}): {advice}" for reason, advice in WAY_OUT.items() if reason in occurring]
     return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
 
 
@@ -110,6 +123,7 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
     if found.sweep.model.second_opinion:
         lines += grade_lines(rows)
+    lines += foot_lines(found.sweep.model)
     if count == 1:
         lines += ["", *_index_lines(found, width)]
     return lines
@@ -156,7 +170,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, u
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
     if any(sign in line for line in lines for sign in "≥≤"):
         lines.append("≥, ≤: passes at the worst value tried")
-    return lines + grade_lines(rows)
+    return [*lines, *grade_lines(rows), *foot_lines(found.sweep.model)]
 
 
 def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:

@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from boulder_sweep.answers.search import WORDS
-from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
+from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID, INPUTS
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.errors import settings_file
@@ -72,7 +72,7 @@ def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Seq
         ("passes_at", unit, "the same as the answer: judged as a run judges it", _numbers(own.passes)),
         ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(own.kind, WORDS)),
         ("passes_within", unit, "where it fails again further on: all stretches that pass", _words(own.stretches)),
-        (*MASS, number_array(boulder_mass(block))),
+        *([] if BOULDER_MASS in block.columns else [(*MASS, number_array(boulder_mass(block)))]),
     ]
     for other, name in zip(answers[1:], readings[1:], strict=True):
         columns += [
@@ -226,6 +226,8 @@ def with_columns(table: pa.Table, columns: Sequence[tuple[str, str, str, Any]]) 
 
 def boulder_mass(block: DesignBlock) -> np.ndarray:
     """Mass of the boulders of a block [kg], shape (n,)."""
+    if BOULDER_MASS in block.columns:
+        return block.columns[BOULDER_MASS].to_numpy()
     sides = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
     return np.prod([block.columns[side].to_numpy() for side in sides], axis=0)
 

@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.columns import BY_NAME, VERDICTS
-from boulder_sweep.settings.model import RESISTANCES
+from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
+from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES, ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
     lines += [
         "",
         *robustness_lines(summary.reasons),
+        *foot_lines(summary.boulder, summary.reasons),
         *firmness_lines(summary.firmness),
         *accuracy_lines(summary.accuracy),
         f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
@@ -84,6 +85,17 @@ def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
     lines = [f"pass   is {NOT_A_RATING}", *_indent(f"robust: {IN_WORDS}", "       ")]
     if "pass/open" in reasons:
         lines.append("       open: not asked; --second-opinion asks")
+    return lines
+
+
+def foot_lines(boulder: Mapping[str, Any], reasons: Mapping[str, int]) -> list[str]:
+    """Return on which foot the boulders stand, of what rock if that is assumed, and what to do about their reasons."""
+    lines = [FOOT_WORDS[boulder["foot"]].replace("foot: ", "foot   ")] if boulder else []
+    if boulder.get("rock_assumed"):
+        lines.append(f"rock   {ROCK_KG_M3:g} kg/m^3 assumed (boulder.density); no pass is robust")
+    for reason, advice in WAY_OUT.items():
+        if f"undecided/{reason}" in reasons:
+            lines += _indent(f"{reason}: {advice}", "       ")
     return lines
 
 

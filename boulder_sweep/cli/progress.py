@@ -23,8 +23,8 @@ PLAIN_EVERY_S = 10.0
 COMPILED = {
     "table": ("lanes.run_lanes", "f81,boulder_kernels.lanes:Queue", 15.0),
     "design": ("impact.simulate", "", 20.0),
-    "elements-table": ("table.run_rows", "f82,n,n,n", 20.0),
-    "springs-table": ("table.run_rows", "f82,n,n,f82", 20.0),
+    "elements-table": ("table.run_rows", "f82,n,n,n,n", 20.0),
+    "springs-table": ("table.run_rows", "f82,n,n,n,f82", 20.0),
     "springs-design": ("impact.simulate", "SecondSpring", 20.0),
     "layers-table": ("lanes.run_lanes", "LayeredLanes", 20.0),
     "layers-design": ("impact.simulate", "SoilProfile", 30.0),

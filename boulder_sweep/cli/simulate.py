@@ -29,6 +29,7 @@ from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 if TYPE_CHECKING:
     from boulder_sweep.impact.explanation import Explanation
     from boulder_sweep.impact.trajectory import Trajectory
+    from boulder_sweep.settings.model import Model
 
 SIMULATE_EXAMPLES = """\b
 Examples:
@@ -101,7 +102,7 @@ def simulate(
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         columns = ["", *console.value_lines(shown_values(row, units))] if every else []
-        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row), *columns)
+        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row, sweep.model), *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:
@@ -117,16 +118,16 @@ def simulate(
     return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0
 
 
-def _cautions(row: dict[str, Any]) -> list[str]:
+def _cautions(row: dict[str, Any], model: Model) -> list[str]:
     """Return the remarks that go with the result."""
-    from boulder_sweep.answers.printing import grade_lines
+    from boulder_sweep.answers.printing import foot_lines, grade_lines
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
 
     cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
     cautions += ["see docs/validity.md"] if cautions else []
-    if row["verdict"] != "pass":
-        return cautions
-    return [*grade_lines([row]), *cautions, f"pass: {NOT_A_RATING}"]
+    if row["verdict"] == "pass":
+        cautions = [*grade_lines([row]), *cautions, f"pass: {NOT_A_RATING}"]
+    return [*cautions, *foot_lines(model, [row["reason"]])]
 
 
 EXPLAIN_EXAMPLES = """\b

@@ -171,6 +171,8 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
             model["resistance"],
             unloading=UNLOADINGS[control.unloading],
             second_opinion=tuple(model.get("second_opinion", ())),
+            foot=model["foot"],
+            rock_assumed=model.get("rock_assumed", False),
             **ground.fields(),
         ),
         solver=SolverSettings(

@@ -34,7 +34,7 @@ from boulder_kernels.table import (
     simulate_impact,
     step_of_solution,
 )
-from boulder_sweep.columns import AT_REST, INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import AT_REST, BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.inputs import designs_of
@@ -45,7 +45,7 @@ from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
-from boulder_sweep.settings.model import ReadingChoice, SolverSettings
+from boulder_sweep.settings.model import ROCK_KG_M3, Model, ReadingChoice, SolverSettings
 from boulder_sweep.soils import plain
 
 __all__ = ["Trajectory", "simulate"]
@@ -162,13 +162,17 @@ def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
     constants = _DEFAULTS | {name: float(given[name]) for name in names if name in given}
     if "embedment_depth_m" in constants:
         constants.pop("embedment_ratio", None)
+    rock_assumed = BOULDER_MASS in constants and "boulder_density_kg_m3" not in constants
+    if rock_assumed:
+        constants["boulder_density_kg_m3"] = ROCK_KG_M3
     optional = {"impact_height_m", "embedment_depth_m" if "embedment_ratio" in constants else ""}
     missing = [name for name in INPUT_COLUMNS if name not in constants and name not in optional]
     if missing:
         raise ValueError(f"the design lacks {', '.join(missing)}")
-    if 0 < len(half := [name for name in OPTIONAL_COLUMNS if name in constants]) < len(OPTIONAL_COLUMNS):
-        raise ValueError(f"a second spring needs {' and '.join(OPTIONAL_COLUMNS)}, not {half[0]} alone")
-    return Sweep(name="design", path=None, axes=(), constants=constants)
+    springs = SECOND_SPRING_COLUMNS
+    if 0 < len(half := [name for name in springs if name in constants]) < len(springs):
+        raise ValueError(f"a second spring needs {' and '.join(springs)}, not {half[0]} alone")
+    return Sweep(name="design", path=None, axes=(), constants=constants, model=Model(rock_assumed=rock_assumed))
 
 
 def _changed(

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_kernels import DesignTable, SecondSprings
-from boulder_sweep.designs import SECOND_SPRING
+from boulder_sweep.columns import BOULDER_MASS
+from boulder_sweep.designs import SECOND_SPRING, solidity_of
 from boulder_sweep.settings.model import RESISTANCES, Ground
 from boulder_sweep.soils import with_soil
 
@@ -44,6 +45,8 @@ class Designs(NamedTuple):
     """Distance from the front bumper to the leading edge of the cargo bed [m], shape (n,)."""
     springs: SecondSprings | None = None
     """Second springs of the vehicles, SI, where the file gives them."""
+    fills: np.ndarray | None = None
+    """`solidity` where the file gives masses; None of boxes."""
 
     @property
     def size(self) -> int:
@@ -56,7 +59,13 @@ class Designs(NamedTuple):
         springs = self.springs
         if springs is not None:
             springs = SecondSprings(*(np.ascontiguousarray(column[chosen]) for column in springs))
-        return Designs(table, self.bed_offset[chosen], springs)
+        fills = None if self.fills is None else self.fills[chosen]
+        return Designs(table, self.bed_offset[chosen], springs, fills)
+
+    @property
+    def solidity(self) -> np.ndarray:
+        """Volume of each boulder over that of the box of its sides, shape (n,)."""
+        return np.ones(self.size) if self.fills is None else self.fills
 
     @property
     def laws(self) -> tuple[SecondSprings, ...]:
@@ -87,8 +96,14 @@ def designs_of(
         springs = SecondSprings(
             _values(block, SECOND_SPRING, rows), _values(block, "vehicle_second_spring_from_m", rows)
         )
+    fills = None
+    if BOULDER_MASS in block.columns:
+        mass, sides = _values(block, BOULDER_MASS, rows), (columns["L"], columns["W"], columns["H"])
+        fills = solidity_of(mass, columns["rho_b"], *sides)
+        # The box has the mass of the boulder.
+        columns["rho_b"] = mass / (sides[0] * sides[1] * sides[2])
     table = with_soil(DesignTable(**columns), resistance, ground or Ground())
-    return Designs(table, _values(block, "bed_offset_m", rows), springs)
+    return Designs(table, _values(block, "bed_offset_m", rows), springs, fills)
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

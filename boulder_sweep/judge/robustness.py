@@ -47,7 +47,8 @@ SENSITIVE_IN_WORDS = (
 MEANINGS = {
     "robust": IN_WORDS,
     "sensitive": SENSITIVE_IN_WORDS,
-    "open": "second opinions know elastic, dry, level, uniform soil, one spring and corrected readings only",
+    "open": "second opinions know rock of given density, elastic, dry, level, uniform soil, one spring and corrected "
+    "readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
 GIVES_WAY = (
@@ -83,9 +84,12 @@ AT_ONCE = 400
 
 
 def can_be_asked(sweep: Sweep) -> bool:
-    """Return whether the designs of a sweep are such as second opinions know: one spring, plain dry soil, corrected."""
+    """Return whether the designs of a sweep are such as second opinions know.
+
+    They know one spring of the vehicle, plain dry soil and corrected readings, and are not asked of assumed rock.
+    """
     model = sweep.model
-    plain = model.ground.is_usual and model.unloading == UNLOADINGS[0]
+    plain = model.ground.is_usual and model.unloading == UNLOADINGS[0] and not model.rock_assumed
     return plain and model.preset == "corrected" and SECOND_SPRING not in sweep.plan.columns
 
 

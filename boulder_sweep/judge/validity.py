@@ -106,7 +106,7 @@ FLAGS = (
         "a density that rock does not have",
         f"boulder density outside {_ROCK[0]:.0f} to {_ROCK[1]:.0f} kg/m³",
         "The granites tested have 2596 and 3074 kg/m³; lighter sound rock is rare.",
-        lambda facts: _outside(facts.designs.table.rho_b, *_ROCK),
+        lambda facts: _outside(facts.designs.table.rho_b / facts.designs.solidity, *_ROCK),
     ),
     Flag(
         "soil_pair",

@@ -7,17 +7,20 @@ for the page of a report:
 2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
 3. ``fail / overturns``: the rotation reached its limit. A small penetration does not change that.
 4. ``fail / penetration``: the truck's cargo bed ends further behind the boulder than its rating allows.
-5. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
-6. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
-7. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
+5. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts.
+6. ``undecided / shape``: by its mass the boulder fills less than 95 % of the box of its sides.
+7. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
+8. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
+9. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
    penetration stay below their limits.
-8. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
-9. ``pass``. Where a reading lets forces feed energy, as the printed ones do, nothing can be proved of later times; such
-   rows are undecided by rule 7, unless a comparison of readings asks only what stands to the end of the simulated time.
+10. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
+11. ``pass``. Where a reading lets forces feed energy, as the printed ones do, nothing can be proved of later times;
+    such rows are undecided by rule 9, unless a comparison of readings asks only what stands to the end of the
+    simulated time.
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
 one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.
-Where errors are those of one solution, as by ``fast``, rows of rule 8 stay as they are; else finer steps decide them.
+Where errors are those of one solution, as by ``fast``, rows of rule 10 stay as they are; else finer steps decide them.
 """
 
 from __future__ import annotations
@@ -31,11 +34,13 @@ import boulder_kernels.verdict as verdicts
 from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
 from boulder_kernels.verdict import RULINGS, VerdictLimits, write_rulings
 from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, Rows
+from boulder_sweep.designs import LEAST_SOLIDITY
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import (
     CRUSH,
     ERROR,
     FAIL,
+    FOOT,
     HORIZON,
     NO_CONTACT,
     NO_REASON,
@@ -44,12 +49,13 @@ from boulder_sweep.judge.judged import (
     OVERTURNS,
     PASS,
     PENETRATION,
+    SHAPE,
     UNDECIDED,
     Judged,
 )
 from boulder_sweep.judge.robustness import grades_without_asking, is_studied
 from boulder_sweep.judge.validity import TESTED_ROTATION_DEG, flagged
-from boulder_sweep.settings.model import Criterion, Model
+from boulder_sweep.settings.model import FEET, Criterion, Model
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -76,6 +82,8 @@ RULES = (
     (FAIL, NO_CONTACT),
     (FAIL, OVERTURNS),
     (FAIL, PENETRATION),
+    (UNDECIDED, FOOT),
+    (UNDECIDED, SHAPE),
     (UNDECIDED, CRUSH),
     (UNDECIDED, OVERRIDE),
     (UNDECIDED, HORIZON),
@@ -103,6 +111,8 @@ class Limits(NamedTuple):
     """Whether a pass must be proved also where the readings allow no proof; without, such rows pass and are flagged."""
     studied: bool = False
     """Whether the study of second opinions speaks for the model, see `boulder_sweep.judge.robustness`."""
+    flat_foot: bool = True
+    """Whether the boulders stand on a flat foot."""
     guarded: bool = True
     """Whether a row nearer to a limit than its error is undecided; not in a search whose results are judged again."""
 
@@ -191,14 +201,16 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     """Apply the rules; see `judge`."""
     status = np.asarray(outcomes.status)
     table = designs.table
-    sizes = np.stack([table.L, table.H, table.d, table.e_bumper, designs.bed_offset])
+    flat = np.full(designs.size, float(limits.flat_foot))
+    known = (designs.solidity >= LEAST_SOLIDITY).astype(float)
+    sizes = np.stack([table.L, table.H, table.d, table.e_bumper, designs.bed_offset, flat, known])
     rulings = np.empty((len(RULINGS), len(status)))
-    known = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1 : len(OutcomeTable._fields)]))
+    given = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1 : len(OutcomeTable._fields)]))
     if not limits.guarded:
         unknown = np.full(len(status), np.nan)
-        known = known._replace(theta_error=unknown, x_error=unknown)
+        given = given._replace(theta_error=unknown, x_error=unknown)
     held = VerdictLimits(limits.rotation, limits.penetration, limits.min_overlap, limits.proved)
-    write_rulings(known, sizes, held, rulings)
+    write_rulings(given, sizes, held, rulings)
     rule, overlap, penetration, margin = rulings[0].astype(np.intp), *rulings[1:]
     verdict = np.array([kind for kind, _ in RULES], dtype=np.int32).take(rule)
     reason = np.array([why for _, why in RULES], dtype=np.int32).take(rule)
@@ -253,6 +265,7 @@ def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
         tested_rotation=math.radians(tested),
         studied=is_studied(sweep),
         proved=proved,
+        flat_foot=sweep.model.foot == FEET[0],
     )
 
 

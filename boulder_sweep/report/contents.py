@@ -16,9 +16,9 @@ from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
-from boulder_sweep.columns import INPUTS, OPTIONAL_COLUMNS, OPTIONAL_INPUTS, OUTCOMES, VERDICTS
+from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, VERDICTS
 from boulder_sweep.columns import REASONS as VERDICT_REASONS
-from boulder_sweep.designs import REASONS
+from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.validity import (
@@ -36,7 +36,7 @@ from boulder_sweep.settings.choices import LAYER_FIELDS
 from boulder_sweep.settings.consistency import FLOATS, SLIDES, uppermost_is_wet
 from boulder_sweep.settings.fields import BY_NAME, fields_of
 from boulder_sweep.settings.leaf import OUTSIDE, sample_of
-from boulder_sweep.settings.model import RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
+from boulder_sweep.settings.model import FEET, RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
 from boulder_sweep.settings.notes import (
     BEYOND_FRONT,
     FAMILY_FACTOR,
@@ -65,7 +65,10 @@ OUTCOME_WORDS = {
 """Outcomes of a design that the page shows."""
 
 
-REFUSED_AT = ("", "embedment_depth_m", "hood_height_m", "impact_height_m", "vehicle_second_spring_N_m")
+REFUSED_AT = (
+    *("", "embedment_depth_m", "hood_height_m", "impact_height_m"),
+    *("vehicle_second_spring_N_m", "boulder_mass_kg"),
+)
 """The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`."""
 ANGLES = np.arange(20.0, 61.0)
 """Friction angles [deg] at which the page knows which soil constants belong together."""
@@ -112,6 +115,12 @@ def page_data(
             "most": MOST_CRUSH,
             "beyond": BEYOND_FRONT,
             "short": SHORT_OF_FRONT,
+        },
+        "boulder": {
+            "flat_foot": float(settings["model"]["foot"] == FEET[0]),
+            "rock_assumed": settings["model"].get("rock_assumed", False),
+            "least_solidity": LEAST_SOLIDITY,
+            "most_solidity": MOST_SOLIDITY,
         },
         "words": REASON_WORDS,
         "step_s": reported_step_s(control),
@@ -198,13 +207,13 @@ def _layout() -> dict[str, Any]:
         "settings": entry_points.SETTINGS,
         "outcome": entry_points.OUTCOME,
         "history": entry_points.HISTORY,
-        "sizes": ["bed_offset_m" if name == "bed_offset" else SOURCES[name] for name in verdicts.SIZES],
+        "sizes": ["bed_offset_m" if name == "bed_offset" else SOURCES.get(name, name) for name in verdicts.SIZES],
         "rulings": verdicts.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": entry_points.LAYER_ROOM,
         "element_room": entry_points.ELEMENT_ROOM,
         "memory_room": entry_points.MEMORY_ROOM,
-        "columns": {**SOURCES, **dict(zip(SecondSpring._fields, OPTIONAL_COLUMNS, strict=True))},
+        "columns": {**SOURCES, **dict(zip(SecondSpring._fields, SECOND_SPRING_COLUMNS, strict=True))},
     }
 
 
@@ -323,6 +332,7 @@ def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str,
         for entry in fields_of("criterion")
     ]
     return {
+        "boulder": [f"foot: {model['foot']}"],
         "vehicle": [f"calibrated_crush: {_quantity(model['calibrated_crush_m'], 'm', system)}"],
         "soil": _ground_entries(ground, system),
         "lines": [

@@ -246,7 +246,7 @@ def rulings(n: int, outcomes_at: Any, sizes_at: Any, limits_at: Any, rulings_at:
     s = carray(limits_at, (4,))
     limits = VerdictLimits(s[0], s[1], s[2], s[3] > 0.0)
     table = outcomes_from(carray(outcomes_at, (11, n)))
-    write_rulings(table, carray(sizes_at, (5, n)), limits, carray(rulings_at, (4, n)))
+    write_rulings(table, carray(sizes_at, (7, n)), limits, carray(rulings_at, (4, n)))
 
 
 @inlined

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.columns import COLUMNS, INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import BOULDER_MASS, COLUMNS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.impact.explanation import one_design
 from boulder_sweep.judge.evaluation import evaluation_of, known_control
@@ -185,6 +185,8 @@ class Rows:
 
     def mass(self) -> np.ndarray:
         """Mass of the boulder [kg] of every design, in the same shape."""
+        if BOULDER_MASS in self.inputs:
+            return self.inputs[BOULDER_MASS]
         length, width, height, density = (self.inputs[name] for name in SIZES)
         return length * width * height * density
 

@@ -20,7 +20,7 @@ from boulder_sweep.report.printing import print_page
 from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
-from boulder_sweep.settings.model import SolverSettings, completed
+from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3, SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system
 from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
@@ -217,7 +217,9 @@ def _notes_on_rules(judged_by: str) -> list[str]:
 
 def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
     """Return notes on how these designs are simulated."""
-    notes = []
+    notes = [f"{FOOT_WORDS[settings['model']['foot']].capitalize()}."]
+    if settings["model"].get("rock_assumed"):
+        notes.append(f"The density of the rock was not given: {ROCK_KG_M3:g} kg/m³ is assumed, and no pass is robust.")
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:

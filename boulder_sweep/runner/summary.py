@@ -67,6 +67,8 @@ class Summary:
         How many verdicts of a sample small changes of the inputs would change, see `boulder_sweep.judge.firmness`.
     notes
         What the user should know: damaged parts that were computed again, lost workers.
+    boulder
+        What is assumed of the boulders: their ``foot``, and whether the density of the rock is (``rock_assumed``).
     """
 
     out: Location
@@ -82,6 +84,7 @@ class Summary:
     accuracy: dict[str, Any] = field(default_factory=dict)
     firmness: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    boulder: dict[str, Any] = field(default_factory=dict)
 
     @property
     def rows_per_second(self) -> float:
@@ -150,6 +153,7 @@ def summary_of(
 ) -> Summary:
     """Return the summary of a finished run from the manifest it left."""
     reasons = manifest.verdicts
+    model = manifest.identity["settings"]["model"]
     verdicts: dict[str, int] = {}
     for key, count in reasons.items():
         verdict = key.partition("/")[0]
@@ -168,4 +172,5 @@ def summary_of(
         accuracy=manifest.identity.get("accuracy", {}),
         firmness=firmness,
         notes=tuple(notes),
+        boulder={name: model[name] for name in ("foot", "rock_assumed") if name in model},
     )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from boulder_sweep.columns import BOULDER_MASS
+from boulder_sweep.designs import MOST_SOLIDITY
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
-from boulder_sweep.settings.model import WATER_KG_M3, Layer, SolverSettings
+from boulder_sweep.settings.model import ROCK_KG_M3, WATER_KG_M3, Layer, SolverSettings
 
 SLIDES = "or the ground slides"
 """What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""
@@ -25,6 +27,8 @@ def check_complete(entries: Entries) -> None:
         if field.name in listed and field.path in entries.given:
             message = f"is given here and as column {field.name} of the table; remove one"
             entries.problems.add(entries.position_of(field), field.path, message)
+        if field.name == "boulder_density_kg_m3" and entries.gives_mass:
+            continue  # that of most rocks is assumed
         if not field.optional and not unread_table and field.path not in present | entries.misspelled:
             entries.problems.add(entries.position_of(field), field.path, "is required and missing")
     _check_embedment(entries, present, unread_table)
@@ -54,6 +58,7 @@ def check_pairs(entries: Entries) -> None:
         entries.problems.add(entries.key_position("vehicle", key), f"vehicle.{key}", message)
     _check_impact_height(entries, bumper)
     _check_second_spring(entries)
+    _check_mass(entries)
     _check_solver(entries)
     _check_uncertain(entries)
     _check_ground(entries)
@@ -86,6 +91,24 @@ def _check_second_spring(entries: Entries) -> None:
     if spring is not None and second is not None and second < spring:
         message = f"{second:g} N/m is softer than the first spring of {spring:g} N/m; a front that softens is refused"
         entries.problems.add(entries.key_position("vehicle", both[0].key), both[0].path, message)
+
+
+def _check_mass(entries: Entries) -> None:
+    """Report boulders that are all heavier than solid boxes of their size."""
+    density = entries.values("boulder_density_kg_m3")
+    sides = [entries.values(f"boulder_{side}_m") for side in ("length", "width", "height")]
+    mass = entries.values(BOULDER_MASS)
+    if not all(map(len, (mass, *sides))):
+        return
+    assumed = "" if len(density) else " assumed for it (give boulder.density)"
+    rock = float(density.max()) if len(density) else ROCK_KG_M3
+    box = rock * math.prod(float(side.max()) for side in sides)
+    if mass.min() > MOST_SOLIDITY * box:
+        message = (
+            f"{mass.min():g} kg is {mass.min() / box:.2f} times the mass of a solid box of this size, {box:.6g} kg at "
+            f"the density of {rock:g} kg/m^3{assumed}; at most {MOST_SOLIDITY:g} times can be a mistake of measurement"
+        )
+        entries.problems.add(entries.key_position("boulder", "mass"), "boulder.mass", message)
 
 
 def _check_solver(entries: Entries) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import read_setting
 from boulder_sweep.settings.distribution_reader import read_input
@@ -206,6 +207,12 @@ class Entries:
             return self.table.columns[name]
         leaf = self.leaves.get(name)
         return np.empty(0) if leaf is None else leaf.values
+
+    @property
+    def gives_mass(self) -> bool:
+        """Whether the file or its table gives the mass of the boulders, right or wrong."""
+        field = fields.BY_NAME[BOULDER_MASS]
+        return field.path in self.given or (self.table is not None and field.name in self.table.columns)
 
     def position_of(self, field: fields.Field) -> Position:
         """Return where a quantity stands, else its block, else the beginning of the file."""

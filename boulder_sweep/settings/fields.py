@@ -62,6 +62,14 @@ INPUTS: tuple[Field, ...] = (
         Usual(2400.0, 3074.0, "rock; a bare number is in kg/m^3, not in t/m^3 or pcf"),
         also=("rho", "rho_b", "unit_weight"),
     ),
+    _input(
+        "boulder.mass",
+        "boulder_mass_kg",
+        Bound(1e-3, 1e10, "a million times lighter or heavier than a boulder"),
+        Usual(1500.0, 65000.0, "usual boulders; a bare number is in kg, not in t or lb"),
+        also=("m_b", "weight"),
+        optional=True,
+    ),
     Field(
         "site",
         "embedment_ratio",
@@ -205,7 +213,7 @@ _OF_FILES = (
     ),
 )
 """Settings that change what the inputs say, and belong to no part of `boulder_sweep.settings.model`."""
-_IN_ORDER = ("soil", "partial_factor", "criterion", "vehicle", "model", "solver")
+_IN_ORDER = ("boulder", "soil", "partial_factor", "criterion", "vehicle", "model", "solver")
 SETTINGS: tuple[Field, ...] = tuple(
     sorted(
         (*_OF_FILES, *(entry for part in (Criterion, Model, SolverSettings) for entry in entries_of(part))),
@@ -221,7 +229,7 @@ LAYER_TOP = Field(
 
 FIELDS: tuple[Field, ...] = (*INPUTS, *SETTINGS)
 SECTIONS: dict[str, str] = {
-    "boulder": "the boulder, a box: its size and density",
+    "boulder": "the boulder, a box: its size and its density or mass",
     "site": "how the boulder stands in the ground",
     "soil": "the soil around the boulder",
     "vehicle": "the vehicle: mass, speed and the Maxwell element of its front",

@@ -16,7 +16,7 @@ from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
 from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
-from boulder_sweep.settings.model import Criterion, Model, SolverSettings
+from boulder_sweep.settings.model import ROCK_KG_M3, Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
 from boulder_sweep.settings.problems import ProblemList, SettingsError, check_regular_file, reason_of, refuse, shorten
 from boulder_sweep.settings.tree import Mapping, Scalar, parse
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 MAX_DESIGNS = 2**63 - 1
 """Most designs of a sweep: ``design_id`` is a 64-bit number."""
 
+DENSITY = "boulder_density_kg_m3"
 MAX_BYTES = 500_000
 """Largest settings file; real ones have a few kilobytes. Long lists of designs belong in a table."""
 
@@ -174,6 +175,10 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         value = entries.single(field.name)
         if value is not None and field.name not in listed:
             constants[field.name] = value
+    choices = _choices(entries)
+    if entries.gives_mass and DENSITY not in {*constants, *listed, *entries.leaves}:
+        constants[DENSITY] = ROCK_KG_M3
+        choices = (choices[0], replace(choices[1], rock_assumed=True), choices[2])
     spreads = {name: leaf.distribution for name, leaf in entries.leaves.items() if leaf.distribution is not None}
     sweep = Sweep(
         name,
@@ -181,7 +186,7 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         axes,
         constants,
         entries.table,
-        *_choices(entries),
+        *choices,
         distributions=spreads,
         correlation=entries.settings.get("correlation", 0.0),
         partial_factor=factor,

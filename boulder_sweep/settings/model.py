@@ -34,6 +34,17 @@ NO_OPINION = "none"
 """Stands in a file for no second opinion."""
 
 
+FEET = ("flat", "rounded")
+"""Shapes of the underside of a boulder; only the first is modelled."""
+FOOT_WORDS = {
+    "flat": "foot: flat (boulder.foot); a rounded one is not modelled",
+    "rounded": "foot: rounded (boulder.foot), which is not modelled",
+}
+"""What every answer says of it."""
+ROCK_KG_M3 = 2650.0
+"""Density of the rock that is assumed where only the mass of a boulder is given: that of granite and most others."""
+
+
 UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
 """How the soil unloads, in the order of the kernels; the first is the paper's."""
 PLASTIC_ELEMENTS = 200
@@ -333,6 +344,17 @@ class Model:
         admitted=Bound(0.0, 60.0, "less than the friction angle, or the ground does not stand"),
         also=("ground_slope", "inclination"),
     )
+    foot: str = setting(
+        "boulder.foot",
+        "",
+        "shape of the boulder's underside; a rounded one is not modelled, and its boulders are undecided",
+        FEET[0],
+        choices=FEET,
+        kind="a shape of the foot",
+        also=("base", "underside", "bottom"),
+    )
+    rock_assumed: bool = False
+    """Whether the density of the rock is `ROCK_KG_M3` because the file gives the mass of the boulders only."""
 
     @property
     def elements(self) -> int:
@@ -354,7 +376,7 @@ class Model:
 def completed(settings: dict[str, Any]) -> dict[str, Any]:
     """Return the resolved settings of a table with today's defaults for entries that are newer than it."""
     model = Model()
-    more = {name: getattr(model, name) for name in ("calibrated_crush_m", "resistance", "unloading")}
+    more = {name: getattr(model, name) for name in ("calibrated_crush_m", "resistance", "unloading", "foot")}
     return settings | {
         "criterion": asdict(Criterion()) | settings["criterion"],
         "model": more | settings["model"],

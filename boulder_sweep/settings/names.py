@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from boulder_sweep.settings.fields import INPUTS, Field
+from boulder_sweep.settings.fields import BY_NAME, INPUTS, Field
 from boulder_sweep.settings.problems import did_you_mean, shorten
 
-BOULDER_MASS = Field("boulder", "mass", "boulder_mass_kg", "kg", "mass of the boulder")
-"""The mass of the boulder, which is not an input but follows from four inputs."""
+BOULDER_MASS = BY_NAME["boulder_mass_kg"]
+"""The mass of the boulder: an input where a file gives it; else it follows from four others."""
 
 
 class UnknownNameError(ValueError):
@@ -30,7 +30,7 @@ class UnknownNameError(ValueError):
         return f"'{shorten(self.word)}' {self.what}"
 
 
-def named(word: str, among: Sequence[Field] = (*INPUTS, BOULDER_MASS)) -> Field:
+def named(word: str, among: Sequence[Field] = INPUTS) -> Field:
     """Return the entry that a word names; an input goes before a setting of the same key.
 
     Parameters
@@ -38,7 +38,7 @@ def named(word: str, among: Sequence[Field] = (*INPUTS, BOULDER_MASS)) -> Field:
     word
         Path of the entry (``boulder.width``), its key (``width``) or its column (``boulder_width_m``).
     among
-        Entries that may be meant; the inputs and the mass of the boulder by default.
+        Entries that may be meant; the inputs by default.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def named(word: str, among: Sequence[Field] = (*INPUTS, BOULDER_MASS)) -> Field:
     """
     matches = [field for field in among if word in (field.path, field.name)]
     matches = matches or [field for field in among if word == field.key]
-    matches = [field for field in matches if field in INPUTS or field == BOULDER_MASS] or matches
+    matches = [field for field in matches if field in INPUTS] or matches
     if len(matches) == 1:
         return matches[0]
     if matches:
@@ -59,6 +59,6 @@ def named(word: str, among: Sequence[Field] = (*INPUTS, BOULDER_MASS)) -> Field:
     ]
     every = (*short, *(field.path for field in among), *(field.name for field in among))
     hint = f"; did you mean {' or '.join(near)}?" if near else did_you_mean(word, every)
-    what = "an input" if all(field in (*INPUTS, BOULDER_MASS) for field in among) else "an entry of the file"
+    what = "an input" if all(field in INPUTS for field in among) else "an entry of the file"
     known = hint or f" ({', '.join(short)})"
     raise UnknownNameError(word, f"is not {what}{known}")

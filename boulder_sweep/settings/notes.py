@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boulder_sweep import elementary
+from boulder_sweep.columns import BOULDER_MASS, WAY_OUT
+from boulder_sweep.designs import LEAST_SOLIDITY, SIDES
 from boulder_sweep.settings.fields import BY_NAME, Field
+from boulder_sweep.settings.model import ROCK_KG_M3
 from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.problems import Position, Problem
 
@@ -65,6 +69,9 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Proble
         if off.any():
             message = _unusual("embedment_ratio", ratio[off])
             yield _note(positions["embedment_depth_m"], "site.embedment_depth", f"depth over height: {message}")
+    message = _on_mass(values, groups, sweep.model.rock_assumed)
+    if message:
+        yield _note(positions[BOULDER_MASS], "boulder.mass", message)
     message = _off_front(values, groups, sweep.model.calibrated_crush_m)
     if message:
         yield _note(positions["vehicle_spring_N_m"], "vehicle.spring", message)
@@ -80,6 +87,33 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Proble
     message = _off_families(angle, reaction) or _mixed_families(angle, reaction)
     if message:
         yield _note(positions["subgrade_reaction_MN_m3"], "soil.subgrade_reaction", message)
+
+
+def _on_mass(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], rock_assumed: bool) -> str:
+    """Return what is assumed of boulders that were weighed, and whether no box stands for them."""
+    if BOULDER_MASS not in values:
+        return ""
+    names = (BOULDER_MASS, "boulder_density_kg_m3", *SIDES)
+    listed = next((group for group in groups if len(group) > 1 and BOULDER_MASS in group), {})
+    if all(name in listed or len(values[name]) == 1 for name in names):
+        mass, rock, *sides = (values[name] for name in names)
+        solidity = mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0))
+    else:
+        ends = [(float(values[name].min()), float(values[name].max())) for name in names]
+        solidity = np.array([ends[0][i] / math.prod(end[1 - i] for end in ends[1:]) for i in range(2)])
+    fills = describe_share(solidity.min(), solidity.max())
+    words = [f"by its mass a boulder fills {fills} of the box of its length, width and height"]
+    if rock_assumed:
+        words[0] += f" if its rock has {ROCK_KG_M3:g} kg/m^3, which is assumed: give boulder.density. No pass is robust"
+    if solidity.min() < LEAST_SOLIDITY:
+        words.append(f"below {LEAST_SOLIDITY:.0%} designs are undecided (shape): {WAY_OUT['shape']}")
+    return "; ".join(words) if len(words) > 1 or rock_assumed else ""
+
+
+def describe_share(low: float, high: float) -> str:
+    """Return a range of shares in per cent."""
+    ends = f"{low:.0%}", f"{high:.0%}"
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def _pairs(

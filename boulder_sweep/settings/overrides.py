@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from boulder_sweep.settings.entries import TOP_KEYS
 from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import SECOND_OPINIONS
-from boulder_sweep.settings.names import BOULDER_MASS, UnknownNameError, named
+from boulder_sweep.settings.names import UnknownNameError, named
 from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, nearest, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse_node
 from boulder_sweep.settings.tree import Sequence as List
@@ -50,7 +50,7 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
         position, name = Position(option), shorten(key.strip())
         if len(path) == 1 and path[0] not in ("", *TOP_KEYS):
             try:
-                path = named(path[0], (*FIELDS, BOULDER_MASS)).path.split(".")
+                path = named(path[0], FIELDS).path.split(".")
             except UnknownNameError as unknown:
                 if nearest(path[0], TOP_KEYS) is None:
                     problems.add(position, name, unknown.what)

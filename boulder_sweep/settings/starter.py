@@ -66,6 +66,7 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "boulder.width": ("{from: 1.6 m, to: 2.4 m, step: 0.2 m}", "{from: 5 ft, to: 8 ft, step: 6 in}"),
     "boulder.height": ("{from: 2.4 m, to: 3.6 m, step: 0.2 m}", "{from: 8 ft, to: 12 ft, step: 6 in}"),
     "boulder.density": ("2600 kg/m^3", "162 pcf"),
+    "boulder.mass": ("18200 kg", "40000 lb"),
     "site.embedment_ratio": ("{from: 0.45, to: 0.75, step: 0.05}",) * 2,
     "site.embedment_depth": ("2 m", "6.5 ft"),
     "site.impact_height": ("0.9 m", "3 ft"),

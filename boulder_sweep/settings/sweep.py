@@ -210,6 +210,8 @@ class Sweep:
                 "calibrated_crush_m": self.model.calibrated_crush_m,
                 "resistance": self.model.resistance,
                 "unloading": self.model.unloading,
+                "foot": self.model.foot,
+                **({"rock_assumed": True} if self.model.rock_assumed else {}),
                 **({} if ground.is_usual else {"ground": ground.as_dict()}),
                 **({"second_opinion": list(opinions)} if (opinions := self.model.second_opinion) else {}),
             },

@@ -31,6 +31,7 @@ SYMBOLS = {
     "boulder_length_m": "length {}",
     "boulder_height_m": "height {}",
     "boulder_density_kg_m3": "boulder {}",
+    "boulder_mass_kg": "boulder {}",
     "soil_density_kg_m3": "soil {}",
     "impact_speed_m_s": "speed {}",
     "vehicle_mass_kg": "vehicle {}",
@@ -99,6 +100,8 @@ REASON_WORDS = {
     "horizon": "nothing proved at the end of the simulated time",
     "crush": "the truck would be inside the boulder",
     "override": "it hardly reaches the bumper",
+    "foot": "a rounded foot is not modelled",
+    "shape": "no box stands for its shape",
     "error": "too near to a limit for the accuracy",
 }
 

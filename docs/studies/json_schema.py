@@ -209,15 +209,22 @@ _FORMS: dict[str, Schema] = {
 """Entries that are more than a quantity."""
 
 
+DENSITY, BOULDER_MASS = "boulder_density_kg_m3", "boulder_mass_kg"
+"""One of these suffices."""
+
+
 def _what_is_required() -> Schema:
     """Return what must be there; beside a table, its columns may hold any of it."""
     sections: Schema = {}
     for field in INPUTS:
         if not field.optional:
-            sections.setdefault(field.section, {"required": []})["required"].append(field.key)
+            needed = sections.setdefault(field.section, {"required": []})["required"]
+            needed += [] if field.name == DENSITY else [field.key]
     for section in set(NAMED_SETS) & set(sections):
         sections[section]["items"] = {"required": sections[section]["required"]}
     embedment = [field for field in INPUTS if field.name in EMBEDMENT]
     sections[embedment[0].section] = {"oneOf": [{"required": [field.key]} for field in embedment]}
+    density_or_mass = [BY_NAME[name].key for name in (DENSITY, BOULDER_MASS)]
+    sections[BY_NAME[DENSITY].section]["anyOf"] = [{"required": [key]} for key in density_or_mass]
     whole = {"required": list(sections), "properties": sections}
     return {"if": {"not": {"required": ["table"]}}, "then": whole}

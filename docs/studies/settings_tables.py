@@ -63,6 +63,8 @@ def _default(field: Field) -> str:
     """What holds where an entry is not given."""
     if field.name in DEFAULTS:
         return DEFAULTS[field.name]
+    if field.name == "boulder_density_kg_m3":
+        return "required, unless `boulder.mass` is given"
     if not field.optional:
         return "required"
     return default_text(field)

@@ -196,18 +196,43 @@ def boulder_mass(design: Design) -> float:
     return design.rho_b * design.L * design.W * design.H
 
 
+class Body(NamedTuple):
+    """The boulder as a rigid body. X counts from where the vehicle strikes it, heights from its base."""
+
+    m_b: float
+    """Mass [kg] (Eq 15)."""
+    J: float
+    """Moment of inertia about its own centre [kg m^2] (Eq 16, first term)."""
+    x: float
+    """Its centre, in X [m]."""
+    y: float
+    """Height of its centre [m]."""
+    line: float
+    """Line of the soil elements, in X: the far face [m]."""
+    foot: float
+    """Half the length of its foot [m]."""
+    lean: float
+    """Its centre before the middle of the foot, towards the vehicle [m]."""
+
+
 @exact_inlined
-def boulder_inertia(design: Design, m_b: float, c_x: float, c_y: float, box: bool) -> float:
+def body_of_box(design: Design) -> Body:
+    """Return the box of the paper as a rigid body (Eqs 3, 4, 15, 16)."""
+    m_b, H, L = boulder_mass(design), design.H, design.L
+    return Body(m_b, m_b / 12.0 * (H * H + L * L), 0.5 * L, 0.5 * H, L, 0.5 * L, 0.0)
+
+
+@exact_inlined
+def boulder_inertia(body: Body, c_x: float, c_y: float, box: bool) -> float:
     """Moment of inertia J_b of the boulder about the common centre of mass [kg m^2] (Eq 16).
 
-    Departs from print where ``box``: the first term is that of a box, m_b/12 (H^2 + L^2); printed, it has
-    the half lengths and so a quarter of it.
+    Departs from print where ``box``: the first term is that of a box, m_b/12 (H^2 + L^2), or of the boulder that there
+    is; printed, it has the half lengths and so a quarter of it.
     """
-    H, L = design.H, design.L
-    own = m_b / 12.0 * (H * H + L * L)
+    own = body.J
     if not box:
         own *= 0.25
-    return own + m_b * ((c_y - 0.5 * H) ** 2 + (c_x - 0.5 * L) ** 2)
+    return own + body.m_b * ((c_y - body.y) ** 2 + (c_x - body.x) ** 2)
 
 
 class SoilMass(NamedTuple):
@@ -291,7 +316,14 @@ def yield_displacement(design: Design) -> float:
 
 @exact_inlined
 def constants_with(
-    design: Design, readings: Readings, elements: int, soil: SoilMass, K_soil: float, R_soil: float, x_yield: float
+    design: Design,
+    body: Body,
+    readings: Readings,
+    elements: int,
+    soil: SoilMass,
+    K_soil: float,
+    R_soil: float,
+    x_yield: float,
 ) -> Constants:
     """Constants of the motion of one design in a soil of which mass, spring, drag and yield are known.
 
@@ -299,26 +331,28 @@ def constants_with(
     ----------
     design, readings, elements
         As of `constants_of`.
+    body
+        The boulder.
     soil
         The soil lumped on the boulder.
     K_soil, R_soil, x_yield
         As of `Constants`.
     """
     d = design.d
-    m_b = boulder_mass(design)
+    m_b = body.m_b
     m_eff = m_b + soil.mass
-    c_x = (soil.mass * design.L + m_b * 0.5 * design.L) / m_eff
-    c_y = (soil.first + m_b * 0.5 * design.H) / m_eff
-    l_n = design.L - c_x
+    c_x = (soil.mass * body.line + m_b * body.x) / m_eff
+    c_y = (soil.first + m_b * body.y) / m_eff
+    l_n = body.line - c_x
     z_0 = d - c_y
     # Eq 13 with d_n = c_y - height: the sum of m_n (d_n^2 + l_n^2) from the sums over heights.
     J_soil = soil.second - 2.0 * c_y * soil.first + (c_y * c_y + l_n * l_n) * soil.mass
-    J_eff = boulder_inertia(design, m_b, c_x, c_y, readings.inertia_box) + J_soil
+    J_eff = boulder_inertia(body, c_x, c_y, readings.inertia_box) + J_soil
     half_element = 0.5 * d / elements if elements > 0 else 0.0
     h = design.e + z_0 if readings.arm_geometric else design.e + half_element - z_0
     d_N = c_y - half_element
     if readings.restoring_gravity:
-        C_cos, C_sin = 0.5 * m_b * G * design.L, -0.5 * m_b * G * design.H
+        C_cos, C_sin = m_b * G * body.foot, -(m_b * G * body.y)
         theta_corner = np.inf
     else:
         C_cos, C_sin = m_b * G * d_N, m_b * G * l_n
@@ -373,6 +407,7 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
     spring = spring_per_depth(design)
     return constants_with(
         design,
+        body_of_box(design),
         readings,
         elements,
         soil_mass(design, elements),

@@ -15,6 +15,7 @@ from .design import Constants
 from .dynamics import State, acceleration, contact_displacement, contact_lever, couple_moment, spring_compression
 from .modes import Modes, Switches
 from .numerics import sine_versine
+from .outlined_soil import lift_of
 from .soil import soil_kinematics
 from .soil_laws import drag_power, soil_energy
 
@@ -84,7 +85,7 @@ def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, 
         0.5 * c.J_eff * y.omega_b * y.omega_b,
         soil_energy(k, c),
         0.5 * c.k_v * u * u if touching else 0.0,
-        c.C_cos * abs(sin) + c.C_sin * versin if gravity_couple else 0.0,
+        lift_of(sin, versin, c) if gravity_couple else 0.0,
     )
 
 

@@ -25,6 +25,7 @@ from .design import (
     Design,
     DesignTable,
     SoilMass,
+    body_of_box,
     constants_with,
     element_depth,
     element_mass,
@@ -128,6 +129,11 @@ hold bounds: K_soil and R_soil are those of the stiffest and of the heaviest ele
 displacement at which an element reaches its ultimate resistance."""
 LayeredTable = _record("LayeredTable", (*DesignTable._fields, "layers"))
 """Many designs in soils of layers: the fields of `DesignTable`, and ``layers`` of shape (n, M, 6)."""
+OutlinedTable = _record("OutlinedTable", (*LayeredTable._fields, "outlines"))
+"""Many designs of boulders that are no boxes: the fields of `LayeredTable`, and ``outlines`` of shape (n, P, 4), see
+`boulder_kernels.outline`."""
+LAYERED = (LayeredTable, OutlinedTable)
+"""Tables that hold layers."""
 
 
 class Bounds(NamedTuple):
@@ -358,10 +364,10 @@ def constants_of_few(count: int) -> Callable[..., Any]:
     fields = ", ".join(f"c.{name}" for name in Constants._fields)
     lines += [
         "b = so_far.bounds",
-        "c = constants_with(design, readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)",
+        "c = constants_with(design, body_of_box(design), readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)",
         f"return Record({fields}, FewLayers(so_far.sums, ({''.join(f'layer_{m}, ' for m in range(count))})))",
     ]
-    known = (nothing_lumped, layer_of, lumped_with, constants_with, FewLayers)
+    known = (nothing_lumped, layer_of, lumped_with, body_of_box, constants_with, FewLayers)
     names = {function.__name__: function for function in known}
     function = function_of("\n ".join(lines), Record=LayeredConstants, **names)
     function.__module__ = __name__

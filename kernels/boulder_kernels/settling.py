@@ -33,6 +33,7 @@ from .design import Constants, Readings
 from .dynamics import State, contact_displacement, spring_compression
 from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
 from .outcomes import Maxima
+from .outlined_soil import least_couple, lift_of
 from .plastic import Memory, memory_of
 from .soil import Potential, soil_kinematics
 from .soil_laws import soil_potential
@@ -172,7 +173,7 @@ def energy_to_turn(theta_max: float, c: Constants) -> float:
         Constants of a design whose restoring moment is the couple of the weight.
     """
     sin, versin = sine_versine(theta_max)
-    return c.C_cos * sin + c.C_sin * versin + least_soil_energy(c.d * sin, c, memory_of(c))
+    return least_couple(c) * sin + c.C_sin * versin + least_soil_energy(c.d * sin, c, memory_of(c))
 
 
 @inlined
@@ -202,7 +203,7 @@ def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     """
     sin_max, versin_max = sine_versine(theta_max)
     t = versin_max / sin_max if sin_max > 0.0 else 0.0
-    lift = c.C_cos + c.C_sin * t
+    lift = least_couple(c) + c.C_sin * t
     # The tangent is placed where, along the line of the largest versine, the energy is least.
     along = c.z_0 - c.l_n * t
     low, high = MOVED_FROM * sin_max, sin_max
@@ -298,5 +299,4 @@ def boulder_energy(y: State, c: Constants) -> float:
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
     u = max(spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c), 0.0)
     kinetic = 0.5 * (c.m_eff * y.v_b * y.v_b + c.J_eff * y.omega_b * y.omega_b)
-    lift = c.C_cos * abs(sin) + c.C_sin * versin
-    return kinetic + lift + soil_potential(k.A, k.slope_x, c).highest + 0.5 * c.k_v * u * u
+    return kinetic + lift_of(sin, versin, c) + soil_potential(k.A, k.slope_x, c).highest + 0.5 * c.k_v * u * u

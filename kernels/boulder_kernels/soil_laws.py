@@ -35,6 +35,21 @@ from .layered_soil import (
     reaction_of_elements,
     reaction_of_layers,
 )
+from .outlined_soil import (
+    OutlinedElements,
+    OutlinedPieces,
+    body_beside,
+    empty_outlined,
+    fill_outlined_elements,
+    fill_outlined_pieces,
+    keep_lean,
+    potential_of_outlined_elements,
+    potential_of_pieces,
+    power_of_outlined_elements,
+    power_of_pieces,
+    reaction_of_outlined_elements,
+    reaction_of_pieces,
+)
 from .plastic import (
     Memory,
     PlasticConstants,
@@ -63,6 +78,13 @@ LAWS: dict[type, SoilLaw] = {
     SoilElements: SoilLaw(reaction_of_elements, potential_of_elements, power_of_elements, fill_elements),
     SoilLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers, fill_layers),
     FewLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers),
+    OutlinedElements: SoilLaw(
+        reaction_of_outlined_elements,
+        potential_of_outlined_elements,
+        power_of_outlined_elements,
+        fill_outlined_elements,
+    ),
+    OutlinedPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces, fill_outlined_pieces),
     Memory: SoilLaw(reaction_of_plastic_elements, potential_of_plastic_elements, power_of_plastic_elements),
 }
 """The law of each record of a soil, the last of those that constants carry."""
@@ -163,8 +185,9 @@ def _with_records(c: Any, soil: Any, memory: Any) -> Callable[..., Any]:
 def constants_in_profile(design: Design, readings: Readings, elements: int, profile: SoilProfile) -> Any:
     """Constants of the motion of one design in layers of soil, or in plastic soil; see `constants_in`."""
     lumped = fill_soil(design, profile.layers, profile.soil)
-    b = lumped.bounds
-    c = constants_with(design, readings, b.elements, lumped.mass, b.K_soil, b.R_soil, b.x_yield)
+    b, body = lumped.bounds, body_beside(design, profile.soil)
+    keep_lean(body, design, readings.restoring_gravity, profile.soil)
+    c = constants_with(design, body, readings, b.elements, lumped.mass, b.K_soil, b.R_soil, b.x_yield)
     return with_records(c, profile.soil, profile.memory)
 
 
@@ -194,8 +217,13 @@ Constants, LayeredConstants or PlasticConstants
 """
 
 
-def empty_soil(layers: int, elements: int) -> SoilLayers | SoilElements:
-    """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact."""
+def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None) -> Any:
+    """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact.
+
+    Beside an outline, shape (P, 4), each of its points may cut a layer in two.
+    """
+    if outline is not None:
+        return empty_outlined(layers + len(outline) - 2, elements, outline)
     if elements > 0:
         return SoilElements(*np.empty((4, elements)))
     to, K, inverse_K, P_0, P_1, R = np.empty((6, layers))
@@ -203,14 +231,18 @@ def empty_soil(layers: int, elements: int) -> SoilLayers | SoilElements:
 
 
 def profile_of(
-    design: Design, layers: np.ndarray | None, elements: int, memory: Memory | None = None
+    design: Design,
+    layers: np.ndarray | None,
+    elements: int,
+    memory: Memory | None = None,
+    outline: np.ndarray | None = None,
 ) -> SoilProfile | None:
-    """Return the soil of a design in layers, by N elements or, where N is 0, exactly.
+    """Return the soil of a design in layers, by N elements or, where N is 0, exactly; beside an outline if it has one.
 
     Without layers it is the uniform soil of the design: None where it is elastic, else its only layer.
     """
     if layers is None:
-        if memory is None:
+        if memory is None and outline is None:
             return None
         layers = uniform_layers(design)
-    return SoilProfile(layers, empty_soil(len(layers), elements), memory)
+    return SoilProfile(layers, empty_soil(len(layers), elements, outline), memory)

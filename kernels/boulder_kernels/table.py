@@ -23,7 +23,7 @@ from .impact import (
 )
 from .lanes import simulate_lanes
 from .last_resort import simulate_last_resort
-from .layered import LayeredTable, filled_layers, lanes_count
+from .layered import LAYERED, OutlinedTable, filled_layers, lanes_count
 from .outcomes import (
     COARSER,
     FINER,
@@ -40,6 +40,7 @@ from .outcomes import (
     outcome_table,
     write_outcome,
 )
+from .outlined_soil import with_outline
 from .plastic import ELASTIC, LAST, PLASTIC_WITH_GAP, SWING, empty_memory, memory_of
 from .second_spring import SecondSpring, SecondSprings
 from .settling import proof_is_possible
@@ -70,6 +71,14 @@ def take_second_spring(row: int, springs: np.ndarray) -> SecondSpring:
     return SecondSpring(springs[0, row], springs[1, row])
 
 
+@array_kernel
+def take_outline(row: int, soil: Any, outlines: np.ndarray) -> Any:
+    """Return the soil to fill for one design of a table of boulders with outlines, shape (n, P, 4)."""
+    return with_outline(soil, outlines[row])
+
+
+soil_in = unless_none("row soil outlines", take_outline, "soil")
+"""The soil to fill for one design of a table."""
 profile_in = unless_none("row soil layers", take_profile, "None")
 """The soil of one design of a table; None for the uniform soil of the design."""
 second_spring_in = unless_none("row springs", take_second_spring, "None")
@@ -80,6 +89,7 @@ second_spring_in = unless_none("row springs", take_second_spring, "None")
 def run_rows(
     designs: np.ndarray,
     layers: np.ndarray | None,
+    outlines: np.ndarray | None,
     soil: Any,
     springs: np.ndarray | None,
     readings: Readings,
@@ -89,7 +99,7 @@ def run_rows(
 ) -> None:
     """Simulate designs one by one; arguments: see `simulate_rows`, a record that keeps nothing, and its result."""
     for row in range(designs.shape[1]):
-        profile, second = profile_in(row, soil, layers), second_spring_in(row, springs)
+        profile, second = profile_in(row, soil_in(row, soil, outlines), layers), second_spring_in(row, springs)
         design = design_in(designs, row)
         outcome = simulate(Problem(design, profile, second), readings, control, record)
         write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
@@ -115,6 +125,7 @@ def run_last_resort(
 def simulate_rows(
     designs: np.ndarray,
     layers: np.ndarray | None,
+    outlines: np.ndarray | None,
     soil: Any,
     springs: np.ndarray | None,
     readings: Readings,
@@ -128,6 +139,8 @@ def simulate_rows(
         As of `simulate_lanes`.
     layers
         Layers of every design, shape (n, M, 6), see `boulder_kernels.layered`; None for uniform soils.
+    outlines
+        Outlines of the boulders, shape (n, P, 4), see `boulder_kernels.outline`, of designs in layers; None for boxes.
     soil
         Elements or layers that every design fills anew; None for uniform soils.
     springs
@@ -136,7 +149,7 @@ def simulate_rows(
         As of `simulate_table`.
     """
     out = empty_outcomes(designs.shape[1])
-    run_rows(designs, layers, soil, springs, readings, control, no_record(), out)
+    run_rows(designs, layers, outlines, soil, springs, readings, control, no_record(), out)
     return out
 
 
@@ -160,11 +173,12 @@ def problem_at(
     """Return one row of a table as a problem, with room for as many samples as a record has."""
     design = design_at(table, row)
     second = None if springs is None else SecondSpring(springs.k_2[row], springs.s_2[row])
-    layers = table.layers[row] if isinstance(table, LayeredTable) else None
+    layers = table.layers[row] if isinstance(table, LAYERED) else None
+    outline = table.outlines[row] if isinstance(table, OutlinedTable) else None
     memory = None
     if control.unloading != ELASTIC:
         memory = empty_memory(control.elements, control.unloading == PLASTIC_WITH_GAP, samples)
-    return Problem(design, profile_of(design, layers, control.elements, memory), second)
+    return Problem(design, profile_of(design, layers, control.elements, memory, outline), second)
 
 
 def simulate_impact(problem: Problem, readings: Readings, control: Control, record: Record) -> Impact:
@@ -236,18 +250,19 @@ def simulate_once(
     layers: np.ndarray | None = getattr(table, "layers", None)
     count = 0 if layers is None else lanes_count(layers.shape[1])
     side_by_side = springs is None and control.elements == 0 and control.stop_at_limit
-    if layers is not None and count and side_by_side:
+    outlines: np.ndarray | None = getattr(table, "outlines", None)
+    if layers is not None and count and side_by_side and outlines is None:
         out = simulate_lanes(np.concatenate([designs, filled_layers(layers, count)]), readings, control)
     elif layers is not None:
-        soil = empty_soil(layers.shape[1], control.elements)
-        out = simulate_rows(designs, layers, soil, stacked, readings, control)
+        soil = empty_soil(layers.shape[1], control.elements, None if outlines is None else outlines[0])
+        out = simulate_rows(designs, layers, outlines, soil, stacked, readings, control)
     elif control.last_resort:
         out = empty_outcomes(designs.shape[1])
         run_last_resort(designs, stacked, readings, control, no_record(), out)
     elif side_by_side:
         out = simulate_lanes(designs, readings, control)
     else:
-        out = simulate_rows(designs, None, None, stacked, readings, control)
+        out = simulate_rows(designs, None, None, None, stacked, readings, control)
     return outcome_table(out, step_of_solution(control)), out[SECOND]
 
 
@@ -404,7 +419,8 @@ def simulate_table(
     Parameters
     ----------
     table
-        Designs, SI, arrays of shape (n,); or a `LayeredTable`, whose designs have no last resort.
+        Designs, SI, arrays of shape (n,); or a `LayeredTable` or an `OutlinedTable`, whose designs have no
+        last resort.
     readings
         Which formulas are read as printed.
     control
@@ -423,7 +439,7 @@ def simulate_table(
     if not control.error_estimate:
         return simulate_once(table, readings, control, springs)[0]
     refined = control._replace(refined=True)
-    if not is_paired(readings, control, layered=isinstance(table, LayeredTable)):
+    if not is_paired(readings, control, layered=isinstance(table, LAYERED)):
         return simulate_checked(table, readings, refined, springs)
     out, _ = simulate_once(table, readings, control, springs)
     fine, _ = simulate_once(table, readings, refined, springs)

@@ -13,7 +13,8 @@ import numpy as np
 from ._jit import exact_inlined, exact_kernel
 from .outcomes import OutcomeTable, Status
 
-NOT_COMPUTED, NO_CONTACT, OVERTURNS, PENETRATION, CRUSH, OVERRIDE, UNPROVED, NUMERICAL_ERROR, PASSES = range(9)
+NOT_COMPUTED, NO_CONTACT, OVERTURNS, PENETRATION = range(4)
+FOOT, SHAPE, CRUSH, OVERRIDE, UNPROVED, NUMERICAL_ERROR, PASSES = range(4, 11)
 """The rules. A row is standing, computed and not overturned, from PENETRATION on."""
 
 
@@ -45,8 +46,9 @@ class Ruling(NamedTuple):
 
 RULINGS = Ruling._fields
 """Rows of the array of `write_rulings`."""
-SIZES = ("L", "H", "d", "e_bumper", "bed_offset")
-"""Rows of the array of inputs that it takes."""
+SIZES = ("L", "H", "d", "e_bumper", "bed_offset", "flat_foot", "known_shape")
+"""Rows of the array of inputs that it takes; the last two are 1 or 0: whether the foot of the boulder is flat, and
+whether what was simulated has its shape."""
 
 
 @exact_inlined
@@ -92,6 +94,10 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
         rule = OVERTURNS
     elif penetration > limits.penetration:
         rule = PENETRATION
+    elif sizes[5, row] == 0.0:
+        rule = FOOT
+    elif sizes[6, row] == 0.0:
+        rule = SHAPE
     elif crush > bed_offset:
         rule = CRUSH
     elif overlap < limits.min_overlap:
@@ -114,7 +120,7 @@ def write_rulings(o: OutcomeTable, sizes: np.ndarray, limits: VerdictLimits, out
     o
         What the simulations gave, arrays of shape (n,).
     sizes
-        Inputs of the same rows [m], shape (len(SIZES), n).
+        Inputs of the same rows, see `SIZES`, shape (len(SIZES), n).
     limits
         Limits of the criterion.
     out

@@ -9,7 +9,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep import Trajectory
 from boulder_sweep.cli.main import execute
-from boulder_sweep.columns import OPTIONAL_COLUMNS
+from boulder_sweep.columns import SECOND_SPRING_COLUMNS
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.impact.trajectory_columns import SPENT
 from boulder_sweep.settings import Sweep, load
@@ -58,7 +58,7 @@ def test_ledger_closes_and_knows_what_is_spent(found: Trajectory, known: oracle.
 def test_rows_carry_the_spring_and_come_out_again(sweep: Sweep, tmp_path: Path) -> None:
     boulder_sweep.run(sweep, tmp_path / "two.sweep")
     table = boulder_sweep.read(tmp_path / "two.sweep")
-    assert table[list(OPTIONAL_COLUMNS)].to_numpy().tolist() == [[9e6, 0.4], [9e6, 0.6]]
+    assert table[list(SECOND_SPRING_COLUMNS)].to_numpy().tolist() == [[9e6, 0.4], [9e6, 0.6]]
     for row in range(2):
         again = explain(tmp_path / "two.sweep", row)
         assert again.unequal == ()
@@ -82,8 +82,8 @@ def test_explain_says_when_it_took_over(
 
 
 def test_a_mapping_needs_both_numbers(found: Trajectory) -> None:
-    design = {name: value for name, value in found.inputs.items() if name != OPTIONAL_COLUMNS[1]}
-    with pytest.raises(ValueError, match=OPTIONAL_COLUMNS[1]):
+    design = {name: value for name, value in found.inputs.items() if name != SECOND_SPRING_COLUMNS[1]}
+    with pytest.raises(ValueError, match=SECOND_SPRING_COLUMNS[1]):
         boulder_sweep.simulate(design)
 
 

@@ -93,7 +93,7 @@ def test_no_contact_fails_without_any_value():
     for name in ("rating", "robustness", "stands_under"):
         assert row[name][0] == -1
     for name in OUTCOME_COLUMNS[2:]:
-        if name not in ("rating", "overlap_m", "validity", "robustness", "stands_under"):
+        if name not in ("rating", "overlap_m", "solidity", "validity", "robustness", "stands_under"):
             assert np.isnan(row[name][0]), name
 
 

@@ -59,7 +59,7 @@ def test_arrays_are_read_and_written_in_place() -> None:
     found = []
     for call in (run_rows, run_rows.for_python):
         out = empty_outcomes(len(DESIGNS))
-        call(np.stack(table_of(DESIGNS)), None, None, None, READINGS, HOW, bk.no_record(), out)
+        call(np.stack(table_of(DESIGNS)), None, None, None, None, READINGS, HOW, bk.no_record(), out)
         found.append(out)
     assert np.isfinite(found[0][1]).all()
     assert np.array_equal(*found, equal_nan=True)
@@ -82,7 +82,7 @@ def test_no_call_is_refused_that_numba_takes() -> None:
     designs = np.stack(table_of(DESIGNS))
     layers = np.asfortranarray(np.stack([uniform_layers(one) for one in DESIGNS]))
     with pytest.raises(UnsuitableError):
-        _ahead.call(run_rows, (designs, layers, None, None, READINGS, HOW, bk.no_record(), designs))
+        _ahead.call(run_rows, (designs, layers, None, None, None, READINGS, HOW, bk.no_record(), designs))
     assert sine_versine(np.float32(0.3))[0] == pytest.approx(np.sin(0.3), rel=1e-6)
 
 

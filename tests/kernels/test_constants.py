@@ -7,6 +7,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import (
+    body_of_box,
     boulder_inertia,
     boulder_mass,
     compression_wedge_length,
@@ -146,9 +147,9 @@ def test_boulder() -> None:
         assert m_b == pytest.approx(design.rho_b * design.L * design.W * design.H, rel=1e-15)
         own = m_b / 12 * (design.L**2 + design.H**2)
         middle = design.L / 2, design.H / 2
-        assert boulder_inertia(design, m_b, *middle, True) == pytest.approx(own, rel=1e-14)
-        assert boulder_inertia(design, m_b, *middle, False) == pytest.approx(own / 4, rel=1e-14)
-        beside = boulder_inertia(design, m_b, design.L / 2 + 0.3, design.H / 2 - 0.4, True)
+        assert boulder_inertia(body_of_box(design), *middle, True) == pytest.approx(own, rel=1e-14)
+        assert boulder_inertia(body_of_box(design), *middle, False) == pytest.approx(own / 4, rel=1e-14)
+        beside = boulder_inertia(body_of_box(design), design.L / 2 + 0.3, design.H / 2 - 0.4, True)
         assert beside == pytest.approx(own + m_b * 0.25, rel=1e-14)
 
 

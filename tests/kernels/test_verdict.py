@@ -6,6 +6,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.verdict import (
     CRUSH,
+    FOOT,
     NO_CONTACT,
     NOT_COMPUTED,
     NUMERICAL_ERROR,
@@ -14,6 +15,7 @@ from boulder_kernels.verdict import (
     PASSES,
     PENETRATION,
     RULINGS,
+    SHAPE,
     SIZES,
     UNPROVED,
     VerdictLimits,
@@ -35,7 +37,7 @@ STANDS = {
     "x_error": 1e-5,
     "step": 4e-3,
 }
-BOULDER = {"L": 1.5, "H": 3.0, "d": 1.5, "e_bumper": 0.5, "bed_offset": 2.9}
+BOULDER = {"L": 1.5, "H": 3.0, "d": 1.5, "e_bumper": 0.5, "bed_offset": 2.9, "flat_foot": 1.0, "known_shape": 1.0}
 
 
 def ruling(**changed):
@@ -64,6 +66,8 @@ def ruling(**changed):
         ({"status": bk.Status.LIMIT}, OVERTURNS),
         ({"theta_max": 0.35}, OVERTURNS),
         ({"x_v_max": 5.5}, PENETRATION),
+        ({"flat_foot": 0.0}, FOOT),
+        ({"known_shape": 0.0}, SHAPE),
         ({"crush_max": 3.0}, CRUSH),
         ({"d": 2.3}, OVERRIDE),
         ({"d": 2.3, "min_overlap": 0.1}, PASSES),
@@ -88,11 +92,13 @@ def test_the_worst_rule_decides():
         {"status": bk.Status.HORIZON},
         {"d": 2.3},
         {"crush_max": 3.0},
+        {"known_shape": 0.0},
+        {"flat_foot": 0.0},
         {"x_v_max": 5.5},
         {"theta_max": 0.4},
         {"t_end": np.inf},
     ]
-    rules = (NUMERICAL_ERROR, UNPROVED, OVERRIDE, CRUSH, PENETRATION, OVERTURNS, NOT_COMPUTED)
+    rules = (NUMERICAL_ERROR, UNPROVED, OVERRIDE, CRUSH, SHAPE, FOOT, PENETRATION, OVERTURNS, NOT_COMPUTED)
     together = {}
     for changed, rule in zip(worse, rules, strict=True):
         together |= changed

@@ -100,7 +100,7 @@ def test_blocks_that_the_file_lacks_are_opened(load_with):
         ("widht=3", "is not an entry of the file; did you mean width?"),
         ("velocity=3", "is not an entry of the file; did you mean speed?"),
         ("density=3", "is ambiguous; use boulder.density or soil.density"),
-        ("mass=3", "is ambiguous; use vehicle.mass or boulder.mass"),
+        ("mass=3", "is ambiguous; use boulder.mass or vehicle.mass"),
     ],
 )
 def test_mistakes_point_at_the_option(problems_of, minimal, override, words):

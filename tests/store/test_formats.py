@@ -30,15 +30,16 @@ from tests.store.folders import IDENTITY, ROWS, finished_folder, open_folder, pa
 DATA = Path(__file__).with_name("data")
 KEPT = sorted(path.name for path in DATA.glob("*.sweep"))
 GRADES = ["robustness", "stands_under"]
-FIRST = ["time_to_limit_error_s", "vehicle_crush_m", "overlap_m", "validity", *GRADES, "step_s"]
+FIRST = ["time_to_limit_error_s", "vehicle_crush_m", "overlap_m", "solidity", "validity", *GRADES, "step_s"]
 LACKING = {
     "1_one_number.sweep": FIRST,
     "2_merging.sweep": FIRST,
     "3_release_0_1.sweep": FIRST,
     "4_named_sets.sweep": FIRST,
-    "5_validity.sweep": ["time_to_limit_error_s", *GRADES],
-    "6_unloading.sweep": ["time_to_limit_error_s", *GRADES],
-    "7_limit_error.sweep": GRADES,
+    "5_validity.sweep": ["time_to_limit_error_s", "solidity", *GRADES],
+    "6_unloading.sweep": ["time_to_limit_error_s", "solidity", *GRADES],
+    "7_limit_error.sweep": ["solidity", *GRADES],
+    "8_robustness.sweep": ["solidity"],
 }
 MORE = {
     "4_named_sets.sweep": ["soil"],
@@ -46,6 +47,7 @@ MORE = {
     "6_unloading.sweep": ["permanent_tilt_deg", "swing_back_deg", "permanent_tilt_error_deg", "soil"],
     "7_limit_error.sweep": ["soil"],
     "8_robustness.sweep": ["soil"],
+    "9_solidity.sweep": ["soil"],
 }
 NAMES = [spec.name for spec in COLUMNS]
 

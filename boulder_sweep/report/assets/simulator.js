@@ -84,6 +84,17 @@ function layersOf(law, ground, design, gravity) {
   });
 }
 
+/**
+ * Volume of a boulder over that of the box of its sides: `boulder_sweep.designs.solidity_of`.
+ * @param {Record<string, number>} inputs
+ * @returns {number}
+ */
+function solidityOf(inputs) {
+  if (!("boulder_mass_kg" in inputs)) return 1;
+  const box = inputs.boulder_length_m * inputs.boulder_width_m * inputs.boulder_height_m;
+  return inputs.boulder_mass_kg / (inputs.boulder_density_kg_m3 * box);
+}
+
 /** How the kernel estimates errors, see `boulder_sweep.report.entry_points`. */
 const PAIRED = 1;
 const ONCE = 2;
@@ -128,6 +139,8 @@ class Simulator {
         return [field, field === "phi" ? value / DEGREES : value];
       }),
     );
+    // A box has the mass of the boulder that was weighed.
+    if ("boulder_mass_kg" in inputs) design.rho_b = inputs.boulder_mass_kg / (design.L * design.W * design.H);
     // Without a second spring it is like the first, from a crush on that is never reached.
     const springs = { k_2: design.k_2 ?? design.k_v, s_2: design.s_2 ?? NEVER };
     const submerged = ground.water_table_m === 0 ? 1 - ground.water_kg_m3 / design.rho_s : 1;
@@ -161,13 +174,17 @@ class Simulator {
     const exposed = inputs.boulder_height_m - inputs.embedment_depth_m;
     const [bumper, hood] = [inputs.bumper_height_m, inputs.hood_height_m];
     const impact = this.data.face ? 0.5 * (Math.min(exposed, hood) + bumper) : inputs.impact_height_m;
+    const { flat_foot, least_solidity, most_solidity } = this.data.boulder;
+    const solidity = solidityOf(inputs);
     let refused = 0;
+    if (solidity > most_solidity) refused = 5;
     if (inputs.vehicle_second_spring_N_m < inputs.vehicle_spring_N_m) refused = 4;
     if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
     if (hood < bumper) refused = 2;
     if (exposed <= 0) refused = 1;
     const [refusal, at] = this.data.refusals[refused];
-    return { inputs: { ...inputs, impact_height_m: impact }, refusal, at };
+    const shape = { solidity, flat_foot, known_shape: Number(solidity >= least_solidity) };
+    return { inputs: { ...inputs, ...shape, impact_height_m: impact }, refusal, at };
   }
 
   /**

@@ -13,9 +13,11 @@ function yamlOf(data, design, units) {
   const sections = {};
   for (const { name, section, key, unit } of /** @type {Input[]} */ (data.inputs)) {
     if (name === "impact_height_m" && data.face) continue;
+    if (name === "boulder_density_kg_m3" && data.boulder.rock_assumed) continue;
     (sections[section] ??= []).push(`${key}: ${units.written(design[name], unit)}`);
   }
-  const { vehicle, soil, lines } = data.yaml[units.system];
+  const { boulder, vehicle, soil, lines } = data.yaml[units.system];
+  sections.boulder.push(...boulder);
   sections.vehicle.push(...vehicle);
   sections.soil.push(...soil);
   return [

@@ -73,6 +73,7 @@ function judge(outcomes, rulings, row, inputs, rules) {
     time_to_limit_error_s: kept(of("x_error") / inputs.impact_speed_m_s, overturned),
     vehicle_crush_m: kept(of("crush_max")),
     overlap_m: verdict === "error" ? null : overlap,
+    solidity: verdict === "error" ? null : inputs.solidity,
     validity: verdict === "error" ? null : flagsOf(outcomes, row, inputs, overlap, rules).join(";"),
   };
 }

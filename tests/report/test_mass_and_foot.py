@@ -1,0 +1,40 @@
+"""Boulders that were weighed, and rounded feet, in the page: verdicts and settings file are those of the command."""
+
+from pathlib import Path
+
+import pytest
+
+import boulder_sweep
+from boulder_sweep.report import write_explorer
+from boulder_sweep.settings import load_text
+
+FILE = """boulder: {{length: 1.65 m, width: 1.68 m, height: 3.44 m, {boulder}}}
+site: {{embedment_depth: 2.3 m}}
+soil: {{density: 1859.9 kg/m^3, friction_angle: 43.2 deg, subgrade_reaction: 95 MN/m^3}}
+vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("boulder", "heaviest"),
+    [
+        ("mass: 24.5 t", True),
+        ("density: 2600 kg/m^3, mass: 20 t", True),
+        ("foot: rounded, density: 2600 kg/m^3", False),
+    ],
+)
+def test_the_simulator_judges_weighed_boulders_and_rounded_feet(boulder, heaviest, tmp_path, opened):
+    sweep = load_text(FILE.format(boulder=boulder), Path("stone.yaml"))
+    page = opened(write_explorer(sweep, 0, tmp_path / "stone.html"))
+    found, known = page.evaluate("page.simulator.whole(page.design)")["judged"], boulder_sweep.simulate(sweep).summary()
+    for name in ("verdict", "reason", "validity"):
+        assert found[name] == known[name]
+    for name in ("max_rotation_deg", "solidity"):
+        assert found[name] == pytest.approx(known[name], rel=1e-5)
+    copied = load_text(page.input_value("#yaml"), Path("copied.yaml"))
+    assert copied.constants == pytest.approx(sweep.constants, rel=1e-5)
+    assert copied.model == sweep.model
+    if heaviest:
+        (refused,) = page.evaluate("page.simulator.rows([{ ...page.design, boulder_mass_kg: 3e4 }])")
+        assert refused["reason"] == "boulder is heavier than a solid box of its size and rock"
+    assert f"Foot: {sweep.model.foot}" in page.content()
