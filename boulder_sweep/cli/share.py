@@ -132,7 +132,7 @@ Examples:
   sweep report m30-sizing.sweep --design 4711 --design 104960 -o site.html
   sweep report m30-sizing.sweep --units us
   sweep report chances.parquet
-  sweep report m30-sizing.sweep --project "Main Street" --client "City of Springfield" -o report.pdf
+  sweep report m30-sizing.sweep --project "Main Street" -o report.pdf
 """
 
 

@@ -102,7 +102,7 @@ def simulate(
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         columns = ["", *console.value_lines(shown_values(row, units))] if every else []
-        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row, sweep.model), *columns)
+        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row | result.inputs, sweep.model), *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:

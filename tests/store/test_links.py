@@ -174,10 +174,11 @@ WRITES = re.compile(r"""O_TRUNC|O_CREAT|write_(text|bytes)\(|open\([^)]*["'][wax
 BY_ITSELF = {
     "store/files.py": "creates files",
     "store/lock.py": "opens a file that is there",
-    "cli/new.py": "only a new file",
+    "cli/settings_files.py": "only a new file",
     "cli/output.py": "nowhere",
     "cli/progress.py": "its own cache",
     "report/build.py": "for developers",
+    "report/printing.py": "a folder of its own for the browser",
 }
 
 
