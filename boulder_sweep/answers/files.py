@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.locations import Location
-from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.manifest import MANIFEST_NAME
+from boulder_sweep.store.reader import FinishedRows
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -26,8 +26,7 @@ from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.locations import Location
-from boulder_sweep.runner.backends import THREADING
-from boulder_sweep.runner.pool import call, pool
+from boulder_sweep.runner.pool import THREADING, call, pool
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.text import ProgressCallback
 

@@ -169,10 +169,11 @@ def _legend(need: Need, file: str) -> list[str]:
 
 def _grades(need: Need) -> list[str]:
     """Return how many answers have each grade, where not every one has a line, and what these mean."""
-    grades = need.arrow.filter(need.arrow["passes_at"].is_valid())["robustness"].to_pylist()
+    rows = need.arrow.filter(need.arrow["passes_at"].is_valid()).to_pylist()
+    grades = [row["robustness"] for row in rows]
     counts = {grade: grades.count(grade) for grade in GRADES if grade in grades}
     told = ", ".join(f"{count:,} {grade}" for grade, count in counts.items())
-    return [*([f"second opinion: {told}"] if len(need) > MOST_LINES and told else []), *grade_lines(grades)]
+    return [*([f"second opinion: {told}"] if len(need) > MOST_LINES and told else []), *grade_lines(rows)]
 
 
 def _outside(need: Need) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.columns import BY_NAME as COLUMNS
-from boulder_sweep.columns import WAY_OUT
+from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3
 from boulder_sweep.settings.shown_units import shown_unit
@@ -63,12 +63,13 @@ GRADE: Column = (("second", "opinion"), lambda row: row["robustness"] or "-")
 """Column of what second opinions say of a pass."""
 
 
-def grade_lines(grades: Iterable[str | None]) -> list[str]:
-    """Return what the grades mean that occur."""
-    from boulder_sweep.judge.robustness import MEANINGS
+def grade_lines(rows: Iterable[Row]) -> list[str]:
+    """Return what the grades of rows mean, each meaning once, in the order of `GRADES`."""
+    from boulder_sweep.judge.robustness import meaning_of
 
-    occurring = set(grades)
-    words = [f"{word}: {meaning}" for word, meaning in MEANINGS.items() if word in occurring]
+    occurring = {(row["robustness"], meaning_of(row)) for row in rows if row["robustness"]}
+    ranked = sorted(occurring, key=lambda found: (GRADES.index(found[0]), found[1]))
+    words = [f"{word}: {meaning}" for word, meaning in ranked]
     return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
 
 
@@ -121,7 +122,7 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     occurring = {row.get("p_fail_by") for row in rows}
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
     if found.sweep.model.second_opinion:
-        lines += grade_lines(row["robustness"] for row in rows)
+        lines += grade_lines(rows)
     lines += foot_lines(found.sweep.model)
     if count == 1:
         lines += ["", *_index_lines(found, width)]
@@ -169,7 +170,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, u
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
     if any(sign in line for line in lines for sign in "≥≤"):
         lines.append("≥, ≤: passes at the worst value tried")
-    return [*lines, *grade_lines(row["robustness"] for row in rows), *foot_lines(found.sweep.model)]
+    return [*lines, *grade_lines(rows), *foot_lines(found.sweep.model)]
 
 
 def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:

@@ -20,10 +20,9 @@ from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID, INPUTS
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.errors import settings_file
-from boulder_sweep.store.files import replacing
-from boulder_sweep.store.provenance import identity_in, judged_by, sha256_of
+from boulder_sweep.store.files import check_target, replacing
+from boulder_sweep.store.provenance import identity_in, judged_by, settings_sha256
 from boulder_sweep.store.schema import number_array, part_table, word_array
-from boulder_sweep.store.targets import check_target
 from boulder_sweep.text import one_line, why
 
 if TYPE_CHECKING:
@@ -320,7 +319,7 @@ def read_parquet(
             advice = "; `sweep export` takes it" if found.keys() >= _IDENTITY else ""
             raise refusal(f"{path} is neither the folder of a run nor a file that `{command}` wrote{advice}")
         odd = [name for name, kind in kinds.items() if name in BY_NAME and not _is_of(BY_NAME[name].type, kind)]
-        if odd or sha256_of(found["settings"]) != found["settings_sha256"]:
+        if odd or settings_sha256(found["settings"]) != found["settings_sha256"]:
             raise refusal(f"{path} is damaged; write it again with `{command}`")
     except BoulderSweepError:
         raise

@@ -142,8 +142,8 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
         )
     if robust:
         final, coarse = (
-            final.with_all_opinions(),
-            dataclasses.replace(coarse.with_all_opinions(), only=(*SEARCHED, *GRADED)),
+            final.asked(),
+            dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED)),
         )
     else:  # asked of the answers alone
         final, coarse = (dataclasses.replace(each, second_opinion=()) for each in (final, coarse))

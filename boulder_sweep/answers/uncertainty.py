@@ -20,8 +20,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.locations import Location
-from boulder_sweep.runner.backends import THREADING
-from boulder_sweep.runner.pool import Pool, pool
+from boulder_sweep.runner.pool import THREADING, Pool, pool
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:

@@ -58,7 +58,7 @@ Examples:
 @click.option(
     "--robust",
     is_flag=True,
-    help="Count only passes that stand under all second opinions (without the margin).",
+    help="Count only passes that stand under every second opinion, with --margin.",
 )
 @click.option(
     "--other-readings",

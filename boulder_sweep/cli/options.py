@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boulder_sweep.cli.output import say
-from boulder_sweep.runner.backends import BACKENDS, MOST_JOBS
+from boulder_sweep.runner.pool import BACKENDS, MOST_JOBS
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:

@@ -63,7 +63,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
             raise click.UsageError(f"--at {name} is given twice; give each column one value")
         given[name] = text
     from boulder_sweep.errors import PictureError
-    from boulder_sweep.store.finished import FinishedRows
+    from boulder_sweep.store.reader import FinishedRows
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
     from boulder_sweep.views.slices import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
@@ -132,12 +132,13 @@ Examples:
   sweep report m30-sizing.sweep --design 4711 --design 104960 -o site.html
   sweep report m30-sizing.sweep --units us
   sweep report chances.parquet
+  sweep report m30-sizing.sweep --project "Main Street" -o report.pdf
 """
 
 
 @click.command("report", short_help="Write a result as one page with the simulator inside.", epilog=REPORT_EXAMPLES)
 @result_argument
-@click.option("-o", "--output", "page", type=OUTPUT, metavar="F.html", help="The page [default: OUT.html].")
+@click.option("-o", "--output", "page", type=OUTPUT, metavar="F.html|.pdf", help="The page [default: OUT.html].")
 @click.option(
     "--design",
     "designs",
@@ -146,20 +147,29 @@ Examples:
     metavar="N",
     help="Show this design in full (may be repeated) [default: the lightest and the shallowest that pass].",
 )
+@click.option("--project", metavar="TEXT", help="Heading of the report; wins over report.project in the file.")
+@click.option("--client", metavar="TEXT", help="The same of the client.")
+@click.option("--author", metavar="TEXT", help="The same of the author.")
+@click.option("--date", metavar="TEXT", help="The same of the date.")
 @units_option
-def report(out: str, page: str | None, designs: tuple[int, ...], units: str) -> int:
+def report(out: str, page: str | None, designs: tuple[int, ...], units: str, **heading: str | None) -> int:
     """Write the result in OUT as one HTML file: the answer, the map, and the simulator, which runs in the page.
 
     OUT is the folder of a run, or a file of `sweep uncertainty -o`, whose probabilities of passing then stand first.
 
     The file needs no network and no server: it opens from disk in any browser, and whoever gets it can change a
-    design and see the impact simulated anew.
+    design and see the impact simulated anew. With -o F.pdf the page is printed by a Chromium or Chrome on this machine.
     """
     from boulder_sweep.report import checked_page, write_report
+    from boulder_sweep.settings.heading import Heading, wrong_with
 
+    given = {key: text for key, text in heading.items() if text is not None}
+    for key, text in given.items():
+        if wrong := wrong_with(text):
+            raise click.UsageError(f"--{key} {wrong}")
     folder = location_of(out)
     target = checked_page(page) if page else beside(location_of(out.removesuffix(".parquet")), ".html")
-    written = write_report(folder, target, designs=designs, units=units, command=_command())
+    written = write_report(folder, target, designs=designs, units=units, command=_command(), heading=Heading(**given))
     _show_page(written)
     return 0
 
@@ -171,7 +181,9 @@ def _command() -> str:
 
 def _show_page(page: Path) -> None:
     """Say where a page is, and how large."""
-    show(f"{page}: {page.stat().st_size / 1e6:.1f} MB, opens in any browser, needs no network")
+    size = f"{page.stat().st_size / 1e6:.1f} MB"
+    printed = page.suffix.lower() == ".pdf"
+    show(f"{page}: {size}" if printed else f"{page}: {size}, opens in any browser, needs no network")
 
 
 EXPORT_EXAMPLES = """\b

@@ -102,7 +102,7 @@ def simulate(
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         columns = ["", *console.value_lines(shown_values(row, units))] if every else []
-        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row, sweep.model), *columns)
+        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row | result.inputs, sweep.model), *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:
@@ -126,7 +126,7 @@ def _cautions(row: dict[str, Any], model: Model) -> list[str]:
     cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
     cautions += ["see docs/validity.md"] if cautions else []
     if row["verdict"] == "pass":
-        cautions = [*grade_lines([row["robustness"]]), *cautions, f"pass: {NOT_A_RATING}"]
+        cautions = [*grade_lines([row]), *cautions, f"pass: {NOT_A_RATING}"]
     return [*cautions, *foot_lines(model, [row["reason"]])]
 
 

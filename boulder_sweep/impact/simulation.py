@@ -130,7 +130,7 @@ def simulate(
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
     designs = designs_of(block, None, sweep.model.resistance, sweep.model.ground, sweep.model.shape)
     one, how = design_at(designs.table, 0), readings_of(sweep)
-    evaluation = evaluation_of(sweep, accuracy_of(sweep)).with_all_opinions()
+    evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
     decided = evaluation.judged(designs)
     layered = isinstance(designs.table, LAYERED)
     control = _control(evaluation.control, how, float(decided["step_s"][0]), layered=layered)

@@ -11,8 +11,7 @@ import pyarrow.parquet as pq
 
 from boulder_sweep.errors import HistoryFileError
 from boulder_sweep.impact.trajectory_columns import BY_NAME
-from boulder_sweep.store.files import replacing
-from boulder_sweep.store.targets import check_target
+from boulder_sweep.store.files import check_target, replacing
 from boulder_sweep.text import why
 
 _TYPES = {"float64": pa.float64(), "dictionary": pa.dictionary(pa.int32(), pa.string())}

@@ -77,7 +77,7 @@ class Evaluation:
         Margin that a question asks for, from 0 to less than 1; see `judged`.
     second_opinion
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
-    can_be_asked
+    askable
         Whether second opinions know such designs.
     shape
         Shape of the boulders.
@@ -93,7 +93,7 @@ class Evaluation:
     ground: Ground = field(default_factory=Ground)
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
-    can_be_asked: bool = False
+    askable: bool = False
     shape: Shape = field(default_factory=Shape)
 
     def __call__(self, block: DesignBlock) -> Judged:
@@ -149,6 +149,7 @@ class Evaluation:
         A simulation may end with a proof of its verdict while the rotation can still grow, so its margin is one up to
         then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
+        Second opinions are asked with the reduced limit.
         """
         rows = RowStates(designs, self.control, *self._once(designs, self.control))
         for control in finer_controls(self.control):
@@ -166,22 +167,26 @@ class Evaluation:
             judged = self._margins_proved(judged, designs)
         if not self.second_opinion or (self.only and "robustness" not in self.only):
             return judged
-        return self._graded(judged, designs.rows(judged.verdict == PASS), self.second_opinion)
+        limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
+        passes = designs.rows(judged.verdict == PASS)
+        return with_second_opinions(judged, passes, self.second_opinion, self.resistance, limits, self.longest_s)
 
-    def with_all_opinions(self) -> Evaluation:
-        """Return the same, asking every second opinion of every pass, where they can be asked."""
-        return replace(self, second_opinion=SECOND_OPINIONS) if self.can_be_asked else self
+    def asked(self) -> Evaluation:
+        """Return the same with every second opinion, where they can be asked."""
+        return replace(self, second_opinion=SECOND_OPINIONS) if self.askable else self
 
     def graded(self, judged: Judged, block: DesignBlock) -> Judged:
-        """Return the judged rows of a block with every second opinion of its passes, where they can be asked."""
+        """Return the judged rows of a block with every second opinion of its passes, without a margin."""
         passing = judged.verdict == PASS
-        if not self.can_be_asked or not passing.any():
+        if not self.askable or not passing.any():
             return judged
-        return self._graded(judged, self.designs(block, passing), SECOND_OPINIONS)
+        passes = self.designs(block, passing)
+        return with_second_opinions(judged, passes, SECOND_OPINIONS, self.resistance, self.limits, self.longest_s)
 
-    def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
-        longest = self.control.longest_horizon or LONGEST_HORIZON * self.control.horizon
-        return with_second_opinions(judged, passes, laws, self.resistance, self.limits, longest)
+    @property
+    def longest_s(self) -> float:
+        """Longest time for which a second opinion is simulated."""
+        return self.control.longest_horizon or LONGEST_HORIZON * self.control.horizon
 
     def _margins_proved(self, judged: Judged, designs: Designs) -> Judged:
         """Put margins that are not proved to last just below the one asked for; see `judged`."""
@@ -277,7 +282,7 @@ def evaluation_of(
         second_spring=SECOND_SPRING in sweep.plan.columns,
         ground=sweep.model.ground,
         second_opinion=sweep.model.second_opinion if can_be_asked(sweep) else (),
-        can_be_asked=can_be_asked(sweep),
+        askable=can_be_asked(sweep),
         shape=sweep.model.shape,
     )
 

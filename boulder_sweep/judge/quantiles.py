@@ -19,7 +19,6 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import sampled_rows
 from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.problems import shorten
 
 if TYPE_CHECKING:
     from boulder_sweep.judge.judged import Judged
@@ -72,7 +71,7 @@ def _share(at: str) -> float:
     """Read ``p5`` as 0.05."""
     found = re.fullmatch(r"p(\d{1,2}(?:\.\d+)?)", at)
     if found is None or not 0.0 < float(found[1]) <= 50.0:
-        raise QuestionError(f"'{shorten(at)}' is not mean, p5 or another quantile from above p0 to p50")
+        raise QuestionError(f"'{at[:40]}' is not mean, p5 or another quantile from above p0 to p50")
     return float(found[1]) / 100.0
 
 

@@ -12,11 +12,14 @@ limit. It needs a better test of the soil, a deeper bed, or a crash test.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from boulder_kernels import Status
+from boulder_kernels._jit import plain
+from boulder_kernels.heave import bearing_capacity_factor
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import GRADES
@@ -37,8 +40,8 @@ IN_WORDS = (
 )
 """What ``robust`` means, in words,"""
 SENSITIVE_IN_WORDS = (
-    "a second opinion overturns it, or the ground under its foot cannot carry it; no fail, but ask for a better soil "
-    "test, a deeper bed (sweep need --robust) or a crash test"
+    "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed (sweep need --robust) or a "
+    "crash test"
 )
 """and ``sensitive``."""
 MEANINGS = {
@@ -48,6 +51,11 @@ MEANINGS = {
     "corrected readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
+GIVES_WAY = (
+    "no second opinion: by the density and friction angle of the soil the ground under the foot cannot carry the "
+    "boulder's own weight; ask for a better soil test, a deeper bed (sweep need --robust) or a foundation"
+)
+"""And of a sensitive pass whose boulder would sink before the impact."""
 FREE_ROTATION_DEG = 8.0
 """Largest rotation up to which a pass is robust without being asked,"""
 FREE = {
@@ -64,7 +72,7 @@ FREE = {
     "k_v": (0.75 * 3103.3e3, 1.25 * 3103.3e3),
     "c_v": (0.75 * 138.91e3, 1.25 * 138.91e3),
 }
-"""in these ranges of the inputs (SI, `boulder_kernels.DesignTable`), where the study found no pass that is not,"""
+"""in these ranges of the inputs, where the study found none that is lost (SI, `boulder_kernels.DesignTable`),"""
 FREE_EMBEDMENT = (0.5, 0.75)
 """of embedment depth over height, and with a subgrade reaction that belongs to the friction angle."""
 FREE_LIMIT_DEG = 20.0
@@ -87,6 +95,19 @@ def can_be_asked(sweep: Sweep) -> bool:
     return plain and model.preset == "corrected" and SECOND_SPRING not in sweep.plan.columns
 
 
+def meaning_of(row: Mapping[str, Any]) -> str | None:
+    """Return what the grade of a row of the table means; None where it has none.
+
+    A boulder that the ground cannot carry (Eq 133) is sensitive under whatever law: no second opinion begins from rest.
+    """
+    if row["robustness"] == "sensitive":
+        angle = math.radians(row["friction_angle_deg"])
+        load = row["boulder_density_kg_m3"] * row["boulder_height_m"]
+        if load >= row["soil_density_kg_m3"] * row["embedment_depth_m"] * plain(bearing_capacity_factor)(angle):
+            return GIVES_WAY
+    return MEANINGS.get(row["robustness"])
+
+
 def grades_without_asking(facts: Any) -> np.ndarray:
     """Return the codes of `GRADES` that passes have without a second opinion, shape (n,).
 
@@ -105,7 +126,7 @@ def grades_without_asking(facts: Any) -> np.ndarray:
 
 
 def is_free(table: DesignTable) -> np.ndarray:
-    """Return which of n designs lie in the ranges of `FREE`, bool, shape (n,)."""
+    """Return which of n designs lie in the ranges that the study draws from, bool, shape (n,)."""
     ranges = [(getattr(table, name), *ends) for name, ends in FREE.items()]
     ranges.append((table.d / table.H, *FREE_EMBEDMENT))
     ranges.append((table.beta, *family_bounds(np.degrees(table.phi))))
@@ -115,8 +136,6 @@ def is_free(table: DesignTable) -> np.ndarray:
 
 def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: float) -> np.ndarray:
     """Return which of n designs pass by a second opinion, bool, shape (n,).
-
-    A boulder that the ground under its foot cannot carry at rest does not.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_sweep.columns import GRADES
-from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS
+from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS, meaning_of
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
 from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
@@ -163,8 +163,9 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
     sentences.append((f"The design {verdict}: ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep."))
     grade = rows.grade(row)
-    if grade in MEANINGS:
-        sentences.append((f"It is {grade}: {MEANINGS[grade]}.",))
+    meaning = meaning_of({**row, "robustness": grade})
+    if meaning is not None:
+        sentences.append((f"It is {grade}: {meaning}.",))
     flags = [flag for flag in (row["validity"] or "").split(SEPARATOR) if flag]
     if flags:
         sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))

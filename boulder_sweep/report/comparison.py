@@ -11,9 +11,8 @@ from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE
-from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.provenance import differences
-from boulder_sweep.store.reader import read
+from boulder_sweep.store.reader import FinishedRows, read
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import RATIO, name_of, unit_of
 

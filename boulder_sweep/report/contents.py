@@ -167,6 +167,15 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
     }
 
 
+def held_at(rows: Rows, kept: Thinned, number: int) -> dict[str, int]:
+    """Return the place of a design along each axis of the map; the nearest one kept where its own is left out."""
+    if not rows.axes:
+        return {}
+    own = np.unravel_index(number, rows.shape)
+    lines = zip(rows.axes.items(), kept.places, own, strict=True)
+    return {name: int(np.abs(along[places] - along[here]).argmin()) for (name, along), places, here in lines}
+
+
 def reading_words(settings: Mapping[str, Any]) -> str:
     """Return which formulas are read as printed, in words."""
     model = settings["model"]

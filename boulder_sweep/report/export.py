@@ -16,9 +16,8 @@ from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
-from boulder_sweep.store.files import replacing
-from boulder_sweep.store.finished import FinishedRows
-from boulder_sweep.store.targets import check_target
+from boulder_sweep.store.files import check_target, replacing
+from boulder_sweep.store.reader import FinishedRows
 from boulder_sweep.text import printable, why
 from boulder_sweep.views.wording import NOT_A_TEST
 

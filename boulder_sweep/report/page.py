@@ -14,8 +14,9 @@ from bokeh.embed.util import standalone_docs_json_and_render_items
 from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.report.contents import page_data, reading_words, setting_lines, table_data
+from boulder_sweep.report.contents import held_at, page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, parts_of, verdict_map
+from boulder_sweep.report.sketch import sketch_of
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
@@ -29,6 +30,7 @@ SCRIPTS = (
     *("walker", "controls", "choices", "player", "texts", "page"),
 )
 """Our own script, in this order."""
+NOTHING: Mapping[str, str] = {}
 MAIN = (
     "embedment_depth_m",
     "friction_angle_deg",
@@ -55,6 +57,7 @@ def assembled(
     chosen: Sequence[Mapping[str, Any]] = (),
     facts: Sequence[tuple[str, str]] = (),
     notes: Sequence[str] = (),
+    heading: Mapping[str, str] = NOTHING,
     units: str = "si",
 ) -> str:
     """Put the page together.
@@ -79,6 +82,8 @@ def assembled(
         Names and values that describe the origin of the results.
     notes
         Notes on these particular results.
+    heading
+        Project, client, author and date, as far as given.
     units
         Units shown first, ``si`` or ``us``.
 
@@ -92,6 +97,8 @@ def assembled(
     for plot in [*(plot for panel in panels for plot in curves(panel, parts_of(control))), verdict_map("live")]:
         document.add_root(plot)
     table = None if rows is None or kept is None else table_data(rows, kept)
+    if table is not None and rows is not None and kept is not None and chosen:
+        table["held"] = held_at(rows, kept, chosen[0]["number"])
     if table is not None and table["mapped"]:
         document.add_root(verdict_map("sweep"))
     docs, items = standalone_docs_json_and_render_items(list(document.roots))
@@ -127,6 +134,8 @@ def assembled(
         mapped=table is not None and table["mapped"],
         facts=facts,
         notes=notes,
+        heading=heading,
+        sketch=sketch_of(chosen[0]["inputs"], settings) if chosen else None,
         settings=settings,
         lines=setting_lines(settings),
         readings=reading_words(settings),

@@ -23,8 +23,7 @@ from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import completed
-from boulder_sweep.store.finished import FinishedRows
-from boulder_sweep.store.reader import read_row
+from boulder_sweep.store.reader import FinishedRows, read_row
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ CHANCES = ("p_pass", "p_pass_low", "p_pass_high", "p_pass_driver")
 
 
 class ChanceFile:
-    """The rows of such a file, read as those of a run are (`boulder_sweep.store.finished.FinishedRows`).
+    """The rows of such a file, read as those of a run are (`boulder_sweep.store.reader.FinishedRows`).
 
     Parameters
     ----------

@@ -16,37 +16,46 @@ from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import Named, answer_of
+from boulder_sweep.report.printing import print_page
 from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
 from boulder_sweep.settings import Sweep
+from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3, SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system
-from boulder_sweep.store.files import put_file
-from boulder_sweep.store.provenance import kernels_sha256, sha256_of, versions
-from boulder_sweep.store.targets import check_target
+from boulder_sweep.store.files import check_target, put_file
+from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
 from boulder_sweep.text import counted, printable, why
 from boulder_sweep.views.wording import UNLOADING_WORDS
 
-KINDS = (".html", ".htm")
+KINDS = (".html", ".htm", ".pdf")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
 
 
 def write_report(
-    out: str | Path | RemotePath, page: str | Path, *, designs: Sequence[int] = (), units: str = "si", command: str = ""
+    out: str | Path | RemotePath,
+    page: str | Path,
+    *,
+    designs: Sequence[int] = (),
+    units: str = "si",
+    command: str = "",
+    heading: Heading = NO_HEADING,
 ) -> Path:
-    """Write the report of a result: one HTML file that needs no network.
+    """Write the report of a result: one HTML file that needs no network, or that page printed to PDF.
 
     Parameters
     ----------
     out
         Folder that a sweep wrote; a run may still be writing into it.
     page
-        The file, ``.html`` or ``.htm``; replaced if it exists.
+        The file, ``.html``, ``.htm`` or ``.pdf``; replaced if it exists. A PDF is printed by a Chromium on the machine.
     designs
         Rows to be shown in full; by default those named in the answer.
     units
         Units shown first, ``si`` or ``us``; the reader can switch.
     command
         Command that regenerates the page.
+    heading
+        Project, client, author and date; an entry that is not given is that of the settings file.
 
     Returns
     -------
@@ -56,14 +65,17 @@ def write_report(
     Raises
     ------
     ReportError
-        There is nothing to report, a design does not exist, the page cannot be written, or the extra ``report`` is
-        not installed.
+        There is nothing to report, a design does not exist, the page cannot be written or printed, an entry of the
+        heading is wrong, or the extra ``report`` is not installed.
     StoreError
         There is no result in the folder, or it is damaged.
     ValueError
         The units are unknown.
     """
     check_system(units)
+    for key, text in heading.given().items():
+        if wrong := wrong_with(text):
+            raise ReportError(f"--{key}: {wrong}")
     assembled = _page_maker()
     rows = read_rows(location_of(out))
     target = checked_page(page)
@@ -83,6 +95,7 @@ def write_report(
         readings = Readings(**identity["readings"])
         text = assembled(
             title=str(settings["name"]),
+            heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
             settings=settings,
             control=control,
             readings=readings,
@@ -144,7 +157,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         control=control,
         readings=readings_of(sweep),
         start=inputs,
-        facts=_facts(versions(), sha256_of(settings), kernels_sha256(), command, None),
+        facts=_facts(versions(), settings_sha256(settings), kernels_sha256(), command, None),
         notes=_general_notes(settings, control),
         units=units,
     )
@@ -176,7 +189,7 @@ def checked_page(path: str | Path) -> Path:
     """
     target = Path(path)
     if target.suffix.lower() not in KINDS:
-        raise ReportError(f"{path}: the name of a page must end in {' or '.join(KINDS)}")
+        raise ReportError(f"{path}: the name of a page must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
     check_target(target, ReportError)
     return target
 
@@ -239,24 +252,27 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
 
 
 def _facts(
-    versions_: Mapping[str, str], settings_sha256: str, kernels_sha256_: str, command: str, out: str | None
+    versions_: Mapping[str, str], settings_sha256_: str, kernels_sha256_: str, command: str, out: str | None
 ) -> list[tuple[str, str]]:
     """Return the origin of the results, and how to reproduce them."""
     found = [(f"version of {name}", versions_[name]) for name in PACKAGES if name in versions_]
-    found += [("hash of the settings", settings_sha256), ("hash of the kernels", kernels_sha256_)]
+    found += [("hash of the settings", settings_sha256_), ("hash of the kernels", kernels_sha256_)]
     if out is not None:
         found.append(("table", printable(out)))
     return [*found, ("command", printable(command))] if command else found
 
 
 def _written(page: Path, text: str) -> Path:
-    """Write a file as a whole or not at all.
+    """Write the page, or print it to PDF, as a whole or not at all.
 
     Raises
     ------
     ReportError
-        The system refuses it.
+        The system refuses it, or as of `print_page`.
     """
+    if page.suffix.lower() == ".pdf":
+        print_page(text, page)
+        return page
     try:
         put_file(page.parent, page.name, text.encode())
     except OSError as problem:

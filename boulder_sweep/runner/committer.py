@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from boulder_sweep.runner.assembly import Admission
 from boulder_sweep.store.errors import DamagedError
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 
@@ -31,8 +30,8 @@ class Committer(threading.Thread):
         Open for writing.
     computation
         Encodes merged parts.
-    admission
-        Is told which rows are staged, and so no longer in memory.
+    release
+        Called with the number of rows that are staged, and so no longer in memory.
     flush
         Stages the rows that are ready when the run is stopped.
     clock, work_clock
@@ -43,8 +42,8 @@ class Committer(threading.Thread):
         self,
         folder: OutputFolder,
         computation: Computation,
-        admission: Admission,
-        flush: Callable[[], Iterable[StagedPart]],
+        release: Callable[[int], object] = lambda rows: None,
+        flush: Callable[[], Iterable[StagedPart]] = tuple,
         clock: Callable[[], float] = time.monotonic,
         work_clock: Callable[[], float] = time.thread_time,
     ):
@@ -52,7 +51,7 @@ class Committer(threading.Thread):
         self.problem: BaseException | None = None
         self._folder = folder
         self._computation = computation
-        self._admission = admission
+        self._release = release
         self._flush = flush
         self._clock = clock
         self._work_clock = work_clock
@@ -85,7 +84,7 @@ class Committer(threading.Thread):
         try:
             while (item := self._next_item()) is not None:
                 self._waiting[item.part.first] = item
-                self._admission.release(item.part.rows)
+                self._release(item.part.rows)
             if self._stopped.is_set():
                 self._waiting |= {item.part.first: item for item in self._flush()}
             self._commit(self._stopped.is_set())

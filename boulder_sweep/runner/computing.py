@@ -127,11 +127,12 @@ def verdict_counts(judged: Judged) -> dict[str, int]:
     passing = judged.verdict == PASS
     grade, standing = judged["robustness"][passing], judged["stands_under"][passing]
     found.pop("pass", None)
-    for place, word in enumerate(GRADES):
-        for under in set(standing[grade == place].tolist()):
-            laws = STANDINGS[under].split(";")[1:] if word == "sensitive" and under >= 0 else []
-            key = f"pass/{word}" + (f" (stands under {' and '.join(laws)})" if laws else "")
-            found[key] = found.get(key, 0) + int(np.count_nonzero((grade == place) & (standing == under)))
+    pairs, numbers = np.unique(np.stack((grade, standing)), axis=1, return_counts=True)
+    for place, under, number in zip(*pairs.tolist(), numbers.tolist(), strict=True):
+        word = GRADES[place]
+        laws = STANDINGS[under].split(";")[1:] if word == "sensitive" and under >= 0 else []
+        key = f"pass/{word}" + (f" (stands under {' and '.join(laws)})" if laws else "")
+        found[key] = found.get(key, 0) + number
     return dict(sorted((key, count) for key, count in found.items() if count))
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.locations import Location, RemotePath
-from boulder_sweep.runner.assembly import COMMIT_EVERY_S
+from boulder_sweep.runner.threads import COMMIT_EVERY_S
 from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.writer import ROWS_PER_PART
 from boulder_sweep.text import size_text

@@ -3,45 +3,27 @@
 from __future__ import annotations
 
 import itertools
-import queue
-import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
-from boulder_sweep.runner.backends import (
-    DASK,
-    FETCH_S,
-    THREADING,
-    available_cores,
-    check_backend,
-    check_jobs,
-    start_failure,
-)
+from boulder_sweep.errors import BackendError, BoulderSweepError
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
     from boulder_sweep.runner.cluster import Cluster
+    from boulder_sweep.runner.dispatch import Task
 
+THREADING, DASK = "threading", "dask"
+BACKENDS = (THREADING, DASK)
+"""Threads of this process: the kernels run without the interpreter's lock. Or a Dask cluster."""
+MOST_JOBS = 4096
+"""Most workers that may be asked for, more than a machine has cores; starting a million would exhaust it."""
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 """Function, arguments and named arguments, see `call`."""
 _CALLS_PER_THREAD = 3
-_LOOK_EVERY_S = 10.0
-"""Time without a result after which is looked whether there are workers [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """A call on a cluster."""
-
-    call: Call
-    future: Any
-    only: frozenset[str]
-    """The workers that it was given to; empty for any."""
+"""Calls on a cluster whose results were not yielded yet."""
 
 
 def call(function: Callable[..., Any], *arguments: Any, **named: Any) -> Call:
@@ -73,7 +55,6 @@ class Pool:
         check_jobs(jobs)
         self._clock = clock
         self._jobs, self._cluster = jobs, cluster
-        self._fetch_s = FETCH_S
 
     def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
         """Make the calls.
@@ -81,7 +62,9 @@ class Pool:
         Raises
         ------
         BackendError
-            The system cannot start as many threads.
+            The system cannot start as many threads, or the workers of a cluster cannot make a call.
+        ClusterLostError
+            The scheduler or the workers are gone.
         """
         if self._cluster is not None:
             return self._on_cluster(self._cluster, calls)
@@ -103,109 +86,34 @@ class Pool:
         return Pool, (1,)
 
     def _on_cluster(self, cluster: Cluster, calls: Iterable[Call]) -> Iterator[Any]:
-        """Make the calls on a cluster.
+        """Make the calls on a cluster."""
+        from boulder_sweep.runner.dispatch import Dispatcher, Task
 
-        Raises
-        ------
-        ClusterLostError
-            The scheduler or the workers are gone.
-        """
-        from boulder_sweep.runner.silence import Silence
+        dispatcher: Dispatcher[int] = Dispatcher(cluster, clock=self._clock)
+        numbered = enumerate(calls)
+        results: dict[int, Any] = {}
+        first = submitted = 0
 
-        silence = Silence(cluster)
-        most = _CALLS_PER_THREAD * max(sum(cluster.threads().values()), 1)
-        waiting: deque[_Asked] = deque()
+        def next_task() -> Task[int] | None:
+            """Return the next call, unless there are results enough that wait for the one of an earlier call."""
+            nonlocal submitted
+            if submitted - first >= _CALLS_PER_THREAD * max(dispatcher.threads, 1):
+                return None
+            number, one = next(numbered, (-1, None))
+            if one is None:
+                return None
+            submitted = number + 1
+            return Task(number, *one)
 
-        def submitted(call: Call) -> _Asked:
-            """Hand a call to the workers that are not silent."""
-            only = sorted(cluster.threads().keys() - silence.silent) if silence.silent else None
-            function, arguments, options = call
-            future = cluster.client.submit(function, *arguments, **options, workers=only, pure=False)
-            return _Asked(call, future, frozenset(only or ()))
-
-        def first_of() -> Any:
-            """Look for silent workers, give their calls to others, and return the future of the first call."""
-            in_flight = {asked.future: asked.only for asked in waiting}
-            for hung in silence.look(self._clock(), in_flight):
-                place = next(k for k, asked in enumerate(waiting) if asked.future is hung)
-                hung.release()
-                waiting[place] = submitted(waiting[place].call)
-            return waiting[0].future
-
-        for call in calls:
-            waiting.append(submitted(call))
-            if len(waiting) >= most:
-                yield self._result(cluster, waiting[0].future, first_of)
-                waiting.popleft()
-        while waiting:
-            yield self._result(cluster, waiting[0].future, first_of)
-            waiting.popleft()
-
-    def _result(self, cluster: Cluster, future: Any, renewed: Callable[[], Any] | None = None) -> Any:
-        """Wait for a result; a worker that dies or hangs is replaced by another as long as there is one.
-
-        Parameters
-        ----------
-        cluster, future
-            What is waited for.
-        renewed
-            Called while it does not come; returns the future that stands for the same call then.
-        """
-        without_s = 0.0
-        while True:
-            finished = future.done()
-            # Only a result that is there is worth waiting for longer: its worker may be far away.
-            patience_s = self._fetch_s if finished else min(self._fetch_s, FETCH_S)
-            try:
-                if patience_s <= FETCH_S:
-                    return future.result(timeout=patience_s)
-                return _fetched(future, patience_s, renewed)
-            except TimeoutError as late:
-                if future.status == "error":  # the call itself ran out of time
-                    raise BackendError(f"the workers cannot answer this: {one_line(late)}") from late
-                if finished:
-                    self._fetch_s *= 2.0
-                without_s += patience_s
-                if without_s >= _LOOK_EVERY_S:
-                    without_s = 0.0
-                    if not cluster.threads():
-                        raise ClusterLostError(f"{cluster.lost_text()}: no worker is left") from None
-                future = future if renewed is None else renewed()
-            except BoulderSweepError:
-                raise
-            except Exception as problem:
-                if cluster.client.status != "running":
-                    raise ClusterLostError(cluster.lost_text()) from problem
+        for number, result, problem in dispatcher.outcomes(next_task):
+            if isinstance(problem, BoulderSweepError):
+                raise problem
+            if problem is not None:
                 raise BackendError(f"the workers cannot answer this: {one_line(problem)}") from problem
-
-
-def _fetched(future: Any, limit_s: float, renewed: Callable[[], Any] | None) -> Any:
-    """Fetch a result that may take long, and look meanwhile whether another future stands for the call.
-
-    Raises
-    ------
-    TimeoutError
-        It did not come in time, or is no longer wanted.
-    """
-    came: queue.SimpleQueue[tuple[Any, Exception | None]] = queue.SimpleQueue()
-
-    def fetch() -> None:
-        try:
-            came.put((future.result(timeout=limit_s), None))
-        except Exception as problem:
-            came.put((None, problem))
-
-    threading.Thread(target=fetch, daemon=True).start()
-    while True:
-        try:
-            result, problem = came.get(timeout=FETCH_S)
-        except queue.Empty:
-            if renewed is not None and renewed() is not future:
-                raise TimeoutError from None
-            continue
-        if problem is not None:
-            raise problem
-        return result
+            results[number] = result
+            while first in results:
+                yield results.pop(first)
+                first += 1
 
 
 @contextmanager
@@ -230,3 +138,60 @@ def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = Non
         yield Pool(jobs, cluster)
     finally:
         cluster.close()
+
+
+def available_cores() -> int:
+    """Return how many cores this process may use."""
+    import joblib
+
+    return joblib.cpu_count()
+
+
+def check_backend(backend: str, scheduler: str | None) -> None:
+    """Refuse backends that do not exist.
+
+    Raises
+    ------
+    BackendError
+        Unknown name, or the address of a scheduler without Dask.
+    """
+    if backend not in BACKENDS:
+        raise BackendError(f"unknown backend {backend!r}: choose one of {', '.join(BACKENDS)}")
+    if scheduler is not None and backend != DASK:
+        raise BackendError(f"a scheduler address needs the backend dask, not {backend}")
+
+
+def check_jobs(jobs: int | None) -> None:
+    """Refuse a number of workers that is not a whole number, below one, or above `MOST_JOBS`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Says what is allowed.
+    """
+    check_count("jobs", 1 if jobs is None else jobs)
+    if jobs is not None and jobs > MOST_JOBS:
+        raise ValueError(f"jobs must be at most {MOST_JOBS:,}, not {jobs:,}")
+
+
+def check_count(name: str, count: int) -> None:
+    """Refuse a count that is not a whole number, or below one; raises as `check_jobs`."""
+    if not isinstance(count, int) or isinstance(count, bool):
+        raise TypeError(f"{name} must be a whole number, not {type(count).__name__}")
+    if count < 1:
+        raise ValueError(f"{name} must be at least 1, not {count}")
+
+
+def start_failure(problem: BaseException, jobs: int | None) -> BackendError | None:
+    """Return the error to raise if a pool failed because the system starts no more threads, None otherwise.
+
+    `multiprocessing` then stumbles over the threads it has started, which cannot be terminated; the cause is the
+    context of its error.
+    """
+    cause: BaseException | None = problem
+    while cause is not None:
+        if isinstance(cause, RuntimeError) and "can't start new thread" in str(cause):
+            wanted = "a thread for every core" if jobs is None else f"{jobs:,} threads"
+            return BackendError(f"the system cannot start {wanted}; give a smaller number of --jobs")
+        cause = cause.__cause__ or cause.__context__
+    return None

@@ -1,22 +1,30 @@
-"""What a worker of a cluster does with a task: compute, encode and stage some rows, part by part."""
+"""A run on a cluster: each worker computes, encodes and stages its own parts; the scheduler sees short messages.
+
+`compute` is what a worker does with some rows; `ClusterWorkers` hands out rows and passes on what comes of them.
+"""
 
 from __future__ import annotations
 
+import queue
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from boulder_sweep.errors import BackendError
+from boulder_sweep.errors import BackendError, BoulderSweepError
 from boulder_sweep.locations import location_of
-from boulder_sweep.runner.computing import Computation, EncodedPart
+from boulder_sweep.runner.cluster import Cluster, Fingerprint, fingerprint, other_versions_text
+from boulder_sweep.runner.computing import Computation, Computed, EncodedPart, Ended, Message, Note, failed_rows
+from boulder_sweep.runner.dispatch import Dispatcher, Task
 from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.store.lock import LOCK_NAME
 from boulder_sweep.store.storage import storage_of
-from boulder_sweep.store.writer import StagedPart, stage
+from boulder_sweep.store.writer import OutputFolder, StagedPart, stage
 from boulder_sweep.text import one_line
 
-Fingerprint = tuple[dict[str, str], str, str]
+_TRIES = 3
 _prepared: set[str] = set()
 _preparing = threading.Lock()
 """Which runs this process, a worker, is ready for."""
@@ -41,42 +49,6 @@ class Done(NamedTuple):
 
     staged: list[StagedPart]
     relayed: list[EncodedPart]
-
-
-def fingerprint() -> Fingerprint:
-    """Return versions and hashes of the code that computes here."""
-    from boulder_sweep.store.provenance import kernels_sha256, rules_sha256, versions
-
-    return versions(), kernels_sha256(), rules_sha256()
-
-
-def check_fingerprints(found: Mapping[str, Any]) -> None:
-    """Refuse workers whose rows could differ from those of this machine; one that leaves meanwhile does not matter.
-
-    Parameters
-    ----------
-    found
-        What every worker has answered to `fingerprint`, or the exception.
-
-    Raises
-    ------
-    BackendError
-        Names them.
-    """
-    here, different = fingerprint(), []
-    for address, there in found.items():
-        if isinstance(there, Exception):
-            if not isinstance(there, OSError):
-                raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")
-        elif tuple(there) != here:
-            different.append(address)
-    if different:
-        raise BackendError(other_versions_text(f"the workers {', '.join(different)}"))
-
-
-def received(work: Work) -> Work:
-    """Hold the work on a worker, from which the others fetch it; repeated if that worker is lost."""
-    return work
 
 
 def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
@@ -122,10 +94,141 @@ def parts_of(start: int, stop: int, size: int) -> list[tuple[int, int]]:
     return list(zip([start, *ends[:-1]], ends, strict=True))
 
 
-def other_versions_text(who: str) -> str:
-    """Say that versions differ."""
-    return (
-        f"{who} and this machine have different versions of boulder-sweep, Python or NumPy, or processors that differ "
-        f"in the last bits (with and without fused multiply-add); install the same versions everywhere, on processors "
-        f"of one kind"
-    )
+@dataclass(frozen=True)
+class _Rows:
+    """Rows [start, stop) to be computed, and how often that has failed."""
+
+    start: int
+    stop: int
+    tries: int = 0
+    alone: bool = False
+    """Whether no other task is in flight with it, so that it is the one that ends its worker."""
+    relayed: bool = False
+    """Whether the bytes come back through the scheduler, because the worker cannot write into the folder."""
+
+
+class ClusterWorkers(threading.Thread):
+    """Computes ranges of rows on a cluster and puts messages into a queue, at last `Ended`.
+
+    Parameters
+    ----------
+    cluster
+        Where to compute.
+    computation
+        What to do with rows.
+    tasks
+        Ranges of rows [start, stop).
+    rows_per_block
+        Rows that a worker computes at once.
+    folder
+        Where parts are staged, by the workers if they share it.
+    clock
+        Gives the time [s].
+    """
+
+    def __init__(
+        self,
+        cluster: Cluster,
+        computation: Computation,
+        tasks: Iterator[tuple[int, int]],
+        rows_per_block: int,
+        folder: OutputFolder,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        super().__init__(name="workers", daemon=True)
+        self.messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self._computation = computation
+        self._ranges = (_Rows(*rows) for rows in tasks)
+        self._folder = folder
+        manifest = folder.manifest
+        work = Work(
+            folder.token,
+            computation,
+            rows_per_block,
+            manifest.rows_per_part,
+            str(folder.path.resolve()),
+            manifest.rows,
+            fingerprint(),
+        )
+        self._dispatcher: Dispatcher[_Rows] = Dispatcher(cluster, work, self._note, clock)
+        self._again: deque[_Rows] = deque()
+        self._suspects: deque[_Rows] = deque()
+        """Rows whose workers died; computed one task after the other."""
+        self._stopped = threading.Event()
+
+    def stop(self) -> None:
+        """Hand out no more tasks; those in progress are dropped."""
+        self._stopped.set()
+        self._dispatcher.stop()
+
+    def release(self, rows: int) -> None:
+        """Do nothing: rows that are staged never were in the memory of this process."""
+
+    def flush(self) -> list[StagedPart]:
+        """Stage what is not written yet: nothing, for workers write what they compute."""
+        return []
+
+    def run(self) -> None:
+        """Compute everything; called by `start`."""
+        problem: BaseException | None = None
+        try:
+            for rows, done, failure in self._dispatcher.outcomes(self._next_task):
+                if failure is None:
+                    self._accept(rows, done)
+                else:
+                    self._retry(rows, failure)
+        except BaseException as raised:
+            problem = raised
+        self.messages.put(Ended(None if self._stopped.is_set() else problem))
+
+    def _note(self, text: str) -> None:
+        """Tell the user something."""
+        self.messages.put(Note(text))
+
+    def _next_task(self) -> Task[_Rows] | None:
+        """Return rows to be computed next; suspects wait until nothing else is under way, and others for them."""
+        under_way = self._dispatcher.under_way
+        if self._suspects:
+            rows = None if under_way else self._suspects.popleft()
+        elif any(others.alone for others in under_way):
+            rows = None
+        else:
+            rows = self._again.popleft() if self._again else next(self._ranges, None)
+        return None if rows is None else Task(rows, compute, (rows.start, rows.stop, rows.relayed))
+
+    def _accept(self, rows: _Rows, done: Done) -> None:
+        """Pass on the parts that a worker has written, or write those that it sent."""
+        for part in done.relayed:
+            done.staged.append(self._folder.stage(part.first, part.content, part.rows, part.verdicts))
+        here = [staged for staged in done.staged if self._folder.is_staged(staged)]
+        for staged in here:
+            self.messages.put(Computed(staged.part.rows))
+            self.messages.put(staged)
+        expected = parts_of(rows.start, rows.stop, self._folder.manifest.rows_per_part)
+        if len(here) < len(expected):
+            if not rows.relayed:
+                self._note("a worker does not share the output folder: its rows go through the scheduler")
+            there = {staged.part.first for staged in here}
+            self._again += [
+                _Rows(start, stop, rows.tries + 1, relayed=True) for start, stop in expected if start not in there
+            ]
+
+    def _retry(self, rows: _Rows, problem: BaseException) -> None:
+        """Submit a failed task again; halve one that ends its workers, until the row that does so is alone."""
+        if isinstance(problem, OSError) and problem.errno is not None:
+            raise self._folder.write_error(problem) from problem
+        if type(problem).__name__ != "KilledWorker":
+            if isinstance(problem, BoulderSweepError):
+                raise problem
+            if rows.tries + 1 >= _TRIES:
+                raise BackendError(f"the workers cannot compute this sweep: {one_line(problem)}") from problem
+            self._again.append(replace(rows, tries=rows.tries + 1))
+        elif not rows.alone:
+            self._suspects.append(replace(rows, alone=True))
+        elif rows.stop - rows.start > 1:
+            middle = (rows.start + rows.stop) // 2
+            self._suspects += [replace(rows, stop=middle), replace(rows, start=middle)]
+        else:
+            reason = "every worker that computed this design died"
+            part = self._computation.encoded(rows.start, [failed_rows(1, reason)])
+            self._accept(rows, Done([], [part]))

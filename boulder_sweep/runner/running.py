@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import shlex
 import threading
 import time
 from collections.abc import Callable
@@ -14,9 +15,8 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.firmness import firmness_of
-from boulder_sweep.runner.assembly import Admission, Assembly
-from boulder_sweep.runner.backends import DASK, start_failure
-from boulder_sweep.runner.cluster import Cluster, ClusterWorkers
+from boulder_sweep.locations import Location
+from boulder_sweep.runner.cluster import Cluster
 from boulder_sweep.runner.committer import Committer
 from boulder_sweep.runner.computing import Computation, Computed, Ended, Message, Note
 from boulder_sweep.runner.estimate import (
@@ -29,21 +29,14 @@ from boulder_sweep.runner.estimate import (
     tasks,
 )
 from boulder_sweep.runner.interruption import Signals
+from boulder_sweep.runner.pool import DASK, start_failure
+from boulder_sweep.runner.remote import ClusterWorkers
 from boulder_sweep.runner.summary import Progress, progress_of
 from boulder_sweep.runner.threads import ThreadWorkers
 from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.provenance import cpu_name, file_metadata
 from boulder_sweep.store.writer import OutputFolder, StagedPart
-
-if TYPE_CHECKING:
-    from boulder_sweep.settings import Sweep
-
-
-import shlex
-from typing import TYPE_CHECKING
-
-from boulder_sweep.locations import Location
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -106,11 +99,13 @@ class Run:
         """Compute and write what is missing."""
         evaluation = self._evaluation
         computation = Computation(evaluation, self._sweep.block, self._metadata, evaluation.warm_up, evaluation.columns)
-        admission = Admission(0)
-        workers = self._workers(computation, admission, commit_every_s)
+        workers = self._workers(computation, commit_every_s)
         if progress is not None and self._cluster is not None and self._cluster.dashboard:
             self.notes.append(f"dashboard of the cluster: {self._cluster.dashboard}")
-        committer = Committer(self._folder, computation, admission, tuple if workers is None else workers.flush)
+        if workers is None:
+            committer = Committer(self._folder, computation)
+        else:
+            committer = Committer(self._folder, computation, workers.release, workers.flush)
         try:
             committer.start()
             if workers is None:
@@ -176,9 +171,7 @@ class Run:
             rows_per_part=self._folder.manifest.rows_per_part,
         )
 
-    def _workers(
-        self, computation: Computation, admission: Admission, commit_every_s: float
-    ) -> ThreadWorkers | ClusterWorkers | None:
+    def _workers(self, computation: Computation, commit_every_s: float) -> ThreadWorkers | ClusterWorkers | None:
         """Return the workers for the missing rows; None if there are no missing rows."""
         if self._estimate is None:
             return None
@@ -186,10 +179,9 @@ class Run:
         if self._cluster is not None:
             rows = rows_per_task(self._estimate, manifest.rows_per_part)
             return ClusterWorkers(self._cluster, computation, tasks(manifest.missing(), rows), size, self._folder)
-        admission.limit = rows_in_progress(size, self.jobs, manifest.rows_per_part)
-        assembly = Assembly(manifest.missing(), commit_every_s)
+        most = rows_in_progress(size, self.jobs, manifest.rows_per_part)
         ranges = blocks(manifest.missing(), size)
-        return ThreadWorkers(self.jobs, computation, ranges, admission, assembly, self._folder)
+        return ThreadWorkers(self.jobs, computation, ranges, most, self._folder, commit_every_s)
 
     def _coordinate(
         self, workers: ThreadWorkers | ClusterWorkers | None, committer: Committer, progress: Report | None

@@ -18,13 +18,13 @@ from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
-from boulder_sweep.runner.assembly import COMMIT_EVERY_S
-from boulder_sweep.runner.backends import available_cores, check_backend, check_count, check_jobs, start_failure
 from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample
 from boulder_sweep.runner.interruption import noted_signals
+from boulder_sweep.runner.pool import available_cores, check_backend, check_count, check_jobs, start_failure
 from boulder_sweep.runner.running import FINISHED, Report, Run, repeat_command
 from boulder_sweep.runner.running import resume_command as default_resume_command
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
+from boulder_sweep.runner.threads import COMMIT_EVERY_S
 from boulder_sweep.store.errors import NotASweepError
 from boulder_sweep.store.manifest import Manifest, check_own, load
 from boulder_sweep.store.opening import ClaimedFolder, claim_output

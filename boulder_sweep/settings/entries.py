@@ -28,7 +28,7 @@ NAME = re.compile(r"\w[\w .+-]{0,79}")
 """Names of sweeps and of named sets."""
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
-TOP_KEYS = ("name", *fields.SECTIONS, "table")
+TOP_KEYS = ("name", *fields.SECTIONS, "table", "report")
 
 
 class Entries:
@@ -65,7 +65,7 @@ class Entries:
         """Read the whole file; mistakes go to `problems`."""
         for entry in self.root:
             if entry.key not in TOP_KEYS:
-                self._unknown(entry, "", TOP_KEYS)
+                self.unknown(entry, "", TOP_KEYS)
         self._read_table()
         for problem in unfold_springs(self.root):
             self.given.add("vehicle.spring")
@@ -118,7 +118,7 @@ class Entries:
         for inner in node:
             field = known.get(inner.key)
             if field is None:
-                self._unknown(inner, section, tuple(known))
+                self.unknown(inner, section, tuple(known))
                 continue
             self.given.add(field.path)
             try:
@@ -151,7 +151,7 @@ class Entries:
                     self.problems.add(inner.position, field.path, message)
                     continue
                 if field is None:
-                    self._unknown(inner, section, ("name", *(key for key in known if known[key] in fields.INPUTS)))
+                    self.unknown(inner, section, ("name", *(key for key in known if known[key] in fields.INPUTS)))
                     continue
                 self.given.add(field.path)
                 try:
@@ -184,7 +184,7 @@ class Entries:
         """Return the inputs that the named sets of a block give."""
         return [field for field in fields.fields_of(section) if field.name in self.leaves]
 
-    def _unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
+    def unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
         """Report an unknown key, with the nearest known one."""
         word = entry.key.lower()
         synonym = next((field.key for field in fields.fields_of(section) if word in field.also), None)

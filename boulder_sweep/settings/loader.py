@@ -15,9 +15,10 @@ from boulder_sweep import elementary
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
 from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
+from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import ROCK_KG_M3, Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
-from boulder_sweep.settings.problems import ProblemList, SettingsError, check_regular_file, reason_of, refuse
+from boulder_sweep.settings.problems import ProblemList, SettingsError, check_regular_file, reason_of, refuse, shorten
 from boulder_sweep.settings.tree import Mapping, Scalar, parse
 
 if TYPE_CHECKING:
@@ -74,10 +75,11 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     entries = Entries(root, path, problems)
     name = _read_name(entries)
     entries.read()
+    heading = _read_heading(entries)
     check_complete(entries)
     check_pairs(entries)
     problems.raise_if_any()
-    return _build(name, entries, tuple(overrides))
+    return _build(name, heading, entries, tuple(overrides))
 
 
 def _read_text(path: Path) -> str:
@@ -133,7 +135,32 @@ def _read_name(entries: Entries) -> str:
     return default
 
 
-def _build(name: str, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
+def _read_heading(entries: Entries) -> Heading:
+    """Return the heading in a file; mistakes go to its problems."""
+    entry = entries.root.entries.get(SECTION)
+    if entry is None:
+        return NO_HEADING
+    node = entry.value
+    if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
+        return NO_HEADING  # a block of which every line is commented out
+    if not isinstance(node, Mapping) or node.unit is not None:
+        entries.problems.add(node.position, SECTION, f"must be a block of keys: {', '.join(Heading._fields)}")
+        return NO_HEADING
+    found: dict[str, str] = {}
+    for inner in node:
+        path, value = f"{SECTION}.{shorten(inner.key)}", inner.value
+        if inner.key not in Heading._fields:
+            entries.unknown(inner, SECTION, Heading._fields)
+        elif not isinstance(value, Scalar):
+            entries.problems.add(value.position, path, "must be one line of text, not a list or a block")
+        elif wrong := wrong_with(value.text):
+            entries.problems.add(value.position, path, wrong)
+        else:
+            found[inner.key] = value.text.strip()
+    return Heading(**found)
+
+
+def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
     """Put the checked parts together."""
     from boulder_sweep.settings.notes import notes_on
     from boulder_sweep.settings.sweep import Sweep
@@ -164,6 +191,7 @@ def _build(name: str, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
         correlation=entries.settings.get("correlation", 0.0),
         partial_factor=factor,
         overrides=overrides,
+        heading=heading,
     )
     positions = {field.name: entries.position_of(field) for field in fields.INPUTS}
     object.__setattr__(sweep, "notes", tuple(notes_on(sweep, positions)))
@@ -197,6 +225,8 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
     axes: list[Axis] = []
     count = 1
     for section in entries.root:
+        if section.key == SECTION:
+            continue
         if section.key in entries.sets:
             labels = entries.sets[section.key]
             columns = {field.name: entries.leaves[field.name].values for field in entries.inputs_of_sets(section.key)}

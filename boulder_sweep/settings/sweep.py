@@ -14,6 +14,7 @@ import numpy as np
 from boulder_sweep.designs import DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import INPUTS
+from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import Problem
 
@@ -109,6 +110,8 @@ class Sweep:
         values: the factor has been applied to them.
     overrides : tuple of str
         Entries that replaced those of the file, as of ``--set``.
+    heading : Heading
+        Project, client, author and date for the heading of a report.
     notes : tuple of Problem
         Notes that are not errors.
     """
@@ -127,6 +130,7 @@ class Sweep:
     partial_factor: float = 1.0
     notes: tuple[Problem, ...] = ()
     overrides: tuple[str, ...] = ()
+    heading: Heading = NO_HEADING
 
     @cached_property
     def plan(self) -> DesignPlan:
@@ -163,7 +167,9 @@ class Sweep:
         return self.plan.block(start, stop)
 
     def resolved(self) -> dict[str, Any]:
-        """Return everything that decides the results as plain data: defaults filled in, units in the names.
+        """Return everything that decides the results, and the heading, as plain data.
+
+        Defaults are filled in, units are in the names.
 
         Two files that mean the same designs, written in other units or another layout, give the same.
         Very long axes and tables are represented by a SHA-256 of their values.
@@ -216,6 +222,7 @@ class Sweep:
                 "step_s": self.solver.step_s,
                 "horizon_s": self.solver.horizon_s,
             },
+            **({SECTION: given} if (given := self.heading.given()) else {}),
         }
 
 

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and that survive a power cut once they are there.
+"""Files that appear whole or not at all, survive a power cut once they are there, and lie where they may.
 
 A file is written without a name where the file system can do that (``O_TMPFILE``: Linux on ext4, XFS,
 Btrfs, tmpfs), else under a name that begins with ``_``; it is flushed to the disk, gets its name in one step,
@@ -17,8 +17,12 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import BinaryIO
 
+from boulder_sweep.errors import BoulderSweepError
+from boulder_sweep.locations import Location
 from boulder_sweep.store.errors import LinkError
 
+MANIFEST_NAME = "_manifest.parquet"
+"""A folder with such a file is the result of a run, see `manifest`."""
 WRITING_SUFFIX = ".writing"
 """Suffix of a file that does not have its final name yet; such names begin with ``_``, and readers skip them."""
 _PIECE = 8 << 20
@@ -211,3 +215,44 @@ def _write_all(descriptor: int, content: memoryview | bytes) -> None:
     while rest:
         rest = rest[os.write(descriptor, rest[:_PIECE]) :]
     os.fsync(descriptor)
+
+
+def check_target(target: Location, refusal: type[BoulderSweepError]) -> None:
+    """Check that a file may be written at a place; readers would take one within a result for rows of it.
+
+    Parameters
+    ----------
+    target
+        The file, by path or URL.
+    refusal
+        The error to raise.
+
+    Raises
+    ------
+    BoulderSweepError
+        Its folder does not exist, cannot be written or holds the result of a run, or a folder has its name.
+    LinkError
+        A link has its name.
+    """
+    if not isinstance(target, Path):
+        with suppress(OSError):  # a store that does not answer, or lets nobody read: writing will tell
+            _check_no_result(target, target.parent, refusal)
+        return
+    folder = target.absolute().parent
+    if not folder.is_dir():
+        raise refusal(f"{target}: the folder {folder} does not exist")
+    _check_no_result(target, folder, refusal)
+    if target.is_dir():
+        raise refusal(f"{target} cannot be written: {os.strerror(errno.EISDIR)}")
+    try:
+        is_there = is_file(target)
+    except OSError as problem:
+        raise refusal(f"{target} cannot be written: {problem.strerror}") from problem
+    if not os.access(folder, os.W_OK | os.X_OK) or (is_there and not os.access(target, os.W_OK)):
+        raise refusal(f"{target} cannot be written: {os.strerror(errno.EACCES)}")
+
+
+def _check_no_result(target: Location, folder: Location, refusal: type[BoulderSweepError]) -> None:
+    """Check that a folder is not the result of a run."""
+    if (folder / MANIFEST_NAME).exists():
+        raise refusal(f"{target}: the folder {folder} holds the result of a run; name a file outside it")

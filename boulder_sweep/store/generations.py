@@ -16,8 +16,8 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from boulder_sweep.locations import RemotePath
+from boulder_sweep.store.files import MANIFEST_NAME
 
-MANIFEST_NAME = "_manifest.parquet"
 KEPT = 16
 """Versions kept; the copy or the list may be behind by as many."""
 Encode = Callable[[Mapping[bytes, bytes]], memoryview | bytes]
@@ -26,6 +26,7 @@ _NUMBER_KEY, _WRITER_KEY = b"boulder_sweep.generation", b"boulder_sweep.writer"
 _DIGITS = 12
 _NAME = re.compile(rf"_manifest-([0-9]{{{_DIGITS}}})\.parquet")
 _ATTEMPTS = 5
+_PROBE = "_probe-"
 
 
 class OtherWriterError(Exception):
@@ -137,6 +138,41 @@ class Generations:
             if not path.exists():
                 path.put(content)
         return path.read_bytes()
+
+
+def is_probe(name: str) -> bool:
+    """Whether a name is that of an object that `refuses_existing` wrote."""
+    return name.startswith(_PROBE)
+
+
+def refuses_existing(folder: RemotePath, token: str) -> bool:
+    """Find out whether the store can refuse to write an object that exists; and whether it can be written at all.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    probe = folder / f"{_PROBE}{token}"
+    try:
+        probe.put(b"1", only_new=True)
+    except FileExistsError:
+        pass  # the answer to a first try was lost
+    except OSError:
+        probe.put(b"1")  # the store may not know such requests
+        probe.unlink(missing_ok=True)
+        return False
+    try:
+        probe.put(b"2", only_new=True)
+    except FileExistsError:
+        return True
+    except OSError:
+        return False
+    else:
+        return False
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
 
 
 def _begin(folder: RemotePath) -> Generation | None:

@@ -1,30 +1,40 @@
-"""One writer per folder: a lock that the system releases when its holder dies.
+"""One writer per folder.
 
-The lock is `flock` on the empty file ``_lock``. A killed run therefore never leaves a folder locked, and the
-file it leaves behind is recognised as stale because the lock can be acquired. On network folders the lock may
-not be seen by other machines; there the heartbeat of the holder counts: it keeps renewing the time of ``_lock``.
+On a disk the lock is `flock` on the empty file ``_lock``: the system releases it when its holder dies. A killed run
+therefore never leaves a folder locked, and the file it leaves behind is recognised as stale because the lock can be
+acquired. On network folders the lock may not be seen by other machines; there the heartbeat of the holder counts: it
+keeps renewing the time of ``_lock``.
+
+An object store has no locks: ``_lock`` holds the name of the holder and the time of its last heartbeat. That keeps two
+runs from working at the same time. Should one believe that the other is dead while it is not, it still cannot spoil
+the table: a version of the manifest is written once, see `generations`.
 """
 
 from __future__ import annotations
 
 import errno
 import fcntl
+import json
 import math
 import os
 import socket
+import threading
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
-from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, LinkError, WriteError
+from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, LinkError, StoreError, WriteError
 
 LOCK_NAME = "_lock"
 HEARTBEAT_S = 10.0
-"""How often the holder renews the time of the lock file [s]."""
+"""How often the holder renews the lock [s]."""
 DEAD_AFTER_S = 6 * HEARTBEAT_S
 """Time without a heartbeat after which a run on another machine counts as dead [s]."""
 _ATTEMPTS = 4
 _NOT_SUPPORTED = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
+_RECORD_BYTES = 1000
 
 
 class FolderLock:
@@ -75,10 +85,7 @@ class FolderLock:
         elsewhere = last_host is not None and last_host != socket.gethostname()
         if (elsewhere or not shared) and self.stale and age < DEAD_AFTER_S:
             os.close(descriptor)
-            raise FolderInUseError(
-                f"{folder} seems to be written by {holder}: its last heartbeat was {age:.0f} s ago. "
-                f"If that run is dead, try again in {DEAD_AFTER_S:.0f} s"
-            )
+            raise FolderInUseError(_in_use_text(folder, holder, age))
         self._descriptor: int | None = descriptor
         self._renewed = -math.inf
         self.renew()
@@ -120,8 +127,103 @@ class FolderLock:
             return float("inf")
 
 
-def is_locked(folder: Path) -> bool:
-    """Whether a run on this machine, or on one that shares its locks, is writing into a folder."""
+class ObjectLock:
+    """The same right on an object store: an object with the name of the holder and the time of its last heartbeat.
+
+    Parameters
+    ----------
+    folder
+        The output folder.
+    token
+        Unique name of this run.
+    only_new
+        Whether the store itself refuses to write an object that exists.
+    holder
+        Description of the run that seems to hold the lock.
+
+    Raises
+    ------
+    FolderInUseError
+        Another run holds it.
+    OSError
+        The folder cannot be written.
+    """
+
+    def __init__(self, folder: RemotePath, token: str, only_new: bool, holder: str):
+        self._folder, self._path, self._token = folder, folder / LOCK_NAME, token
+        self._lost: StoreError | None = None
+        self._released = threading.Event()
+        there = _record(self._path)
+        if there is not None and _is_alive(there):
+            raise FolderInUseError(_in_use_text(folder, holder, _age(there)))
+        with suppress(FileExistsError):  # another was quicker, or the answer to the first try was lost
+            self._path.put(self._content(), only_new=only_new and there is None)
+        if (_record(self._path) or {}).get("token") != token:
+            raise FolderInUseError(f"{folder} is being written by {holder}")
+        self._heart = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
+        self._heart.start()
+
+    def check(self) -> None:
+        """Look whether the lock is still held.
+
+        Raises
+        ------
+        FolderInUseError
+            Another run has taken it, because this one was silent for long.
+        FolderRemovedError
+            It was removed, as by another run that has ended.
+        OSError
+            The store does not answer.
+        """
+        self._look()
+        self.renew()
+
+    def renew(self) -> None:
+        """Do nothing if the lock was held when the thread that sends heartbeats last looked; cheap, call it often.
+
+        Raises
+        ------
+        FolderInUseError, FolderRemovedError
+            As for `check`.
+        """
+        if self._lost is not None:
+            raise self._lost
+
+    def release(self) -> None:
+        """Release the lock; may be called twice. If the store does not answer, it is that of a dead run."""
+        self._released.set()
+        self._heart.join()
+
+    def _beat(self) -> None:
+        """Renew the lock until it is released or taken; remove it then, so that no late heartbeat leaves a new one."""
+        while not self._released.wait(HEARTBEAT_S):
+            with suppress(OSError):
+                self._look()
+                if self._lost is not None:
+                    return
+                self._path.put(self._content())
+        with suppress(OSError):
+            if (_record(self._path) or {}).get("token") == self._token:
+                self._path.unlink(missing_ok=True)
+
+    def _look(self) -> None:
+        """Note if the lock is that of another run, or gone: it is not put there again, for others may have written."""
+        there = _record(self._path)
+        if there is None:
+            self._lost = FolderRemovedError(self._folder)
+        elif there.get("token") != self._token:
+            self._lost = FolderInUseError(f"{self._folder} was taken over by another run while this one was silent")
+
+    def _content(self) -> bytes:
+        record = {"token": self._token, "host": socket.gethostname(), "pid": os.getpid(), "time": time.time()}
+        return json.dumps(record).encode()
+
+
+def is_locked(folder: Location) -> bool:
+    """Whether a run seems to be writing into a folder; on a disk, one on a machine that shares its locks with this."""
+    if isinstance(folder, RemotePath):
+        there = _record(folder / LOCK_NAME)
+        return there is not None and _is_alive(there)
     try:
         descriptor = os.open(folder / LOCK_NAME, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:
@@ -136,6 +238,14 @@ def is_locked(folder: Path) -> bool:
         return False
     finally:
         os.close(descriptor)
+
+
+def _in_use_text(folder: Location, holder: str, age_s: float) -> str:
+    """Say who holds the lock."""
+    return (
+        f"{folder} seems to be written by {holder}: its last heartbeat was {age_s:.0f} s ago. "
+        f"If that run is dead, try again in {DEAD_AFTER_S:.0f} s"
+    )
 
 
 def _lock(descriptor: int) -> bool:
@@ -164,3 +274,35 @@ def _is(path: Path, descriptor: int) -> bool:
         return False
     mine = os.fstat(descriptor)
     return (there.st_dev, there.st_ino) == (mine.st_dev, mine.st_ino)
+
+
+def _record(path: RemotePath) -> dict[str, Any] | None:
+    """Return what a lock says; None if there is no lock."""
+    try:
+        found = json.loads(path.read_bytes(_RECORD_BYTES))
+    except FileNotFoundError:
+        return None
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _is_alive(there: dict[str, Any]) -> bool:
+    """Whether the holder of a lock may still be at work: not if its process is gone, or silent for long."""
+    if there.get("host") == socket.gethostname() and isinstance(there.get("pid"), int):
+        try:
+            os.kill(there["pid"], 0)
+        except (ProcessLookupError, OverflowError):
+            return False
+        except OSError:
+            pass  # somebody else's process
+    return _age(there) < DEAD_AFTER_S
+
+
+def _age(there: dict[str, Any]) -> float:
+    """Return the time since the last heartbeat [s]."""
+    moment = there.get("time")
+    with suppress(OverflowError):
+        if isinstance(moment, int | float):
+            return abs(time.time() - moment)
+    return float("inf")

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from io import BytesIO
 from itertools import pairwise
-from typing import IO, Any
+from typing import Any
 
 from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
-from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.locations import Location
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.errors import (
@@ -26,15 +24,13 @@ from boulder_sweep.store.errors import (
     ImpossibleRecordsError,
     NotASweepError,
     OtherVersionError,
-    StoreError,
     settings_file,
 )
-from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
-from boulder_sweep.store.generations import MANIFEST_NAME, is_generation, newest
+from boulder_sweep.store.files import MANIFEST_NAME, WRITING_SUFFIX, hidden_name
+from boulder_sweep.store.generations import is_generation, is_probe
 from boulder_sweep.store.lock import LOCK_NAME
-from boulder_sweep.store.object_lock import is_probe
 from boulder_sweep.store.records import IDENTITY, check_kinds, entries_of, is_deep, version_of
-from boulder_sweep.store.storage import Storage
+from boulder_sweep.store.storage import Storage, storage_of
 
 _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
@@ -265,7 +261,7 @@ def load(folder: Location) -> Manifest:
 
     path = folder / MANIFEST_NAME
     try:
-        with _opened(folder) as file:  # pyarrow takes no names that are not Unicode
+        with storage_of(folder).open_manifest() as file:  # pyarrow takes no names that are not Unicode
             found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
         raise NotASweepError(_no_result(folder)) from None
@@ -342,25 +338,6 @@ def check_own(manifest: Manifest, folder: Location) -> None:
     if manifest.differing:
         why = "; ".join(manifest.differing[:3]) + ("; ..." if len(manifest.differing) > 3 else "")
         raise OtherVersionError(folder / MANIFEST_NAME, shorten(why, 300), version_of({"identity": manifest.identity}))
-
-
-def _opened(folder: Location) -> IO[bytes]:
-    """Open the file of a manifest.
-
-    Raises
-    ------
-    StoreError
-        An object store does not answer, which says nothing about the manifest.
-    """
-    if not isinstance(folder, RemotePath):
-        # A pipe of this name must not be waited for.
-        return open(folder / MANIFEST_NAME, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
-    try:
-        return BytesIO(newest(folder).content)
-    except FileNotFoundError:
-        raise
-    except OSError as problem:
-        raise StoreError(f"{folder} cannot be read: {problem.strerror}") from None
 
 
 def _no_result(folder: Location) -> str:

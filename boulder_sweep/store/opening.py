@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
-from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.locations import Location
 from boulder_sweep.store import errors
 from boulder_sweep.store.generations import is_generation
 from boulder_sweep.store.lock import LOCK_NAME
@@ -87,9 +87,10 @@ class ClaimedFolder:
             different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
         if different:
             raise errors.SettingsDifferError(out, different)
+        there.identity = manifest.identity  # the heading of reports may be another
         recover_merge(there, out, storage)
-        # An object store checks its content itself, and reading all of it again may take hours.
-        damaged = damaged_parts(out, there.parts, read_parts=not isinstance(out, RemotePath))
+        # Where the storage checks content itself, reading all of it again may take hours.
+        damaged = damaged_parts(out, there.parts, read_parts=not storage.checks_content)
         there.parts = {name: part for name, part in there.parts.items() if name not in damaged}
         there.resume_command = manifest.resume_command
         storage.remove(name for name in self._names if is_ours(name) and name not in there.parts and not _is_kept(name))

@@ -2,7 +2,8 @@
 
 The *identity* is what must be equal for rows to belong to one table: settings, control of the integration,
 versions and the hashes of the code that decides a row. It goes into every part and into the manifest, and a
-run is resumed only with the same. When, where and with how many workers rows were computed does not affect
+run is resumed only with the same; the heading of reports, on which no row depends, may change. When, where
+and with how many workers rows were computed does not affect
 them; that is kept in the manifest only, and the name of the processor in the parts, so that equal runs on equal
 machines give equal parts.
 """
@@ -22,6 +23,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from boulder_sweep.settings.heading import SECTION
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.manifest import Session
 
@@ -35,7 +37,7 @@ _DECIDING_SOURCES = (
     "elementary.py",
     "soils.py",
     "judge/*.py",
-    *(f"settings/{name}.py" for name in ("fields", "model", "notes")),
+    *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "notes")),
 )
 """Modules, in addition to the kernels, whose code determines the rows: of the settings those that the others import."""
 
@@ -48,6 +50,11 @@ def canonical(content: Any) -> str:
 def sha256_of(content: Any) -> str:
     """SHA-256 of the canonical JSON of some content."""
     return hashlib.sha256(canonical(content).encode()).hexdigest()
+
+
+def settings_sha256(settings: Mapping[str, Any]) -> str:
+    """SHA-256 of resolved settings without the heading of reports, on which no row depends."""
+    return sha256_of({key: value for key, value in settings.items() if key != SECTION})
 
 
 def identity(
@@ -81,7 +88,7 @@ def identity(
         "control": control,
         "accuracy": accuracy or {},
         "versions": versions(),
-        "settings_sha256": sha256_of(settings),
+        "settings_sha256": settings_sha256(settings),
         "kernels_sha256": kernels_sha256(),
         "rules_sha256": rules_sha256(),
     }
@@ -92,6 +99,7 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
     """List the entries in which two identities differ, one line each; hashes only where nothing else explains them."""
     before, after = _flat(there), _flat(here)
     changed = [key for key in {**before, **after} if before.get(key, _ABSENT) != after.get(key, _ABSENT)]
+    changed = [key for key in changed if not key.startswith(f"settings.{SECTION}.")]
     telling = [key for key in changed if not key.endswith("_sha256")]
     if any(key.startswith("settings.") for key in telling):
         changed = [key for key in changed if key != "settings_sha256"]

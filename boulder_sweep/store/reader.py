@@ -1,19 +1,36 @@
-"""A finished or unfinished result as a table in memory."""
+"""The rows of a result: as one table in memory, or part by part, even while a run is writing into its folder.
+
+Files never change, but a run that has all its rows replaces small parts by larger ones with the same rows, see
+`writer`. A file that existed a moment ago may then be gone: its rows are looked up again in the new manifest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import warnings
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
-from boulder_sweep.columns import OUTCOMES, column_spec
+from boulder_sweep.columns import COLUMNS, OUTCOMES, column_spec
+from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import Location, RemotePath, location_of
-from boulder_sweep.store.finished import FinishedRows
+from boulder_sweep.settings.problems import shorten
+from boulder_sweep.store.errors import DamagedError, StoreError
+from boulder_sweep.store.files import hidden_name
+from boulder_sweep.store.manifest import Manifest, Part, load
+from boulder_sweep.store.provenance import judged_by
+from boulder_sweep.store.verify import load_checked, wrong_bytes
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
+
+_THREADS = min(8, os.cpu_count() or 1)
 
 
 def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, verify: bool = True) -> pd.DataFrame:
@@ -116,3 +133,201 @@ def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tupl
     if not parts:
         parts = [with_columns(table_schema().empty_table(), known if columns is None else columns)]
     return pa.concat_tables(parts), finished
+
+
+class FinishedRows:
+    """The rows of a result that are finished now; later ones are ignored.
+
+    Parameters
+    ----------
+    folder
+        The output folder; a run may be writing into it.
+
+    Attributes
+    ----------
+    rows : int
+        Rows of the whole table.
+    rows_done : int
+        Rows that are finished.
+    columns : tuple of str
+        Names of the columns: all of today, and what else the table has.
+    lacking : frozenset of str
+        Those of them that it does not store, being of another version: they are null.
+    identity : dict
+        What all rows have in common, see `provenance`.
+    judged_by : str
+        By whose rules the rows were judged; empty where by those of this version.
+
+    Warns
+    -----
+    OlderRulesWarning
+        Another version wrote the table.
+
+    Raises
+    ------
+    NotASweepError
+        There is no result in the folder.
+    DamagedError, OtherVersionError
+        Its manifest cannot be trusted, or not be read by this version.
+    """
+
+    def __init__(self, folder: Location):
+        manifest = load(folder)
+        self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
+        today = (*(spec.name for spec in COLUMNS), *manifest.more_columns)
+        self.columns = tuple(dict.fromkeys((*today, *manifest.columns)))
+        self.lacking = frozenset(self.columns) - frozenset(manifest.columns)
+        self.judged_by = judged_by(manifest.identity)
+        self._stored = manifest.columns
+        if said := [*([f"was {self.judged_by}"] if self.judged_by else []), *self._other_columns(today)]:
+            warnings.warn(f"{folder} {'; it '.join(said)}", OlderRulesWarning, stacklevel=2)
+        self._folder = folder
+        self._schemas: dict[str, pa.Schema] = {}
+        self._places = _Places(manifest)
+        self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())
+
+    def _other_columns(self, today: Sequence[str]) -> Iterator[str]:
+        """Say which columns the table has more or less than one of this version."""
+        if self.lacking:
+            yield f"has no {', '.join(name for name in self.columns if name in self.lacking)} (null here)"
+        if more := [name for name in self.columns if name not in today]:
+            yield f"has more columns, kept as they are: {shorten(', '.join(more), 200)}"
+
+    def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
+        """Yield all rows in the order of the designs, about a part at a time.
+
+        Parameters
+        ----------
+        columns
+            Names of the columns wanted; all by default.
+        verify
+            Compare every part with its checksum.
+
+        Raises
+        ------
+        DamagedError
+            A part is missing, truncated or changed.
+        """
+        _, damaged = load_checked(self._folder, read_parts=False)
+        if damaged:
+            raise DamagedError(_damage_text(self._folder, damaged))
+        wanted = list(columns) if columns is not None else None
+        ahead: deque[Future[list[pa.Table]]] = deque()
+        with ThreadPoolExecutor(_THREADS) as pool:
+            try:
+                for first, stop in self._ranges:
+                    ahead.append(pool.submit(self._between, first, stop, wanted, verify))
+                    if len(ahead) > _THREADS:
+                        yield from ahead.popleft().result()
+                while ahead:
+                    yield from ahead.popleft().result()
+            finally:
+                for waiting in ahead:
+                    waiting.cancel()
+
+    def row(self, number: int) -> pa.Table | None:
+        """Return one row; None where it is not finished.
+
+        Raises
+        ------
+        DamagedError
+            Its part is missing, truncated or changed.
+        """
+        if not any(first <= number < stop for first, stop in self._ranges):
+            return None
+        return self._between(number, number + 1, None, verify=True)[0]
+
+    def _between(self, first: int, stop: int, columns: list[str] | None, verify: bool) -> list[pa.Table]:
+        """Read the rows [first, stop)."""
+        found = []
+        while first < stop:
+            name, part, file = self._opened(first)
+            with file:
+                table = self._read(file, name, part, columns, verify)
+            end = min(stop, part.stop)
+            found.append(table.slice(first - part.first, end - first))
+            first = end
+        return found
+
+    def _opened(self, row: int) -> tuple[str, Part, IO[bytes]]:
+        """Open the file that holds a row. An open file stays readable, even if it is removed."""
+        places = self._places
+        while True:
+            for name, part in places.of(row):
+                try:
+                    return name, part, (self._folder / name).open("rb")
+                except FileNotFoundError:
+                    continue
+                except OSError as problem:
+                    if isinstance(self._folder, RemotePath):
+                        raise StoreError(f"{self._folder / name} cannot be read: {problem.strerror}") from None
+                    raise DamagedError(_damage_text(self._folder, {name: str(problem.strerror)})) from problem
+            before, places = places, _Places(load(self._folder))
+            if places.manifest.identity != self.identity:
+                raise StoreError(f"{self._folder} was replaced by the result of another sweep while it was read")
+            if places.manifest == before.manifest:
+                name = next((name for name, _ in places.of(row)), f"the part with row {row}")
+                raise DamagedError(_damage_text(self._folder, {name: "missing"}))
+            self._places = places
+
+    def _read(self, file: IO[bytes], name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
+        """Read a part from its open file."""
+        import pyarrow as pa  # heavy, and only readers need it
+        import pyarrow.parquet as pq
+
+        from boulder_sweep.store.schema import with_columns
+
+        source: Any = file
+        try:
+            if verify:
+                content = file.read()
+                wrong = wrong_bytes(content, part)
+                if wrong:
+                    raise DamagedError(_damage_text(self._folder, {name: wrong}))
+                source = pa.BufferReader(content)
+            # Parts are read in parallel already, and reading through a dataset would take twice as long.
+            with pq.ParquetFile(source, page_checksum_verification=True) as opened:
+                if set(opened.schema_arrow.names) != set(self._stored):
+                    wrong = "its columns are not those of the manifest"
+                    raise DamagedError(_damage_text(self._folder, {name: wrong}))
+                schema = self._schemas.setdefault("of all parts", opened.schema_arrow)  # one step, as of threads
+                if opened.metadata.num_rows != part.rows or not opened.schema_arrow.equals(schema):
+                    raise DamagedError(_damage_text(self._folder, {name: "other rows or columns than recorded"}))
+                table = opened.read(columns, use_threads=False)
+        except (OSError, ValueError, pa.ArrowException) as problem:  # ValueError: a name that is no text
+            raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
+        if not self.lacking and columns is None:
+            return table
+        return with_columns(table, self.columns if columns is None else columns)
+
+
+class _Places:
+    """Which rows are in which file, by a manifest."""
+
+    def __init__(self, manifest: Manifest):
+        self.manifest = manifest
+        self._names = sorted(manifest.parts, key=lambda name: manifest.parts[name].first)
+        self._firsts = [manifest.parts[name].first for name in self._names]
+
+    def of(self, row: int) -> Iterator[tuple[str, Part]]:
+        """Yield the files in which a row may be, in the order to try them."""
+        place = bisect_right(self._firsts, row) - 1
+        if place >= 0:
+            name = self._names[place]
+            if row < self.manifest.parts[name].stop:
+                yield name, self.manifest.parts[name]
+        merge = self.manifest.merge
+        if merge is not None and merge.part.first <= row < merge.part.stop:
+            # The final name again: the file may be renamed between the first two attempts.
+            for name in (merge.name, hidden_name(merge.name), merge.name):
+                yield name, merge.part
+
+
+def _damage_text(folder: Location, damaged: dict[str, str]) -> str:
+    """Describe what is damaged and what to do."""
+    first, what = next(iter(damaged.items()))
+    more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
+    return (
+        f"{folder} is damaged ({first}: {what}{more}). `sweep status {folder} --verify` lists the damaged parts, "
+        f"and running again with --resume recomputes them"
+    )

@@ -8,10 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.locations import LocationError, RemotePath, location_of
+from boulder_sweep.locations import LocationError, location_of
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import Session
-from boulder_sweep.store.object_lock import is_held
 from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.verify import load_checked
 
@@ -99,7 +98,7 @@ def status(out: str | Path, *, verify: bool = False) -> RunStatus:
         The manifest cannot be trusted.
     """
     folder = location_of(out)
-    running = is_held(folder) if isinstance(folder, RemotePath) else is_locked(folder)
+    running = is_locked(folder)
     manifest, damaged = load_checked(folder, read_parts=verify)
     there = sorted((part.first, part.stop) for part in manifest.parts.values())
     gaps = pairwise([0, *(edge for rows in there for edge in rows), manifest.rows])

@@ -13,16 +13,24 @@ import threading
 import uuid
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from stat import S_ISREG
-from typing import Any, Protocol
+from typing import IO, Any
 
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import check_writable, flush_folder, hidden_name, is_file, opened_folder, put_file
-from boulder_sweep.store.generations import MANIFEST_NAME, Encode, Generations, OtherWriterError
-from boulder_sweep.store.lock import FolderLock
-from boulder_sweep.store.object_lock import ObjectLock, refuses_existing
+from boulder_sweep.store.files import (
+    MANIFEST_NAME,
+    check_writable,
+    flush_folder,
+    hidden_name,
+    is_file,
+    opened_folder,
+    put_file,
+)
+from boulder_sweep.store.generations import Encode, Generations, OtherWriterError, newest, refuses_existing
+from boulder_sweep.store.lock import FolderLock, ObjectLock
 from boulder_sweep.text import why
 
 _PROBE_BYTES = 1 << 16
@@ -31,67 +39,24 @@ _REQUESTS = 16
 """Requests to a store at the same time."""
 
 
-class Lock(Protocol):
-    """The right to write into a folder."""
+class _Storage:
+    """What folders on a disk and on an object store have in common."""
 
-    def check(self) -> None:
-        """Raise StoreError if another run may have it by now, or if the folder is gone."""
+    _lock: FolderLock | ObjectLock | None = None
 
-    def renew(self) -> None:
-        """Show that the run is alive; cheap, call it often."""
-
-    def release(self) -> None:
-        """Give the right back; may be called twice."""
+    def _check_lock(self) -> None:
+        """Refuse to change what may belong to another run by now."""
+        if self._lock is not None:
+            self._lock.check()
 
 
-class Storage(Protocol):
-    """What a run does to its output folder."""
-
-    def make(self) -> bool:
-        """Create the folder if it does not exist; True if it was created."""
-
-    def unmake(self) -> None:
-        """Remove the folder if it is empty and can be removed."""
-
-    def lock(self, last_host: str | None, holder: str) -> Lock:
-        """Become the only writer."""
-
-    def check_writable(self) -> None:
-        """Raise OSError if the folder cannot be written."""
-
-    def names(self) -> list[str]:
-        """Return the names in the folder."""
-
-    def is_folder(self, name: str) -> bool:
-        """Whether one of the names is that of a folder."""
-
-    def put(self, name: str, content: memoryview | bytes) -> None:
-        """Write a file whole or not at all, durably."""
-
-    def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
-        """Give staged files, by their temporary names, their final names, durably."""
-
-    def remove(self, names: Iterable[str]) -> None:
-        """Remove files that may exist, durably."""
-
-    def put_manifest(self, encode: Encode) -> None:
-        """Replace the manifest in one step."""
-
-    def discard_manifest(self) -> None:
-        """Remove the manifest."""
-
-
-def storage_of(place: Location) -> Storage:
-    """Return how a run writes into a folder."""
-    return DiskStorage(place) if isinstance(place, Path) else ObjectStorage(place)
-
-
-class DiskStorage:
+class DiskStorage(_Storage):
     """A folder on a disk, local or shared."""
+
+    checks_content = False
 
     def __init__(self, path: Path):
         self._path = path
-        self._lock: FolderLock | None = None
 
     def make(self) -> bool:
         """Create the folder if it does not exist; True if it was created."""
@@ -152,6 +117,11 @@ class DiskStorage:
         if names:
             flush_folder(self._path)
 
+    def open_manifest(self) -> IO[bytes]:
+        """Open the manifest; raises OSError."""
+        # A pipe of this name must not be waited for.
+        return open(self._path / MANIFEST_NAME, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
+
     def put_manifest(self, encode: Encode) -> None:
         """Replace the manifest in one step."""
         self._check_lock()
@@ -162,20 +132,17 @@ class DiskStorage:
         self._check_lock()
         (self._path / MANIFEST_NAME).unlink()
 
-    def _check_lock(self) -> None:
-        """Refuse to change what may belong to another run by now."""
-        if self._lock is not None:
-            self._lock.check()
 
-
-class ObjectStorage:
+class ObjectStorage(_Storage):
     """A folder on an object store, or on any other file system of fsspec."""
+
+    checks_content = True
+    """Whether it sees to it itself that a file holds what was written, so that comparing its size is enough."""
 
     def __init__(self, path: RemotePath):
         self._path = path
         self._token = uuid.uuid4().hex
         self._generations: Generations | None = None
-        self._lock: ObjectLock | None = None
 
     def make(self) -> bool:
         """Create nothing, for folders exist by their files only; True if there are none."""
@@ -224,16 +191,31 @@ class ObjectStorage:
 
     def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Copy staged files to their final names and remove the staged ones."""
-        if self._lock is not None:
-            self._lock.check()
+        self._check_lock()
         for_size = sizes or {}
         self._each(lambda name: self._publish(name, names[name], for_size.get(name)), names)
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, unless they are another run's by now."""
-        if self._lock is not None:
-            self._lock.check()
+        self._check_lock()
         self._each(lambda name: (self._path / name).unlink(missing_ok=True), names)
+
+    def open_manifest(self) -> IO[bytes]:
+        """Open the newest version of the manifest.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is none.
+        StoreError
+            The store does not answer, which says nothing about the manifest.
+        """
+        try:
+            return BytesIO(newest(self._path).content)
+        except FileNotFoundError:
+            raise
+        except OSError as problem:
+            raise errors.StoreError(f"{self._path} cannot be read: {problem.strerror}") from None
 
     def put_manifest(self, encode: Encode) -> None:
         """Write the next version of the manifest."""
@@ -282,3 +264,14 @@ class ObjectStorage:
         for problem in [done.get() for _ in range(count)]:
             if problem is not None:
                 raise problem
+
+
+Lock = FolderLock | ObjectLock
+"""The right to write into a folder."""
+Storage = DiskStorage | ObjectStorage
+"""What a run does to its output folder, and where the manifest is read. Both have the same methods."""
+
+
+def storage_of(place: Location) -> Storage:
+    """Return how a run writes into a folder."""
+    return DiskStorage(place) if isinstance(place, Path) else ObjectStorage(place)

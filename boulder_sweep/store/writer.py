@@ -154,10 +154,10 @@ class OutputFolder:
                 with suppress(OSError, errors.StoreError):
                     self._storage.remove(temporary)
                 return
-            # An object store checks its content itself, and lets nobody see half of it: sizes are enough there.
+            # An object store lets nobody see half of a file, and checks what it holds: sizes are enough there.
             parts = {name: one.part for name, one in temporary.items()}
-            on_disk = isinstance(self.path, Path)
-            for name, wrong in damaged_parts(self.path, parts if on_disk else {}, read_parts=True).items():
+            unchecked = {} if self._storage.checks_content else parts
+            for name, wrong in damaged_parts(self.path, unchecked, read_parts=True).items():
                 self.check()
                 raise errors.DamagedError(
                     f"{self.path / name} is not what a worker wrote there ({wrong}). "

@@ -25,8 +25,7 @@ from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of
 from boulder_sweep.judge.pilot import sampled_designs
 from boulder_sweep.judge.quantiles import at_values
-from boulder_sweep.runner.backends import THREADING
-from boulder_sweep.runner.pool import pool
+from boulder_sweep.runner.pool import THREADING, pool
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.store.files import replacing
 from boulder_sweep.tradeoff.points import Method, Point, mark_front

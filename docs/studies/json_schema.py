@@ -10,6 +10,7 @@ from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS
 from boulder_sweep.settings.distribution_reader import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
+from boulder_sweep.settings.heading import SECTION, Heading
 from boulder_sweep.settings.leaf import MAX_AXIS
 from boulder_sweep.settings.model import (
     ACCURACIES,
@@ -42,6 +43,12 @@ def schema() -> Schema:
         "properties": {
             "name": {"type": "string", "pattern": f"^({NAME.pattern})$", "description": "name of the sweep"},
             **{section: _block(section, words) for section, words in SECTIONS.items()},
+            SECTION: {
+                "type": "object",
+                "description": "heading of a report",
+                "additionalProperties": False,
+                "properties": {key: {"type": ["string", "number"]} for key in Heading._fields},
+            },
             "table": {"type": "string", "pattern": r"\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT]|[xX][lL][sS][xX])$"},
         },
         **_what_is_required(),

@@ -112,6 +112,12 @@ class Forces(NamedTuple):
 
 
 @kernel
+def bearing_capacity_factor(phi: float) -> float:
+    """Bearing capacity factor N_q of a friction angle [rad], by Prandtl and Reissner (Eq 133)."""
+    return math.exp(math.pi * math.tan(phi)) * passive_pressure_coefficient(phi)
+
+
+@kernel
 def heave_constants(design: Design, c: Constants, form: Form, base: Base) -> HeaveConstants:
     """Constants of the motion with heave and friction (Eqs 131-134).
 
@@ -131,7 +137,7 @@ def heave_constants(design: Design, c: Constants, form: Form, base: Base) -> Hea
     a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
     own = m_b / 12.0 * (design.H * design.H + design.L * design.L)
     strip = design.W * design.L / PIECES
-    capacity = math.exp(math.pi * math.tan(design.phi)) * passive_pressure_coefficient(design.phi)
+    capacity = bearing_capacity_factor(design.phi)
     friction = math.tan(2.0 / 3.0 * design.phi) if form.friction else 0.0
     at_rest = 1.0 - math.sin(design.phi)
     area = design.L * design.d / (SIDE_ROWS * SIDE_COLUMNS)

@@ -2,7 +2,8 @@
 
 Nothing jumps in this motion, but forces bend where the truck comes off, where a strip of the foot touches or leaves and
 where a slip turns. So the step follows the embedded error of Dormand and Prince's method; where the truck comes off or
-touches again, and where the rotation reaches its limit, the step is cut at that instant.
+touches again, where the rotation reaches its limit, and where a strip that is being pressed in comes back, the step is
+cut at that instant.
 
 Once the truck no longer drives forward, the energy of boulder, soil, base and crush can only fall. If it is below the
 least potential energy at the limit of rotation, forward and back, the boulder never gets there, and the motion ends.
@@ -21,6 +22,7 @@ from .dormand_prince import AA, ERROR, STAGES, A, C
 from .dynamics import contact_displacement, spring_compression
 from .flat import field, put
 from .heave import (
+    FOOT,
     PIECES,
     ROOM,
     SETS,
@@ -50,6 +52,8 @@ WORKSPACE = RATES + STAGES * AXES
 """Numbers in the workspace of one impact."""
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 2e-4, 8e-3, 1e-9
 """Lengths of steps [s]."""
+LEAST_SINKING = 1e-9
+"""Velocity below which a strip has come to rest, so that no step is cut twice where one turns back [m/s]."""
 MOST_ATTEMPTS = 50_000
 CAUTION = 0.01
 """Share of the least energy by which the energy must be below it: the errors of integrator and search, and more."""
@@ -201,6 +205,41 @@ def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
 
 
 @kernel
+def foot_rises(work: np.ndarray, q: Tracks, tau_end: float, h: float, f: HeaveConstants) -> float:
+    """Fraction of a step at which the first strip that is pressed in comes back; tau_end if none does.
+
+    What is pressed in is kept at the end of a step (`press_in`), so no step may go on from where a strip is deepest.
+    """
+    tau, capacity = tau_end, f.q_strip / f.k_strip
+    sin, versin = sine_versine(displacement_at(q.theta_b, 0.0))
+    y = displacement_at(q.y_b, 0.0)
+    for j in range(PIECES):
+        sinking, at_end = sinking_in(work, j, q, 0.0, f), sinking_in(work, j, q, tau, f)
+        # A strip that slows down gets no deeper than it would at the speed that it has.
+        reach = strip_depth(work, j, y, sin, versin, f) + sinking * tau
+        if sinking > LEAST_SINKING * h and at_end < 0.0 and reach > capacity:
+            b, at = Bracket(0.0, sinking, tau, at_end, 0.0), tau
+            for _ in range(ITERATIONS):
+                at = next_guess(b)
+                there = sinking_in(work, j, q, at, f)
+                if abs(there) < 0.1 * LEAST_SINKING * h or b.high - b.low < 1e-12:
+                    break
+                b = narrowed(b, at, there)
+            sin_at, versin_at = sine_versine(displacement_at(q.theta_b, at))
+            if strip_depth(work, j, displacement_at(q.y_b, at), sin_at, versin_at, f) > capacity:
+                tau = at
+    return tau
+
+
+@inlined
+def sinking_in(work: np.ndarray, j: int, q: Tracks, tau: float, f: HeaveConstants) -> float:
+    """Velocity at which strip j of the foot sinks at the fraction tau of a step, times its length [m]."""
+    sin, versin = sine_versine(displacement_at(q.theta_b, tau))
+    lever = field(work, FOOT, j) * (1.0 - versin) - f.c.c_y * sin
+    return lever * slope_at(q.theta_b, tau) - slope_at(q.y_b, tau)
+
+
+@kernel
 def keep(work: np.ndarray, q: Tracks, tau: float, h: float) -> None:
     """Go on from the fraction tau of the step that was tried last."""
     for axis in range(AXES):
@@ -317,6 +356,9 @@ def simulate_heave(
         tau, changes = 1.0, False
         if u_end < 0.0 < u if touching else u_end > 0.0 >= u:
             tau, changes = contact_change(q, u, u_end, h, c), True
+        if f.heave > 0.0:
+            deepest = foot_rises(work, q, tau, h, f)
+            tau, changes = deepest, changes and deepest == tau
         turned = turning_point(q.theta_b, tau)
         theta = abs(displacement_at(q.theta_b, turned))
         theta_end = abs(displacement_at(q.theta_b, tau))
@@ -351,7 +393,8 @@ def simulate_heave(
         else:
             u = u_end
         if tau < 1.0:
-            write_rate(work, START, 0, touching, f)
+            cut = write_rate(work, START, 0, touching, f)
+            u = u if changes else cut
         else:
             for axis in range(AXES):
                 put(work, RATES, axis, field(work, RATES + AXES * (STAGES - 1), axis))

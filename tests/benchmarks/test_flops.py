@@ -65,8 +65,8 @@ def test_machine_code_does_what_the_formulas_say() -> None:
     evaluation, step = operations_of_step()
     executed = operations_in_machine_code(assembly_of(lanes.attempt_steps, np.zeros(SIZE)))
     assert executed.divide == step.divide
-    # The minimum in the arm of the error is a comparison and a choice.
-    assert executed.least_or_most == EVALUATIONS_PER_STEP * evaluation.least_or_most
+    # The minimum in the arm of the error is one instruction, or a comparison and a choice, as the processor has it.
+    assert executed.least_or_most in (step.least_or_most, EVALUATIONS_PER_STEP * evaluation.least_or_most)
     assert 0.9 * step.flops <= executed.flops <= step.flops
 
 

@@ -1,10 +1,14 @@
 """`sweep report` and `sweep explore` from the command line: what they write, what they open, what they refuse."""
 
 import json
+import re
+import shutil
 import webbrowser
 from pathlib import Path
 
 import pytest
+
+import boulder_sweep
 
 
 @pytest.fixture
@@ -38,7 +42,7 @@ def test_a_page_under_any_other_ending_is_refused(sweep, possible_grid, opened, 
     text = possible_grid.read_bytes()
     monkeypatch.setattr("boulder_sweep.report.writing.read_rows", None)  # refused before anything is read
     for name in ("grid.yaml", "small-grid.sweep", "page", "page.html.txt"):
-        refused = (2, "", f"error: {name}: the name of a page must end in .html or .htm\n")
+        refused = (2, "", f"error: {name}: the name of a page must end in .html, .htm or .pdf\n")
         assert sweep("report", "small-grid.sweep", "-o", name) == refused
         assert sweep("explore", "grid.yaml", "--design", 3, "-o", name) == refused
     assert possible_grid.read_bytes() == text
@@ -164,3 +168,62 @@ def test_results_with_nothing_in_common_are_not_compared(sweep, possible_grid):
     code, out, err = sweep("compare", "a.sweep", "b.sweep")
     assert (code, out) == (2, "")
     assert err.startswith("error: a.sweep and b.sweep have no design in common: boulder height has 3 values")
+
+
+@pytest.fixture
+def headed(possible_grid):
+    """Return the grid with a heading in the file."""
+    block = "report: {project: Main Street, client: City, date: 2026-11-25}\n"
+    possible_grid.write_text(possible_grid.read_text() + block)
+    return possible_grid
+
+
+def heading_of(file):
+    found = re.search(r'<dl class="heading">(.*?)</dl>', Path(file).read_text())
+    return re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", found[1]) if found else []
+
+
+def test_the_heading_is_that_of_the_file_unless_an_option_says_otherwise(sweep, headed):
+    assert sweep("run", headed, "-q")[0] == 0
+    assert sweep("report", "small-grid.sweep")[0] == 0
+    assert heading_of("small-grid.html") == [("project", "Main Street"), ("client", "City"), ("date", "2026-11-25")]
+    assert sweep("report", "small-grid.sweep", "--client", "A & B", "--author", "C. Day")[0] == 0
+    assert heading_of("small-grid.html") == [
+        *(("project", "Main Street"), ("client", "A &amp; B"), ("author", "C. Day"), ("date", "2026-11-25")),
+    ]
+    code, _, err = sweep("report", "small-grid.sweep", "--date", "")
+    assert code == 2
+    assert "--date is empty; write one line of text, or leave it out" in err
+
+
+def test_another_client_neither_refuses_a_resume_nor_changes_a_row(sweep, headed):
+    assert sweep("run", headed, "-q")[0] == 0
+    before = boulder_sweep.read("small-grid.sweep")
+    headed.write_text(headed.read_text().replace("City", "County"))
+    code, _, err = sweep("run", headed, "-q", "--resume")
+    assert code == 0, err
+    assert boulder_sweep.read("small-grid.sweep").equals(before)
+    assert sweep("report", "small-grid.sweep")[0] == 0
+    assert ("client", "County") in heading_of("small-grid.html")
+
+
+def test_without_a_browser_a_pdf_is_refused_with_what_to_do(sweep, possible_grid, monkeypatch, tmp_path):
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setenv("HOME", str(tmp_path / "empty"))
+    code, out, err = sweep("report", "small-grid.sweep", "-o", "page.pdf")
+    assert (code, out) == (2, "")
+    assert err == (
+        "error: a PDF is printed by Chromium, which was not found: install Chromium or Chrome, or write the page as "
+        ".html and print it from a browser\n"
+    )
+    assert not Path("page.pdf").exists()
+
+
+def test_a_browser_that_prints_nothing_is_an_error(sweep, possible_grid, monkeypatch, tmp_path):
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    monkeypatch.setattr("boulder_sweep.report.printing.browser", lambda: shutil.which("true"))
+    code, _, err = sweep("report", "small-grid.sweep", "-o", "page.pdf")
+    assert code == 2
+    assert "did not print the page (it ended with code 0)" in err
+    assert not Path("page.pdf").exists()

@@ -36,9 +36,6 @@ def test_need_with_a_probability(sweep):
     code, out, _ = sweep("need", CONFIG, "--probability", "0.9", "-q")
     assert code == 0
     assert "P(pass)" in out.splitlines()[0]
-    code, _, err = sweep("need", CONFIG)
-    assert code == 2
-    assert "'sweep need --probability'" in err
 
 
 def test_an_object_in_us_units_is_refused(sweep):

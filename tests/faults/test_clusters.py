@@ -19,7 +19,7 @@ from distributed import Future, LocalCluster
 import boulder_sweep
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
-from boulder_sweep.runner import remote
+from boulder_sweep.runner import dispatch, remote
 from boulder_sweep.runner.computing import Computation, EncodedPart
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
@@ -78,7 +78,7 @@ def test_a_scheduler_without_workers_says_how_to_start_one(tmp_path, monkeypatch
 
 
 def test_losing_the_last_worker_ends_the_run_resumable(tmp_path, monkeypatch, bar):
-    monkeypatch.setattr(backend, "NO_WORKER_S", 2.0)  # none comes, however long it is
+    monkeypatch.setattr(dispatch, "NO_WORKER_S", 2.0)  # none comes, however long it is
     rows, out, told = 20_000, tmp_path / "out", []
     with Cluster(1, tmp_path) as cluster:
 
@@ -107,8 +107,8 @@ def test_losing_the_last_worker_ends_the_run_resumable(tmp_path, monkeypatch, ba
 def test_a_result_lost_with_its_worker_is_computed_again(tmp_path, monkeypatch):
     """The worker dies after finishing a task, before its result is fetched."""
     rows, how = 4000, {"rows_per_part": 500, "simulate": plausible}
-    receive, lost, asked = backend.ClusterWorkers._receive, [], Counter()
-    expect, looks = backend.ClusterWorkers._expect_lost, []
+    receive, lost, asked = dispatch.Dispatcher._received, [], Counter()
+    expect, looks = dispatch.Dispatcher._expect_lost, []
     with Cluster(1, tmp_path) as cluster:
 
         def receive_late(self, future):
@@ -128,8 +128,8 @@ def test_a_result_lost_with_its_worker_is_computed_again(tmp_path, monkeypatch):
             looks.append(len(self._lost))
             expect(self)
 
-        monkeypatch.setattr(backend.ClusterWorkers, "_receive", receive_late)
-        monkeypatch.setattr(backend.ClusterWorkers, "_expect_lost", expect_lost)
+        monkeypatch.setattr(dispatch.Dispatcher, "_received", receive_late)
+        monkeypatch.setattr(dispatch.Dispatcher, "_expect_lost", expect_lost)
         run(grid_of(rows), tmp_path / "out", backend="dask", scheduler=cluster.address, **how)
     assert lost == ["lost"]
     assert max(asked.values()) >= ASKED_AGAIN, "a lost result is asked for again"

@@ -31,7 +31,7 @@ def sweep_of(boulder: str) -> Sweep:
 
 def rows_of(boulder: str) -> list[dict]:
     sweep = sweep_of(boulder)
-    judged = evaluation_of(sweep, accuracy_of(sweep)).with_all_opinions()(sweep.block(0, sweep.n_designs))
+    judged = evaluation_of(sweep, accuracy_of(sweep)).asked()(sweep.block(0, sweep.n_designs))
     return [judged.row(place) for place in range(len(judged))]
 
 

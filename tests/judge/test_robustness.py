@@ -133,6 +133,41 @@ def test_another_law_of_the_file_keeps_its_second_opinions() -> None:
     assert np.array_equal(ours["stands_under"][both], theirs["stands_under"][both])
 
 
+def test_a_boulder_that_the_ground_cannot_carry_is_told_in_words_of_its_own() -> None:
+    """Where no second opinion begins from rest, and not where one overturns the pass."""
+    row = {
+        "robustness": "sensitive",
+        "boulder_density_kg_m3": 2600.0,
+        "boulder_height_m": 3.0,
+        "soil_density_kg_m3": 1600.0,
+        "embedment_depth_m": 0.5,
+        "friction_angle_deg": 25.0,
+    }
+    for depth, words in ((0.45, robustness.GIVES_WAY), (0.46, robustness.SENSITIVE_IN_WORDS)):  # N_q = 10.66
+        assert robustness.meaning_of(row | {"embedment_depth_m": depth}) == words
+        table = plain_designs(rho_b=2600.0, H=3.0, d=depth, e=0.95, rho_s=1600.0, phi=math.radians(25.0)).table
+        status = second_opinions(table, HeaveControl(LIMITS.rotation, 1e-3)).status[0]
+        assert (status == Status.INVALID) == (words == robustness.GIVES_WAY)
+    assert robustness.meaning_of(row | {"robustness": "robust"}) == robustness.IN_WORDS
+    assert robustness.meaning_of(row | {"robustness": None}) is None
+
+
+def test_a_margin_is_asked_of_second_opinions_too() -> None:
+    """With it they have to stand below the reduced limit; the grade of an answer is that without it."""
+    sweep = grid()
+    evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
+    block = sweep.block(0, sweep.n_designs)
+    careful = replace(evaluation, least_margin=0.4)
+    reduced = careful(block)
+    passing = designs_of(block).rows(judged.verdict == PASS)
+    limits = evaluation.limits._replace(rotation=0.6 * evaluation.limits.rotation)
+    known = [robustness.stands(passing, law, "kp_squared", limits, evaluation.longest_s) for law in SECOND_OPINIONS]
+    found = reduced["stands_under"][judged.verdict == PASS]
+    assert np.array_equal(found, known[0] + 2 * known[1])
+    assert not np.array_equal(found, judged["stands_under"][judged.verdict == PASS])
+    assert np.array_equal(careful.graded(reduced, block)["stands_under"], judged["stands_under"])
+
+
 def test_a_penetration_beyond_the_rating_overturns_a_pass() -> None:
     sweep = grid()
     evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
 from boulder_kernels import Status
+from boulder_kernels.dense_output import Track
 from boulder_kernels.design import G, constants_of
 from boulder_kernels.dynamics import contact_displacement, spring_compression
 from boulder_kernels.heave import PIECES, SETS, Base, Form, HeaveConstants, heave_constants, potential_energy, prepare
@@ -21,7 +22,9 @@ from boulder_kernels.second_opinion import (
     HeaveControl,
     HeaveOutcome,
     HeaveRecord,
+    Tracks,
     energy_at,
+    foot_rises,
     least_energy,
     no_heave_record,
     press_in,
@@ -193,6 +196,39 @@ def test_what_is_pressed_in_stays() -> None:
         assert firm.work[SETS : SETS + PIECES].max() == 0.0
         found += sets.max() > 1e-3
     assert found >= 3
+
+
+@pytest.mark.compiled
+def test_what_is_pressed_in_does_not_depend_on_where_steps_end() -> None:
+    """By the default tolerance to 0.03 mm on average; twenty times as far off where no step ends at the deepest."""
+    gaps = []
+    for design in some_designs(24, seed=262):
+        exact, usual = (
+            simulate(design, RISE, HeaveControl(1.2, 0.3, tolerance, False)).work[SETS : SETS + PIECES]
+            for tolerance in (1e-11, HeaveControl(1.2, 0.3).tolerance)
+        )
+        if exact.max() > 1e-4:
+            gaps.append(np.abs(usual - exact).max())
+    assert len(gaps) >= 12
+    assert np.mean(gaps) < 3e-5
+    assert np.max(gaps) < 2e-4
+
+
+def test_a_step_ends_where_a_strip_that_is_pressed_in_comes_back() -> None:
+    """The step is cut at the greatest depth of the first strip, and what is pressed in is that of the interpolant."""
+    f = heave_constants(RWG, constants_of(RWG, bk.corrected(), 0), BOTH, BASE)
+    work, h = np.zeros(WORKSPACE), 4e-3
+    prepare(work, f)
+    still = Track(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    capacity = f.q_strip / f.k_strip
+    for beyond, end in ((0.004, 0.4), (-0.004, 1.0)):
+        # It sinks to its greatest depth at 0.4 of the step.
+        start = f.s_0 - capacity - beyond
+        sinking = Track(start, -0.8 * 1e-3, 1e-3, 0.0, 0.0, 0.0)
+        q = Tracks(still, still, sinking, still)
+        assert foot_rises(work, q, 1.0, h, f) == pytest.approx(end, abs=1e-6)
+        assert foot_rises(work, q, 0.3, h, f) == 0.3
+    assert foot_rises(work, Tracks(still, still, Track(np.nan, np.nan, 0, 0, 0, 0), still), 1.0, h, f) == 1.0
 
 
 def test_pressing_in_by_hand() -> None:

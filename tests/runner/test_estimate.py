@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner import sweeper
-from boulder_sweep.runner.assembly import Admission
 from boulder_sweep.runner.estimate import (
     LARGEST_BLOCK,
     Estimate,
@@ -28,6 +27,7 @@ from boulder_sweep.runner.estimate import (
     take_sample,
 )
 from boulder_sweep.runner.sweeper import estimate, run
+from boulder_sweep.runner.threads import Admission
 from boulder_sweep.store.errors import DoesNotFitError
 from boulder_sweep.store.schema import encode, part_table
 from boulder_sweep.text import size_text

@@ -7,21 +7,14 @@ from collections.abc import Callable, Iterator
 import pytest
 from distributed import Future
 
-from boulder_sweep.errors import ClusterLostError
-from boulder_sweep.runner.pool import Pool, pool
+from boulder_sweep.runner.dispatch import Dispatcher, Outcome
+from boulder_sweep.runner.pool import Pool, call, pool
 
 
 @pytest.fixture(scope="module")
 def workers() -> Iterator[Pool]:
     with pool(1, "dask") as found:
         yield found
-
-
-def finished(workers: Pool, number: int) -> Future:
-    """Return a call that is finished; its result is not fetched yet."""
-    future = workers._cluster.client.submit(abs, -number, pure=False)
-    assert future.exception(timeout=600) is None  # hang guard
-    return future
 
 
 def told(workers: Pool, change: Callable[[], None]) -> None:
@@ -43,54 +36,44 @@ def test_a_result_that_does_not_come_is_asked_for_again(workers: Pool, monkeypat
             raise TimeoutError
         return result(self, None)
 
-    patient = Pool(1, workers._cluster)
     monkeypatch.setattr(Future, "result", comes_at_last)
-    assert patient._result(patient._cluster, finished(workers, 7)) == 7
+    assert list(workers([call(abs, -7)])) == [7]
     assert waited == [2.0, 4.0, 8.0]
-    assert patient._result(patient._cluster, finished(workers, 8)) == 8
-    assert waited[3:] == [8.0], "a slow connection is not found out again for every result"
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_a_result_that_is_nothing_is_asked_for_no_more_than_any(
+    workers: Pool, monkeypatch: pytest.MonkeyPatch, late: bool
+) -> None:
+    result, waited = Future.result, []
+
+    def comes(self: Future, timeout: float) -> int:
+        waited.append(timeout)
+        if late and len(waited) < 2:
+            raise TimeoutError
+        return result(self, None)
+
+    monkeypatch.setattr(Future, "result", comes)
+    assert list(workers([call(abs, 0)])) == [0]
+    assert waited == ([2.0, 4.0] if late else [2.0])
 
 
 def test_a_result_lost_with_its_worker_is_waited_for(workers: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
     """The loss is noticed before the result is fetched; another worker computes it anew."""
-    result, asked = Future.result, []
-    future = finished(workers, 7)
-    told(workers, future._state.lose)
-    assert future.status == "lost"
+    receive, expect, seen = Dispatcher._received, Dispatcher._expect_lost, []
 
-    def computed_meanwhile(self: Future, timeout: float) -> int:
-        asked.append((timeout, self.status))
-        if len(asked) == 2:
-            told(workers, self._state.finish)
-        return result(self, timeout)
+    def receive_late(self: Dispatcher[int], future: Future) -> Outcome[int] | None:
+        if not seen:
+            told(workers, future._state.lose)
+        seen.append(future.status)
+        return receive(self, future)
 
-    patient = Pool(1, workers._cluster)
-    patient._fetch_s = 0.05
-    monkeypatch.setattr(Future, "result", computed_meanwhile)
-    assert patient._result(patient._cluster, future) == 7
-    assert asked[:2] == [(0.05, "lost"), (0.05, "lost")], "waiting for a call is no sign of a slow connection"
+    def expect_when_computed_again(self: Dispatcher[int]) -> None:
+        for future in self._lost:
+            told(workers, future._state.finish)
+        expect(self)
 
-
-def test_a_result_that_nobody_is_left_to_compute_anew_ends_the_waiting() -> None:
-    looked = []
-
-    class Lost:
-        status = "lost"
-
-        def done(self) -> bool:
-            return False
-
-        def result(self, timeout: float) -> None:
-            looked.append(timeout)
-            raise TimeoutError
-
-    class Deserted:
-        def threads(self) -> dict[str, int]:
-            return {}
-
-        def lost_text(self) -> str:
-            return "the connection was lost"
-
-    with pytest.raises(ClusterLostError, match=r"the connection was lost: no worker is left"):
-        Pool(1)._result(Deserted(), Lost())
-    assert looked == [2.0] * 5, "a worker that starts again has ten seconds"
+    monkeypatch.setattr(Dispatcher, "_received", receive_late)
+    monkeypatch.setattr(Dispatcher, "_expect_lost", expect_when_computed_again)
+    assert list(workers([call(abs, -7)])) == [7]
+    assert seen == ["lost", "finished"]

@@ -9,7 +9,8 @@ import threading
 
 import pytest
 
-from boulder_sweep.errors import BackendError, QuestionError
+from boulder_sweep.errors import BackendError, ClusterLostError, QuestionError
+from boulder_sweep.runner import dispatch
 from boulder_sweep.runner.pool import Pool, pool
 from boulder_sweep.runner.sweeper import estimate
 from tests.runner.grids import grid_of
@@ -90,63 +91,37 @@ def test_a_number_of_threads_below_one_is_refused(jobs):
         estimate(grid_of(10), jobs=jobs)
 
 
-class Late:
-    """A call on a cluster whose result is there, but takes its time to be sent."""
-
-    def __init__(self):
-        self.status, self.asked = "finished", 0
-
-    def done(self):
-        return True
-
-    def result(self, timeout):
-        self.asked += 1
-        if self.asked < 3:
-            raise TimeoutError(f"timed out after {timeout} s")
-        return 7
+def run_out(_):
+    raise TimeoutError("no answer from the store")
 
 
-class Failed(Late):
-    """A call that ran out of time itself."""
-
-    def result(self, timeout):
-        self.status = "error"
-        raise TimeoutError("no answer from the store")
-
-
-class Workers:
-    """A cluster of one worker that never works."""
-
-    def threads(self):
-        return {"tcp://worker": 1}
-
-
-def test_a_result_that_comes_late_is_waited_for():
-    assert Pool(1)._result(Workers(), late := Late()) == 7
-    assert late.asked == 3
-    with pytest.raises(BackendError, match="TimeoutError: no answer from the store"):
-        Pool(1)._result(Workers(), Failed())
+def test_a_call_that_runs_out_of_time_itself_is_not_waited_for():
+    with pool(1, "dask") as workers, pytest.raises(BackendError, match="TimeoutError: no answer from the store"):
+        list(workers([(run_out, (1,), {})]))
 
 
 class Hanging:
-    """A cluster whose worker b hangs: it has calls, but no heartbeats and no results."""
+    """A cluster of workers of which some hang: they have calls, but no heartbeats and no results."""
 
-    status, silent, kind = "running", frozenset(), None
+    status, silent, kind, address = "running", frozenset(), None, "tcp://scheduler"
 
-    def __init__(self):
-        self.client, self.given, self.turn = self, [], itertools.cycle("ab")
-        self.beats = itertools.count()
+    def __init__(self, *names, hung=("b",)):
+        self.client, self.given, self.names, self.hung = self, [], list(names), hung
+        self.turn, self.looks, self.given_before = itertools.cycle(names), 0, None
 
     def submit(self, function, *arguments, workers=None, pure=True):
+        if workers and self.given_before is None:
+            self.given_before, self.looks_before = len(self.given), self.looks
         worker = workers[0] if workers else next(self.turn)
         self.given.append((worker, arguments[0]))
-        return self.kind(worker, function(*arguments))
+        return self.kind(worker, worker in self.hung, function(*arguments))
 
     def threads(self):
-        return {"a": 1, "b": 1}
+        return dict.fromkeys(self.names, 1)
 
     def last_seen(self):
-        return {"a": float(next(self.beats)), "b": -1.0}
+        self.looks += 1
+        return {name: -1.0 if name in self.hung else float(self.looks) for name in self.names}
 
     def tasks_of(self, workers):
         return {f"{worker} {value}" for worker, value in self.given if worker in workers}
@@ -156,20 +131,26 @@ class Hanging:
 
 
 class HangingCall:
-    """A call on a worker, done at once but on the one that hangs."""
+    """A call on a worker, done at once but on one that hangs."""
 
-    status = "pending"
-
-    def __init__(self, worker, value):
-        self.worker, self.value, self.key = worker, value, f"{worker} {value // 2}"
+    def __init__(self, worker, hung, value):
+        self.hung, self.value, self.key = hung, value, f"{worker} {value // 2}"
         self.released = threading.Event()
+        self.status = "finished" if self.done() else "pending"
+
+    def add_done_callback(self, tell):
+        if self.done():
+            tell(self)
+
+    def cancelled(self):
+        return self.released.is_set()
 
     def done(self):
-        return self.worker == "a"
+        return not self.hung
 
     def result(self, timeout):
         assert not self.released.is_set()
-        if self.worker == "b":
+        if self.hung:
             raise TimeoutError
         return self.value
 
@@ -184,22 +165,90 @@ class HeldResult(HangingCall):
         return True
 
     def result(self, timeout):
-        if self.worker == "b" and timeout > 0.01:
+        if self.hung and timeout > 0.01:
             self.released.wait(HANG_GUARD_S)
         return super().result(timeout)
 
 
-@pytest.mark.parametrize("kind", [HangingCall, HeldResult])
-def test_calls_of_a_worker_that_hangs_are_made_by_others(kind, monkeypatch):
+@pytest.fixture(params=[HangingCall, HeldResult])
+def cluster(request, monkeypatch):
+    """Return a function that makes a cluster, and a pool on it whose clock goes on by five seconds at every look."""
+    monkeypatch.setattr(dispatch, "FETCH_S", 0.01)
+    monkeypatch.setattr(Hanging, "kind", request.param)
+
+    def make(*names, **how):
+        cluster, clock = Hanging(*names, **how), itertools.count(step=5.0)
+        return cluster, Pool(1, cluster, lambda: next(clock))
+
+    return make
+
+
+def test_calls_of_a_worker_that_hangs_are_made_by_others(cluster):
     """Half a minute after its last heartbeat, all that it has, and nothing more is given to it."""
-    monkeypatch.setattr("boulder_sweep.runner.pool.FETCH_S", 0.01)
-    monkeypatch.setattr(Hanging, "kind", kind)
-    cluster, clock = Hanging(), itertools.count(step=5.0)
-    workers = Pool(1, cluster, lambda: next(clock))
-    workers._fetch_s = 0.01
+    cluster, workers = cluster("a", "b")
     assert list(workers((times, (value,), {}) for value in range(9))) == list(range(0, 18, 2))
-    by_b = [value for worker, value in cluster.given if worker == "b"]
-    assert by_b == [1, 3, 5]
-    assert [worker for worker, value in cluster.given[6:]] == ["a"] * (len(cluster.given) - 6)
-    assert sorted(value for worker, value in cluster.given if worker == "a") == list(range(9))
-    assert next(clock) <= 5.0 * 10, "found out by counting looks"
+    assert {(worker, value) for worker, value in cluster.given[:4]} == {("a", 0), ("b", 1), ("a", 2), ("b", 3)}
+    assert cluster.looks_before in (7, 8), "found out by counting looks"
+    assert {worker for worker, value in cluster.given[cluster.given_before :]} == {"a"}
+    assert {value for worker, value in cluster.given if worker == "a"} == set(range(9))
+    cluster.given.clear()
+    assert list(workers((times, (value,), {}) for value in range(9))) == list(range(0, 18, 2))
+    assert {worker for worker, value in cluster.given} == {"a"}, "the next calls need not find it out again"
+
+
+def test_where_every_worker_hangs_that_is_told(cluster):
+    _, workers = cluster("a", "b", hung=("a", "b"))
+    with pytest.raises(ClusterLostError, match="workers a, b are silent, and there is no other"):
+        list(workers((times, (value,), {}) for value in range(9)))
+
+
+def test_where_no_worker_is_left_that_is_told(cluster):
+    cluster, workers = cluster("a", hung=("a",))
+
+    def calls():
+        yield times, (1,), {}
+        cluster.names.clear()
+
+    with pytest.raises(ClusterLostError, match="scheduler at tcp://scheduler has no worker; start one with: dask wor"):
+        list(workers(calls()))
+
+
+def test_a_worker_that_leaves_when_all_is_done_is_not_missed(cluster):
+    cluster, workers = cluster("a", hung=())
+
+    def calls():
+        yield times, (1,), {}
+        cluster.names.clear()
+
+    assert list(workers(calls())) == [2]
+
+
+def test_calls_wait_for_a_worker_that_comes_later(cluster):
+    cluster, workers = cluster("a", hung=())
+    names, looks = cluster.names.copy(), itertools.count()
+    cluster.names.clear()
+    cluster.threads = lambda: dict.fromkeys(names, 1) if next(looks) > 1 else {}
+    assert list(workers((times, (value,), {}) for value in range(9))) == list(range(0, 18, 2))
+
+
+def test_a_mistake_in_making_calls_is_not_blamed_on_the_workers(cluster):
+    def calls():
+        yield times, (1,), {}
+        raise ZeroDivisionError("by chance")
+
+    with pytest.raises(ZeroDivisionError, match="by chance"):
+        list(cluster("a", hung=())[1](calls()))
+
+
+@pytest.mark.parametrize("status", ["running", "closed"])
+def test_a_result_that_cannot_be_fetched_is_told(cluster, monkeypatch, status):
+    def refuse(self, timeout):
+        cluster.status = status
+        raise ConnectionError("broken off")
+
+    monkeypatch.setattr(HangingCall, "result", refuse)
+    cluster, workers = cluster("a", hung=())
+    lost = {"closed": (ClusterLostError, "the scheduler was lost")}
+    error, words = lost.get(status, (BackendError, "cannot answer this: ConnectionError: broken off"))
+    with pytest.raises(error, match=words):
+        list(workers([(times, (1,), {})]))

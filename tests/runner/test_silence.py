@@ -8,11 +8,10 @@ import threading
 import pytest
 
 from boulder_sweep.errors import BackendError, ClusterLostError
-from boulder_sweep.runner.backends import FETCH_S
-from boulder_sweep.runner.cluster import ClusterWorkers
+from boulder_sweep.runner.cluster import answers
 from boulder_sweep.runner.computing import Computed, Ended, Note
-from boulder_sweep.runner.remote import Done, received
-from boulder_sweep.runner.silence import Silence, answers
+from boulder_sweep.runner.dispatch import FETCH_S, Silence, received
+from boulder_sweep.runner.remote import ClusterWorkers, Done
 from boulder_sweep.store.manifest import Manifest, Part, part_name
 from boulder_sweep.store.writer import StagedPart
 

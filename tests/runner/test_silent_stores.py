@@ -14,7 +14,8 @@ from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner import interruption
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import object_lock, status
+from boulder_sweep.store import generations, status
+from boulder_sweep.store import lock as locks
 from boulder_sweep.store.errors import WriteError
 from boulder_sweep.store.reader import read_table
 from boulder_sweep.store.writer import OutputFolder
@@ -81,8 +82,8 @@ def test_the_first_signal_ends_a_run_while_the_store_is_silent(silent, monkeypat
 def test_what_goes_on_after_a_signal_is_undone(silent, monkeypatch):
     """In a notebook the process goes on, and may not hold the folder for ever."""
     monkeypatch.setattr(interruption, "LAST_S", 0.2)  # no answer comes, however long it is
-    monkeypatch.setattr(object_lock, "HEARTBEAT_S", HANG_GUARD_S)  # hang guard
-    begin = object_lock.refuses_existing
+    monkeypatch.setattr(locks, "HEARTBEAT_S", HANG_GUARD_S)  # hang guard
+    begin = generations.refuses_existing
 
     def stop(folder, token):
         signal.raise_signal(signal.SIGINT)

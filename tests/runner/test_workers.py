@@ -13,12 +13,11 @@ import pytest
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.judged import Judged, not_computed
-from boulder_sweep.runner.assembly import Admission, Assembly
-from boulder_sweep.runner.backends import check_backend
 from boulder_sweep.runner.committer import COMMIT_SHARE, GAP_S, Committer
 from boulder_sweep.runner.computing import Computation, Computed, EncodedPart, Ended
 from boulder_sweep.runner.estimate import blocks
-from boulder_sweep.runner.threads import ThreadWorkers
+from boulder_sweep.runner.pool import check_backend
+from boulder_sweep.runner.threads import Assembly, ThreadWorkers
 from boulder_sweep.store.manifest import Manifest, Part, part_name
 from boulder_sweep.store.writer import StagedPart
 from tests.waiting import HANG_GUARD_S, wait_until
@@ -68,12 +67,10 @@ def good(block: Rows) -> Judged:
 
 def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, part=100, make_block=Rows):
     """Run workers to their end; margin, verdict and reason of every row in the order of the commits."""
-    folder, admission = Folder(rows, part), Admission(limit)
-    computation = Recorder(evaluate, make_block, {})
-    assembly = Assembly(folder.manifest.missing())
+    folder, computation = Folder(rows, part), Recorder(evaluate, make_block, {})
     ranges = blocks(folder.manifest.missing(), size)
-    workers = ThreadWorkers(jobs, computation, ranges, admission, assembly, folder)
-    committer = Committer(folder, computation, admission, workers.flush)
+    workers = ThreadWorkers(jobs, computation, ranges, limit, folder)
+    committer = Committer(folder, computation, workers.release, workers.flush)
     committer.start()
     workers.start()
     computed = 0
@@ -195,9 +192,8 @@ def test_stopped_workers_hand_out_no_more():
         return good(block)
 
     folder = Folder(10**9, 10**9)
-    assembly = Assembly(folder.manifest.missing())
     ranges = blocks(folder.manifest.missing(), 1)
-    workers = ThreadWorkers(2, Recorder(held, Rows, {}), ranges, Admission(10**9), assembly, folder)
+    workers = ThreadWorkers(2, Recorder(held, Rows, {}), ranges, 10**9, folder)
     workers.start()
     wait_until(lambda: len(begun) == 2, "both threads are at work")
     workers.stop()
@@ -213,9 +209,8 @@ def test_a_problem_in_writing_ends_the_run():
             raise OSError(28, "No space left on device")
 
     folder = Full(100, 50)
-    assembly = Assembly(folder.manifest.missing())
     ranges = blocks(folder.manifest.missing(), 10)
-    workers = ThreadWorkers(2, Recorder(good, Rows, {}), ranges, Admission(10**9), assembly, folder)
+    workers = ThreadWorkers(2, Recorder(good, Rows, {}), ranges, 10**9, folder)
     workers.start()
     while not isinstance(message := workers.messages.get(timeout=HANG_GUARD_S), Ended):  # hang guard
         pass
@@ -261,9 +256,7 @@ def test_a_large_manifest_is_written_seldom():
     rest_s = commit_s / COMMIT_SHARE
     folder.commit = lambda staged: (Folder.commit(folder, staged), commits.put(len(staged)))
     work_clock = itertools.count(step=commit_s).__next__  # it is read before and after a commit
-    writer = Committer(
-        folder, Recorder(good, Rows, {}), Admission(10**9), tuple, clock=lambda: now[0], work_clock=work_clock
-    )
+    writer = Committer(folder, Recorder(good, Rows, {}), clock=lambda: now[0], work_clock=work_clock)
 
     def put(*firsts):
         for first in firsts:
@@ -293,7 +286,7 @@ def test_parts_do_not_wait_for_ever_for_the_one_before_them(first_comes):
     """As where it is with a worker that hangs. What has come is committed, and the rest when it comes."""
     folder, commits, now = Folder(100, 10), queue.SimpleQueue(), [0.0]
     folder.commit = lambda staged: (Folder.commit(folder, staged), commits.put([one.part.first for one in staged]))
-    writer = Committer(folder, Recorder(good, Rows, {}), Admission(10**9), tuple, lambda: now[0], lambda: 0.0)
+    writer = Committer(folder, Recorder(good, Rows, {}), clock=lambda: now[0], work_clock=lambda: 0.0)
 
     def put(*firsts):
         for first in firsts:
@@ -327,7 +320,7 @@ def test_parts_do_not_wait_for_ever_for_the_one_before_them(first_comes):
 
 def test_parts_behind_a_gap_are_not_lost_where_a_run_is_stopped():
     folder = Folder(100, 10)
-    writer = Committer(folder, Recorder(good, Rows, {}), Admission(10**9), tuple, lambda: 0.0, lambda: 0.0)
+    writer = Committer(folder, Recorder(good, Rows, {}), clock=lambda: 0.0, work_clock=lambda: 0.0)
     for first in (0, 20, 30, 70):
         writer.put(folder.stage(first, b"", 10, {"pieces": []}))
     writer.stop()
@@ -340,9 +333,8 @@ def test_parts_behind_a_gap_are_not_lost_where_a_run_is_stopped():
 def test_threads_that_the_system_does_not_start_end_the_run(no_more_threads, started, jobs):
     no_more_threads(started)
     folder = Folder(1000, 100)
-    assembly = Assembly(folder.manifest.missing())
     ranges = blocks(folder.manifest.missing(), 32)
-    workers = ThreadWorkers(jobs, Recorder(good, Rows, {}), ranges, Admission(10**9), assembly, folder)
+    workers = ThreadWorkers(jobs, Recorder(good, Rows, {}), ranges, 10**9, folder)
     workers.start()
     message = workers.messages.get(timeout=HANG_GUARD_S)  # hang guard
     workers.join(HANG_GUARD_S)  # hang guard

@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from boulder_sweep import simulate
-from boulder_sweep.settings import SettingsError
-
 PHI = "friction_angle_deg"
 
 
@@ -114,15 +111,6 @@ def test_mistakes(problems_of, minimal, text, words):
     problems = problems_of(minimal, f"soil.friction_angle={text}")
     assert any(words in problem.message for problem in problems)
     assert {problem.key for problem in problems} == {"soil.friction_angle"}
-
-
-def test_one_outcome_per_design_needs_values(load_it, minimal):
-    sweep = load_it(minimal.replace("43.2", "{mean: 38 deg, sd: 3 deg}"))
-    with pytest.raises(
-        SettingsError,
-        match=r"grid.yaml:10:19: soil.friction_angle: .* 'sweep uncertainty' and 'sweep need --probability'",
-    ):
-        simulate(sweep)
 
 
 @pytest.mark.parametrize("text", ["43.2", "[36, 40]"])

@@ -14,10 +14,9 @@ import boulder_sweep
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store import files, status
 from boulder_sweep.store.errors import DamagedError, LinkError
-from boulder_sweep.store.files import hidden_name, put_file, replacing
+from boulder_sweep.store.files import check_target, hidden_name, put_file, replacing
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, part_name, staged_name
-from boulder_sweep.store.targets import check_target
 from tests.store.folders import ROWS, SIZE, finished_folder, open_folder, part_bytes
 
 TOKEN = "0123456789abcdef"
@@ -175,10 +174,11 @@ WRITES = re.compile(r"""O_TRUNC|O_CREAT|write_(text|bytes)\(|open\([^)]*["'][wax
 BY_ITSELF = {
     "store/files.py": "creates files",
     "store/lock.py": "opens a file that is there",
-    "cli/new.py": "only a new file",
+    "cli/settings_files.py": "only a new file",
     "cli/output.py": "nowhere",
     "cli/progress.py": "its own cache",
     "report/build.py": "for developers",
+    "report/printing.py": "a folder of its own for the browser",
 }
 
 

@@ -16,7 +16,8 @@ import pytest
 
 from boulder_sweep import locations
 from boulder_sweep.locations import RemotePath, location_of
-from boulder_sweep.store import object_lock, status
+from boulder_sweep.store import lock as locks
+from boulder_sweep.store import status
 from boulder_sweep.store.errors import (
     DamagedError,
     FolderInUseError,
@@ -48,7 +49,7 @@ def _quick(monkeypatch):
 @pytest.fixture
 def stopped_clock(monkeypatch):
     """A clock that stands still."""
-    monkeypatch.setattr(object_lock, "time", SimpleNamespace(time=lambda: NOW))
+    monkeypatch.setattr(locks, "time", SimpleNamespace(time=lambda: NOW))
 
 
 @pytest.fixture
@@ -154,7 +155,7 @@ def test_a_run_that_was_thought_dead_cannot_change_the_table(only_new, monkeypat
         out = location_of(OUT)
         asleep = folders.open_folder(out)
         folders.commit(asleep, 0)
-        monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)
+        monkeypatch.setattr(locks, "DEAD_AFTER_S", 0.0)
         other = folders.open_folder(out, resume=True)
         for first in FIRSTS[1:]:
             folders.commit(other, first)
@@ -170,7 +171,7 @@ def test_a_run_that_was_thought_dead_cannot_change_the_table(only_new, monkeypat
 def test_no_row_is_lost_or_double_whatever_fails(only_new, monkeypatch):
     """Puts that fail, whose answer is lost, or that arrive late; lists that are stale: many times each."""
     seeds, least = 12, 50
-    monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)  # a lock that arrives late is that of a dead run
+    monkeypatch.setattr(locks, "DEAD_AFTER_S", 0.0)  # a lock that arrives late is that of a dead run
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "SECRET-KEY")
     monkeypatch.setattr(locations, "_TRIES", 2)
     expected, counts, told = whole(), Counter(), ""
@@ -292,8 +293,8 @@ def test_a_refused_run_leaves_no_trace(out):
 
 
 def test_the_heartbeat_goes_on_until_the_lock_is_released_or_taken(out, monkeypatch):
-    monkeypatch.setattr(object_lock, "HEARTBEAT_S", 0.01)
-    monkeypatch.setattr(object_lock, "time", SimpleNamespace(time=itertools.count().__next__))
+    monkeypatch.setattr(locks, "HEARTBEAT_S", 0.01)
+    monkeypatch.setattr(locks, "time", SimpleNamespace(time=itertools.count().__next__))
     folder = folders.open_folder(out)
     first = json.loads((out / "_lock").read_bytes())["time"]
     wait_until(lambda: json.loads((out / "_lock").read_bytes())["time"] != first, "there is another heartbeat")

@@ -14,12 +14,12 @@ import pytest
 
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.locations import location_of
-from boulder_sweep.store import object_lock, read, status
+from boulder_sweep.store import lock as locks
+from boulder_sweep.store import read, status
 from boulder_sweep.store.errors import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
 from boulder_sweep.store.files import hidden_name
-from boulder_sweep.store.finished import FinishedRows
 from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, load, part_name, staged_name
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import FinishedRows, read_table
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.writer import stage
 from tests.runner.grids import same_bits
@@ -126,7 +126,7 @@ def test_a_lock_that_another_run_has_taken_keeps_parts_from_being_published(monk
         out = location_of("faulty://bucket/out")
         asleep = open_folder(out)
         staged = asleep.stage(0, *_content(0))
-        monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)
+        monkeypatch.setattr(locks, "DEAD_AFTER_S", 0.0)
         other = open_folder(out, resume=True)
         with pytest.raises(BoulderSweepError, match="taken over by another run"):
             asleep.commit([staged])
@@ -140,7 +140,7 @@ def test_a_run_does_not_lock_again_what_another_has_finished_meanwhile(monkeypat
         out = location_of("faulty://bucket/out")
         asleep = open_folder(out, identity=OTHER)
         staged = asleep.stage(0, *_content(0))
-        monkeypatch.setattr(object_lock, "DEAD_AFTER_S", 0.0)
+        monkeypatch.setattr(locks, "DEAD_AFTER_S", 0.0)
         other = open_folder(out, overwrite=True)
         commit(other, 0)
         other.close("finished")

@@ -6,7 +6,7 @@ import pytest
 
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.locations import location_of
-from boulder_sweep.store.targets import check_target
+from boulder_sweep.store.files import check_target
 from tests.store.folders import finished_folder
 
 

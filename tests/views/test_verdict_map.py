@@ -276,7 +276,7 @@ def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str]) -> N
         (["--at", "subgrade_reaction_MN_m3=nan"], "with a finite number in the column's unit"),
         (["--at", "subgrade_reaction_MN_m3=1e400"], "with a finite number in the column's unit"),
         (["--at", "subgrade_reaction_MN_m3=60", "--at", "subgrade_reaction_MN_m3 = 95"], "is given twice"),
-        (["--across", "weight"], "--across 'weight' is not an input; did you mean vehicle.mass?"),
+        (["--across", "weight"], "--across 'weight' is not an input; did you mean boulder.mass or vehicle.mass?"),
         (["--at", "subgrade=95"], "--at 'subgrade' is not an input; did you mean subgrade_reaction?"),
         (["--up", "boulder.mass"], "boulder_mass_kg is not an input column"),
         (["-o", "map.jpeg"], "must end in .png"),

@@ -306,7 +306,7 @@ class Page {
     byId("held").replaceChildren(
       ...names.map((name) => {
         const values = rows.values[name];
-        this.held[name] ??= Math.floor(values.length / 2);
+        this.held[name] ??= rows.held[name];
         const label = element("label", "");
         label.dataset.name = name;
         const words = element("span", "");

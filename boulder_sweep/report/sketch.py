@@ -1,0 +1,130 @@
+"""The recommended design on the first page: a section to scale with dimensions, and the soil as it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from boulder_sweep.settings.model import Ground
+
+LEFT, RIGHT = 4.6, 5.0
+"""How much is drawn before and behind the boulder [m]."""
+SKY, BELOW = 0.5, 0.5
+"""Room above what stands, and below the boulder [m]."""
+TEXT, LINE = 0.26, 0.34
+"""Height of letters, and distance of lines [m]."""
+CAB_M = 0.85
+"""How far the cab stands above the hood."""
+
+
+class Dimension(NamedTuple):
+    """A dimension line between two points [m], y upwards from the ground, with its name and value."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    name: str
+    value: float
+    at_x: float
+    at_y: float
+    anchor: str
+
+
+class Stratum(NamedTuple):
+    """A layer of the soil as drawn: its upper and lower boundary [m] below the ground and its constants."""
+
+    top: float
+    bottom: float
+    text_y: float
+    constants: tuple[tuple[str, float, str], ...]
+    """Name, value and unit of each."""
+
+
+class Sketch(NamedTuple):
+    """What the template draws; lengths in metres, y upwards from the ground, x from the struck face."""
+
+    length: float
+    height: float
+    depth: float
+    bumper: float
+    hood: float
+    roof: float
+    left: float
+    right: float
+    top: float
+    bottom: float
+    dimensions: tuple[Dimension, ...]
+    strata: tuple[Stratum, ...]
+    water: float | None
+
+
+def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketch:
+    """Return the section of a design.
+
+    Parameters
+    ----------
+    inputs
+        Its inputs by the columns of the table.
+    settings
+        Resolved settings of its sweep, which say how the soil lies.
+    """
+    length, height, depth = (inputs[name] for name in ("boulder_length_m", "boulder_height_m", "embedment_depth_m"))
+    bumper, hood = inputs["bumper_height_m"], inputs["hood_height_m"]
+    ground = Ground.of_dict(settings["model"].get("ground", {}))
+    above, roof = height - depth, hood + CAB_M
+    bottom = -depth - BELOW
+    beside = length + 0.35
+    dimensions = (
+        Dimension(beside, 0.0, beside, above, "above ground", above, beside + 0.12, above / 2, "start"),
+        Dimension(beside, -depth, beside, 0.0, "embedment", depth, beside + 0.12, -depth + 0.12, "start"),
+        Dimension(0.0, above + 0.2, length, above + 0.2, "length", length, 0.0, above + 0.3, "start"),
+        Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
+    )
+    tops = [0.0, *(layer.from_m for layer in ground.layers)]
+    own = [
+        (
+            inputs["friction_angle_deg"],
+            inputs["soil_density_kg_m3"],
+            inputs["subgrade_reaction_MN_m3"],
+            ground.cohesion_kPa,
+        ),
+        *(
+            (layer.friction_angle_deg, layer.density_kg_m3, layer.subgrade_reaction_MN_m3, layer.cohesion_kPa)
+            for layer in ground.layers
+        ),
+    ]
+    # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
+    known = [*tops, ground.water_table_m or 0.0]
+    bottom = min(bottom, -max(level for level in known if level <= 2 * height) - BELOW)
+    bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0)) * LINE * len(tops) - 0.3)
+    strata = []
+    written = 0.0
+    for place, (top, constants) in enumerate(zip(tops, own, strict=True)):
+        if -top <= bottom:
+            break
+        under = min(tops[place + 1] if place + 1 < len(tops) else -bottom, -bottom)
+        units = (("φ′", "deg"), ("ρ", "kg/m^3"), ("k", "MN/m^3"), ("c", "kPa"))
+        named = tuple(
+            (name, value, unit) for (name, unit), value in zip(units, constants, strict=True) if name != "c" or value
+        )
+        first = max(top, written) + LINE
+        written = first + (len(named) - 1) * LINE
+        strata.append(Stratum(top, under, -first, named))
+    bottom = min(bottom, -written - 0.2)
+    strata[-1] = strata[-1]._replace(bottom=-bottom)
+    return Sketch(
+        length=length,
+        height=height,
+        depth=depth,
+        bumper=bumper,
+        hood=hood,
+        roof=roof,
+        left=-LEFT,
+        right=length + RIGHT,
+        top=max(above + 0.6, roof) + SKY,
+        bottom=bottom,
+        dimensions=dimensions,
+        strata=tuple(strata),
+        water=ground.water_table_m,
+    )

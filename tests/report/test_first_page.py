@@ -1,0 +1,44 @@
+"""The first page of a report: heading, section to scale, the map of the recommended design, and the page as a PDF."""
+
+import numpy as np
+import pytest
+
+import boulder_sweep
+from boulder_sweep.report import write_report
+from boulder_sweep.settings.heading import Heading
+from tests.report.conftest import SITE, reported
+
+LAYER = "{from: 0.5 m, density: 1900 kg/m^3, friction_angle: 36 deg, subgrade_reaction: 40 MN/m^3}"
+
+
+def test_the_map_is_that_of_the_recommended_design_in_its_worst_soil(report, result, opened):
+    page = opened(report)
+    table = boulder_sweep.read(result)
+    table["embedment_ratio"] = table.embedment_depth_m / table.boulder_height_m
+    first = page.evaluate("page.data.chosen[0]")
+    assert first["title"] == "Lightest boulder that passes in every soil of the sweep"
+    values, held = page.evaluate("page.data.rows.values"), page.evaluate("page.held")
+    for name in values:
+        assert values[name][held[name]] == pytest.approx(table[name][first["number"]], rel=1e-12)
+    assert table.friction_angle_deg[first["number"]] == table.friction_angle_deg.min()
+    assert page.complaints == []
+
+
+def test_the_section_has_its_dimensions_layers_and_water_in_the_units_chosen(tmp_path, opened):
+    page = opened(reported(SITE, tmp_path, [f"soil.layers=[{LAYER}]", "soil.water_table=0.8 m"]))
+    words = " ".join(page.locator(".section svg text").all_text_contents())
+    for said in ("embedment 2.04", "above ground 1.36", "bumper 0.5", "length 1.65", "water table 0.8", "36", "40"):
+        assert said in words
+    sides = page.locator(".section .boulder").get_attribute("points").split()
+    corners = np.array([[float(number) for number in side.split(",")] for side in sides])
+    np.testing.assert_allclose(np.ptp(corners, axis=0), [1.65, 3.4])
+    assert page.locator(".section rect").count() == 2
+    page.select_option("#units", "us")
+    assert "length 5.41" in " ".join(page.locator(".section svg text").all_text_contents())
+
+
+@pytest.mark.nightly
+def test_the_page_is_printed_to_a_pdf(result, tmp_path, chromium):
+    file = write_report(result, tmp_path / "page.pdf", heading=Heading(client="City"))
+    assert file.read_bytes().startswith(b"%PDF")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["page.pdf"]
