@@ -27,15 +27,18 @@ from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 
 MOST_LAYERS = 100
 MOST_POINTS = 100
-_REACH = Bound(0.0, 20.0, "a length")
+_SIDE = Bound(0.0, 20.0, "a length")
+_REACH = Bound(
+    -20.0, 20.0, "a length; negative where a boulder that leans does not reach back over the middle of its foot"
+)
 PROFILE_FIELDS = {
-    key: Field("boulder.profile", key, key, "m", meaning, _REACH)
-    for key, meaning in (
-        ("height", "height over the foot"),
-        ("width", "width at that height"),
-        ("length", "length at that height"),
-        ("near", "in place of length: reach towards the vehicle from the middle of the foot"),
-        ("far", "in place of length: reach away from the vehicle"),
+    key: Field("boulder.profile", key, key, "m", meaning, bound)
+    for key, meaning, bound in (
+        ("height", "height over the foot", _SIDE),
+        ("width", "width at that height", _SIDE),
+        ("length", "length at that height", _SIDE),
+        ("near", "in place of length: reach towards the vehicle from the middle of the foot", _REACH),
+        ("far", "in place of length: reach away from the vehicle", _REACH),
     )
 }
 LAYER_FIELDS = {
@@ -176,6 +179,8 @@ def _read_point(node: Node) -> ProfilePoint:
     if mistakes:
         raise LeafError(mistakes)
     half = 0.5 * values.get("length", 0.0)
+    if values.get("near", half) + values.get("far", half) < 0.0:
+        raise _wrong(node, "near and far together are the length, which cannot be negative")
     return ProfilePoint(values["height"], values["width"], values.get("near", half), values.get("far", half))
 
 

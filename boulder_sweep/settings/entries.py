@@ -26,6 +26,8 @@ NAMED_SETS = ("soil", "vehicle")
 """Blocks that may be a list of named sets."""
 NAME = re.compile(r"\w[\w .+-]{0,79}")
 """Names of sweeps and of named sets."""
+SIDES = ("length", "width", "height")
+"""Keys of the boulder that a profile stands for."""
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table", "report")
@@ -74,11 +76,13 @@ class Entries:
             self._read_block(section)
         if "profile" in self.settings:
             self._take_sides(self.settings["profile"])
+        elif "boulder.profile" in self.given:  # its mistakes are reported, and its sides are not missing
+            self.given |= {f"boulder.{key}" for key in SIDES}
 
     def _take_sides(self, points: tuple[ProfilePoint, ...]) -> None:
         """Take the sides of the boulder from its profile, which must not be given beside it."""
         position = self.key_position("boulder", "profile")
-        for key in ("length", "width", "height", "taper"):
+        for key in (*SIDES, "taper"):
             if f"boulder.{key}" in self.given:
                 message = "is part of boulder.profile; remove one of them"
                 self.problems.add(self.key_position("boulder", key), f"boulder.{key}", message)
