@@ -174,7 +174,7 @@ def _read_point(node: Node) -> ProfilePoint:
         mistakes.append(Mistake(node.position, "give length, or near and far, not both"))
     wanted = ("height", "width", *(("near", "far") if given & {"near", "far"} else ("length",)))
     missing = [key for key in wanted if key not in given]
-    if missing:
+    if missing and not mistakes:
         mistakes.append(Mistake(node.position, f"the point lacks {', '.join(missing)}"))
     if mistakes:
         raise LeafError(mistakes)

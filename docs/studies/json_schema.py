@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS
+from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS, MOST_POINTS, PROFILE_FIELDS
 from boulder_sweep.settings.distribution_reader import NEEDED
-from boulder_sweep.settings.entries import NAME, NAMED_SETS
+from boulder_sweep.settings.entries import NAME, NAMED_SETS, SIDES
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
 from boulder_sweep.settings.heading import SECTION, Heading
 from boulder_sweep.settings.leaf import MAX_AXIS
@@ -198,6 +198,15 @@ _FORMS: dict[str, Schema] = {
             tuple(key for key in LAYER_FIELDS if key != "cohesion"),
         ),
     },
+    "profile": {
+        "type": "array",
+        "minItems": 2,
+        "maxItems": MOST_POINTS,
+        "items": {
+            **_object({key: _value(field) for key, field in PROFILE_FIELDS.items()}, ("height", "width")),
+            "oneOf": [{"required": ["length"]}, {"required": ["near", "far"]}],
+        },
+    },
     "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
     "second_opinion": {
         "anyOf": [
@@ -219,12 +228,15 @@ def _what_is_required() -> Schema:
     for field in INPUTS:
         if not field.optional:
             needed = sections.setdefault(field.section, {"required": []})["required"]
-            needed += [] if field.name == DENSITY else [field.key]
+            needed += [] if field.section == "boulder" else [field.key]
     for section in set(NAMED_SETS) & set(sections):
         sections[section]["items"] = {"required": sections[section]["required"]}
     embedment = [field for field in INPUTS if field.name in EMBEDMENT]
     sections[embedment[0].section] = {"oneOf": [{"required": [field.key]} for field in embedment]}
     density_or_mass = [BY_NAME[name].key for name in (DENSITY, BOULDER_MASS)]
-    sections[BY_NAME[DENSITY].section]["anyOf"] = [{"required": [key]} for key in density_or_mass]
+    sections["boulder"] = {
+        "anyOf": [{"required": [key]} for key in density_or_mass],
+        "oneOf": [{"required": ["profile"]}, {"required": list(SIDES)}],
+    }
     whole = {"required": list(sections), "properties": sections}
     return {"if": {"not": {"required": ["table"]}}, "then": whole}

@@ -18,6 +18,7 @@ FORMS = {
     "readings": "`corrected`, `as_printed`, or single switches ([readings](readings.md))",
     "soil_elements": "`closed_form`, or `{elements: 5000}` ([soil elements](convergence.md))",
     "layers": "a list of layers ([soils as they lie](soil.md#soils-as-they-lie))",
+    "profile": "a list of points ([boulders that are no boxes](stones.md))",
     "second_opinion": "`none`, or a list of `broms` and `width_capped` ([second opinion](second_opinion.md))",
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }

@@ -25,6 +25,7 @@ _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered"
 
 _PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
 _HEAVE, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "second_opinion"))
+_OUTLINE, _OUTLINED = (f"kernels/boulder_kernels/{name}.py" for name in ("outline", "outlined_soil"))
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return (1.0 + half) / (1.0 - half)", "return (1.0 - half) / (1.0 + half)"),
@@ -164,4 +165,33 @@ MUTATIONS = (
         "control.stop and field(work, START, 7) <= 9.0",
     ),
     Mutation((137,), _OPINION, "f) + (crush_energy(u, c) if touching else 0.0)", "f)"),
+    Mutation((141,), _OUTLINE, "m_b = design.rho_b * volume", "m_b = 1.01 * design.rho_b * volume"),
+    Mutation((141,), _OUTLINE, "area = slice_ * (near + far)", "area = slice_ * 2.0 * near"),
+    Mutation((142,), _OUTLINE, "0.5 * (far * far - near * near)", "0.5 * (far * far + near * near)"),
+    Mutation((142,), _OUTLINE, "z_c += area * z\n", "z_c += slice_ * z\n"),
+    Mutation((143,), _OUTLINE, "- m_b * (x * x + z_c * z_c)", "- m_b * z_c * z_c"),
+    Mutation(
+        (143,), _OUTLINE, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
+    ),
+    Mutation((144,), _OUTLINED, "lift + soil.lean[0] * c.d * sin if", "lift - soil.lean[0] * c.d * sin if"),
+    Mutation((144,), _OUTLINED, "c.C_cos - abs(soil.lean[0]) * c.d if", "c.C_cos if"),
+    Mutation((144,), _OUTLINED, "reaction.M - lean[0] * k.lever_d", "reaction.M + lean[0] * k.lever_d"),
+    Mutation(
+        (145,),
+        _OUTLINED,
+        "w_1 = -slope_of(outline, i, WIDTH) * d / design.W",
+        "w_1 = slope_of(outline, i, WIDTH) * d / design.W",
+    ),
+    Mutation((145,), _OUTLINED, "elements.ultimate[n] *= share", "elements.ultimate[n] *= 1.0"),
+    Mutation(
+        (146,),
+        _OUTLINED,
+        "roots_of(KS, K * A + piece.P_1, -piece.P_0, piece)",
+        "roots_of(KS, K * A - piece.P_1, -piece.P_0, piece)",
+    ),
+    Mutation((147,), _OUTLINED, "(piece.w_0 + piece.w_1 * r) * v * abs(v)", "piece.w_0 * v * abs(v)"),
+    Mutation(
+        (147,), _OUTLINED, "first += WEIGHTS[g] * length * pressed * r", "first += WEIGHTS[g] * length * pressed * low"
+    ),
+    Mutation((147,), _OUTLINED, "total - linear - P_2 * piece.w_0 * logarithm", "total - P_2 * piece.w_0 * logarithm"),
 )

@@ -10,6 +10,7 @@ from boulder_sweep.settings.tree import Mapping, Node, Scalar, parse
 from docs.studies.json_schema import FILE, schema, text
 
 ROOT = Path(__file__).parents[2]
+SIDES_OF_A_BOX = "length: 1.65\n  width: 1.68\n  height: 3.44"
 VALIDATOR = jsonschema.Draft202012Validator(schema())
 
 
@@ -58,6 +59,11 @@ def test_the_examples_of_the_tests_are_valid(example, minimal):
     ("old", "new"),
     [
         ("height: 3.44", "height: '[3, 3.5] m'"),
+        ("height: 3.44", "height: 3.44\n  taper: 0.8"),
+        (
+            SIDES_OF_A_BOX,
+            "profile: [{height: 0, width: 1.5, length: 1.5}, {height: 3.44, width: 1.7, near: 0.8, far: 0.7}]",
+        ),
         ("height: 3.44", "height: {from: 3 m, to: 4 m, step: 0.5 m}"),
         ("height: 3.44", "height: {from: 3, to: 4, count: 3}"),
         ("friction_angle: 43.2", "friction_angle: 0.75 rad"),
@@ -84,6 +90,13 @@ def test_what_the_program_takes_is_valid(load_it, minimal, old, new):
     [
         ("length: 1.65", "lenght: 1.65", "$.boulder"),
         ("height: 3.44", "height: -3.44", "$.boulder.height"),
+        ("height: 3.44", "height: 3.44\n  taper: wide", "$.boulder.taper"),
+        (
+            SIDES_OF_A_BOX,
+            "profile: [{height: 0, width: 1.5}, {height: 3.44, width: 1.7, length: 1}]",
+            "$.boulder.profile[0]",
+        ),
+        ("  height: 3.44\n", "", "$.boulder"),
         ("height: 3.44", "height: tall", "$.boulder.height"),
         ("height: 3.44", "height: 3,44 m", "$.boulder.height"),
         ("height: 3.44", "height: []", "$.boulder.height"),

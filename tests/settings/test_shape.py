@@ -1,0 +1,166 @@
+"""Boulders that are no boxes, as a file gives them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from boulder_sweep.settings import SettingsError, load_text
+from boulder_sweep.settings.shape import ProfilePoint, Shape, tapered
+
+SIDES = "  length: 1.65\n  width: 1.68\n  height: 3.44\n"
+POINTS = "[{height: 0 m, width: 1.2 m, length: 1.1 m}, {height: 40 in, width: 1.7 m, near: 0.9 m, far: 0.7 m}, {height: 3 m, width: 1.4 m, length: 1.2 m}]"  # noqa: E501
+
+
+def with_profile(minimal: str, points: str, more: str = "") -> str:
+    return minimal.replace(SIDES, f"  profile: {points}\n{more}")
+
+
+def test_a_profile_stands_for_the_sides_of_the_box_around_it(load_it, minimal):
+    sweep = load_it(with_profile(minimal, POINTS))
+    sides = [sweep.constants[f"boulder_{side}_m"] for side in ("length", "width", "height")]
+    assert sides == pytest.approx([0.9 + 0.7, 1.7, 3.0])
+    foot, middle, top = sweep.model.shape.points
+    assert (foot.height, top.height) == (0.0, 1.0)
+    assert (middle.height * 3.0, middle.width * 1.7) == pytest.approx((1.016, 1.7))
+    assert (middle.near * 1.6, middle.far * 1.6) == pytest.approx((0.9, 0.7))
+    assert (foot.near, foot.far) == pytest.approx((0.55 / 1.6, 0.55 / 1.6))
+
+
+def test_volume_and_centre_are_those_of_the_slices(load_it, minimal):
+    shape = load_it(with_profile(minimal, POINTS)).model.shape
+    heights = [point.height for point in shape.points]
+
+    def at(name: str, z: float) -> float:
+        return float(np.interp(z, heights, [getattr(point, name) for point in shape.points]))
+
+    def integral(of) -> float:
+        return sum(quad(of, low, high)[0] for low, high in pairwise(heights))
+
+    volume = integral(lambda z: at("width", z) * (at("near", z) + at("far", z)))
+    first = integral(lambda z: at("width", z) * (at("far", z) ** 2 - at("near", z) ** 2) / 2)
+    assert shape.filled == pytest.approx(volume, rel=1e-12)
+    assert shape.centre == pytest.approx(first / volume, rel=1e-10)
+
+
+@pytest.mark.parametrize("ratio", [0.5, 0.8, 1.25, 2.0])
+def test_a_taper_is_a_profile_of_two_points(ratio):
+    foot, top = tapered(ratio).points
+    assert top.width / foot.width == pytest.approx(ratio)
+    assert max(foot.width, top.width) == max(foot.near + foot.far, top.near + top.far) == 1.0
+    assert tapered(ratio).filled == pytest.approx((1 + ratio + ratio**2) / 3 / max(1, ratio) ** 2)
+
+
+def test_a_taper_goes_with_axes_of_the_sides(load_it, minimal):
+    sweep = load_it(minimal.replace("  height: 3.44\n", "  height: [3, 3.44]\n  taper: 0.8\n"))
+    assert sweep.n_designs == 2
+    assert sweep.model.shape == tapered(0.8)
+    assert sweep.resolved()["model"]["profile"] == tapered(0.8).as_list()
+
+
+def test_a_constant_profile_and_a_taper_of_one_are_boxes(load_it, minimal):
+    same = "[{height: 0, width: 1.68, length: 1.65}, {height: 2, width: 1.68, length: 1.65}, {height: 3.44, width: 1.68, length: 1.65}]"  # noqa: E501
+    sweep = load_it(with_profile(minimal, same))
+    box = load_it(minimal)
+    assert sweep.model.shape.is_box
+    assert sweep.constants == box.constants
+    assert "profile" not in sweep.resolved()["model"]
+    assert load_it(minimal.replace(SIDES, SIDES + "  taper: 1\n")).resolved() == box.resolved()
+
+
+def test_settings_are_read_back(load_it, minimal):
+    shape = load_it(with_profile(minimal, POINTS)).model.shape
+    assert Shape.of_list(shape.as_list()) == shape
+
+
+@pytest.mark.parametrize(
+    ("points", "flat"),
+    [
+        ("[{height: 0, width: 0.9, length: 1}, {height: 3, width: 1.7, length: 1}]", True),
+        ("[{height: 0, width: 0.8, length: 1}, {height: 3, width: 1.7, length: 1}]", False),
+        ("[{height: 0, width: 1, length: 0.6}, {height: 3, width: 1, length: 1.3}]", False),
+    ],
+)
+def test_a_small_foot_counts_as_rounded(load_it, minimal, points, flat):
+    sweep = load_it(with_profile(minimal, points))
+    assert sweep.model.stands_flat == flat
+    assert any("undecided (foot)" in note.message for note in sweep.notes) != flat
+
+
+def test_a_leaning_boulder_may_end_before_the_middle_of_its_foot(load_it, minimal):
+    leaning = "[{height: 0, width: 1, near: 0.8, far: 0.8}, {height: 3, width: 0.4, near: 0.6, far: -0.2}]"
+    assert load_it(with_profile(minimal, leaning)).model.shape.points[1].far < 0.0
+    assert Shape((ProfilePoint(0.0, 1.0, 0.5, 0.5), ProfilePoint(1.0, 0.5, 0.9, -0.4))).stands_up
+
+
+@pytest.mark.parametrize(
+    ("points", "where", "words"),
+    [
+        ("wide", "2:12", "must be a list of 2 to 100 points from the foot up"),
+        ("[{height: 0, width: 1, length: 1}]", "2:12", "must be a list of 2 to 100 points"),
+        (
+            "[1, {height: 2, width: 1, length: 1}]",
+            "2:13",
+            "a point must be a block of keys: height, width, length, near, far",
+        ),
+        (
+            "[{height: 0.1, width: 1, length: 1}, {height: 2, width: 1, length: 1}]",
+            "2:13",
+            "the first point is the foot",
+        ),
+        (
+            "[{height: 0, width: 1, length: 1}, {height: 2, width: 1, length: 1}, {height: 2, width: 1, length: 1}]",
+            "2:81",
+            "not above the point before it",
+        ),
+        ("[{height: 0, width: 1, length: 1}, {height: 2, width: 1}]", "2:47", "the point lacks length"),
+        ("[{height: 0, width: 1, length: 1}, {height: 2, width: 1, near: 1}]", "2:47", "the point lacks far"),
+        (
+            "[{height: 0, width: 1, length: 1, far: 1}, {height: 2, width: 1, length: 1}]",
+            "2:13",
+            "length, or near and far",
+        ),
+        ("[{height: 0, width: 1, length: 1}, {height: 2, width: 1, near: 1, far: -2}]", "2:47", "cannot be negative"),
+        ("[{height: 0, widht: 1, length: 1}, {height: 2, width: 1, length: 1}]", "2:25", "did you mean width?"),
+        ("[{height: 0, width: 1 kg, length: 1}, {height: 2, width: 1, length: 1}]", "2:32", "a length is needed"),
+        (
+            "[{height: 0, width: 0, length: 1}, {height: 2, width: 0, length: 1}]",
+            "2:12",
+            "has neither width nor length",
+        ),
+        (
+            "[{height: 0, width: 1, near: 1, far: 0}, {height: 2, width: 1, near: -1, far: 3}]",
+            "2:12",
+            "fall over by itself",
+        ),
+    ],
+)
+def test_mistakes_in_a_profile(minimal, points, where, words):
+    with pytest.raises(SettingsError) as caught:
+        load_text(with_profile(minimal, points), Path("grid.yaml"))
+    (problem,) = caught.value.problems
+    assert problem.key == "boulder.profile"
+    assert words in problem.message
+    assert f"{problem.line}:{problem.column}" == where
+
+
+@pytest.mark.parametrize(("more", "key"), [("  height: 3\n", "boulder.height"), ("  taper: 0.8\n", "boulder.taper")])
+def test_a_profile_beside_what_it_stands_for_is_refused(load_it, minimal, more, key):
+    with pytest.raises(SettingsError, match=rf"{key}: is part of boulder\.profile"):
+        load_it(with_profile(minimal, POINTS, more))
+
+
+def test_plastic_soil_knows_boxes_only(load_it, minimal):
+    with pytest.raises(SettingsError, match=r"boulder\.profile: plastic soil knows boxes only"):
+        load_it(with_profile(minimal, POINTS) + "model: {soil: {elements: 50}, unloading: plastic_with_gap}\n")
+
+
+def test_a_mass_beside_a_profile_is_compared_with_its_volume(load_it, minimal):
+    weighed = load_it(with_profile(minimal, POINTS, "  mass: 12 t\n"))
+    assert weighed.constants["boulder_mass_kg"] == 12000
+    with pytest.raises(SettingsError, match="solid rock of this profile"):
+        load_it(with_profile(minimal, POINTS, "  mass: 19 t\n"))
