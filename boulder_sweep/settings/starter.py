@@ -16,7 +16,7 @@ from boulder_sweep.text import printable
 def default_of(field: Field) -> float | str | None:
     """Return the default of an entry: a number in the unit of the field, a word, or None where there is none."""
     words = {"readings": Model().preset, "soil_elements": CLOSED_FORM, "correlation": 0.0, "partial_factor": 1.0}
-    words |= {"layers": None, "second_opinion": NO_OPINION}
+    words |= {"layers": None, "profile": None, "second_opinion": NO_OPINION}
     attributes = {**asdict(Criterion()), **asdict(Model()), **asdict(SolverSettings()), **words}
     return attributes.get(field.name, field.default)
 
