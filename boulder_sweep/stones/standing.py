@@ -1,0 +1,322 @@
+"""How a stone can stand: which way up, on which part of its surface, and with which face to the road.
+
+The axes a, b and c of a stone are the long, the middle and the short side of the smallest box around it, as for
+particles of sediment. The end a is the one farther from the centre of mass, the slimmer one; -a is the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_sweep.errors import ScanError
+from boulder_sweep.stones.fitting import Profile, fitted, sides_of
+from boulder_sweep.stones.sections import Sections, doubled_share, sections_of
+
+if TYPE_CHECKING:
+    from boulder_sweep.stones.solid import Solid
+
+OF_STONE, OF_SCAN = "abc", "xyz"
+DIRECTIONS = tuple(f"{sign}{axis}" for axes in (OF_STONE, OF_SCAN) for axis in axes for sign in ("", "-"))
+"""Ends of a stone by name: of its own axes, and of the axes of the scan."""
+TILT_DEG = 20.0
+"""How far a stone is tilted to stand on the flattest part near an end."""
+CANDIDATES = 8
+"""Parts of the surface near an end that are tried, the largest first."""
+RESTS_WITHIN = 0.02
+"""What is this near to the plane below the stone rests on it, as a share of the height."""
+SECTIONS = 128
+LEAST_FOOT = 0.5
+"""Least length and width of a foot as a share of those of the largest section: shorter ones count as rounded."""
+MOST_CUT = 0.25
+"""Largest part of the height that is cut off to get a foot."""
+CUT_STEP_M = 0.01
+MOST_DOUBLED = 0.01
+"""Largest share of the volume that a surface may enclose twice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A stone on its foot, with one face to the road.
+
+    Attributes
+    ----------
+    up, facing : str
+        Which end is up, and which faces the vehicle: names of `DIRECTIONS`.
+    axes : ndarray, shape (3, 3)
+        Direction of travel, across it to the left, and up, in the axes of the scan.
+    stands : bool
+        Whether the stone stands by itself before it is cut, its centre of mass over what it rests on.
+    cut_m : float
+        What is cut off at the foot [m].
+    cut_share : float
+        The same as a share of the volume.
+    rests : float
+        Section of the uncut stone just above what it lies on, as a share of its largest section.
+    profile : Profile
+        The stone above the cut.
+    centre : tuple of float
+        Centre of mass of the cut stone: beyond the middle of the foot of the profile, and above the cut [m].
+    moment : float
+        Its moment of inertia about the axis across the travel through the centre, for 1 kg/m^3 [m^5].
+    volume : float
+        Volume of the cut stone [m^3].
+    outline : ndarray, shape (m, 4)
+        Height above the foot, distance of the near and of the far face from the middle of the foot, and width of the
+        stone as it is [m].
+    """
+
+    up: str
+    facing: str
+    axes: np.ndarray
+    stands: bool
+    cut_m: float
+    cut_share: float
+    rests: float
+    profile: Profile
+    centre: tuple[float, float]
+    moment: float
+    volume: float
+    outline: np.ndarray
+
+    @property
+    def has_foot(self) -> bool:
+        """Whether its foot is long and wide enough to count as flat."""
+        return has_foot(self.profile)
+
+
+def has_foot(profile: Profile) -> bool:
+    """Return whether the foot of a profile is long and wide enough to count as flat."""
+    sides = (profile.length, profile.width)
+    return all(side[0] >= LEAST_FOOT * side.max() * (1.0 - 1e-9) for side in sides)
+
+
+class Stone:
+    """A stone that can be set up.
+
+    Parameters
+    ----------
+    solid
+        The stone.
+    file
+        Its scan, for messages.
+
+    Raises
+    ------
+    ScanError
+        Its surface crosses itself.
+    """
+
+    def __init__(self, solid: Solid, file: str) -> None:
+        self.solid = solid
+        self._sections: dict[str, tuple[Sections, bool, float, np.ndarray]] = {}
+        doubled = self._whole_doubled()
+        if doubled > MOST_DOUBLED:
+            raise ScanError(
+                f"{file}: the surface crosses itself: {doubled:.0%} of the stone lies inside it twice or inside out; "
+                "repair the scan first, for example in MeshLab"
+            )
+
+    @cached_property
+    def _box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Axes a, b and c as rows, and the sides of the box along them [m]."""
+        from trimesh.bounds import oriented_bounds
+
+        placing, extents = oriented_bounds(self._hull)
+        order = np.argsort(-np.round(extents, 9), kind="stable")
+        axes = np.asarray(placing)[:3, :3][order]
+        offset = np.asarray(placing)[:3, :3] @ self.solid.centre + np.asarray(placing)[:3, 3]
+        for k in range(2):
+            lean = -offset[order[k]]
+            if abs(lean) < 1e-6 * extents[order[k]]:
+                lean = axes[k][np.abs(axes[k]).argmax()]
+            axes[k] *= np.sign(lean) or 1.0
+        axes[2] = np.cross(axes[0], axes[1])
+        return axes, np.asarray(extents)[order]
+
+    @cached_property
+    def _hull(self) -> Any:
+        """The convex hull."""
+        import trimesh
+
+        return trimesh.Trimesh(self.solid.vertices, self.solid.faces, process=False).convex_hull
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Directions of a, b and c in the axes of the scan, shape (3, 3)."""
+        return self._box[0]
+
+    @property
+    def sides_m(self) -> np.ndarray:
+        """Sides a, b and c of the smallest box around the stone [m], shape (3,)."""
+        return self._box[1]
+
+    @property
+    def solidity(self) -> float:
+        """Volume over that of the smallest box."""
+        return self.solid.volume / float(np.prod(self.sides_m))
+
+    @property
+    def hull_share(self) -> float:
+        """Volume over that of the convex hull."""
+        return self.solid.volume / float(self._hull.volume)
+
+    def standings(self) -> Iterator[Standing]:
+        """Yield the 24 ways to stand: six ends up, four to the road."""
+        for up in DIRECTIONS[:6]:
+            for facing in DIRECTIONS[:6]:
+                if facing[-1] != up[-1]:
+                    yield self.standing(up, facing)
+
+    def standing(self, up: str, facing: str) -> Standing:
+        """Return the stone with one end up and another to the road.
+
+        With an end of its own axes up the stone is tilted to the flattest part of its surface on which it stands; with
+        an axis of the scan up it stands as it was scanned.
+
+        Raises
+        ------
+        ScanError
+            Up and facing are ends of one axis, or of two kinds of axes.
+        """
+        if up[-1] == facing[-1] or (up[-1] in OF_STONE) != (facing[-1] in OF_STONE):
+            kinds = "one of a, b, c or one of x, y, z each"
+            raise ScanError(f"up: {up} and facing: {facing} do not go together: give two different axes, {kinds}")
+        if up not in self._sections:
+            self._sections[up] = self._found(up)
+        sections, stands, rests, frame = self._sections[up]
+        # The frame is turned by quarters until x points away from the road.
+        towards = self._direction(facing) @ frame.T
+        quarters = next(k for k, (x, y) in enumerate(((-1, 0), (0, -1), (1, 0), (0, 1))) if _is_nearest(towards, x, y))
+        for _ in range(quarters):
+            frame = np.stack([frame[1], -frame[0], frame[2]])
+        return self._cut(up, facing, frame, sections.turned(quarters), stands, rests)
+
+    def _direction(self, end: str) -> np.ndarray:
+        """Return an end as a unit vector in the axes of the scan."""
+        axes, names = (self._box[0], OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
+        return (-1.0 if end[0] == "-" else 1.0) * axes[names.index(end[-1])]
+
+    def _found(self, up: str) -> tuple[Sections, bool, float, np.ndarray]:
+        """Return sections over the height with one end up, whether it stands, how much of it rests, and the axes."""
+        upwards, stands = self._upwards(up)
+        beside = next(end for end in (OF_STONE if up[-1] in OF_STONE else OF_SCAN) if end != up[-1])
+        x = self._direction(beside)
+        x = x - (x @ upwards) * upwards
+        x /= np.linalg.norm(x)
+        frame = np.stack([x, np.cross(upwards, x), upwards])
+        height = self._height(upwards)
+        places = (np.arange(SECTIONS) + 0.5) / SECTIONS
+        sections = sections_of(self.solid, frame, places * height)
+        rests = float(sections_of(self.solid, frame, np.array([RESTS_WITHIN * height])).area[0] / sections.area.max())
+        return sections, stands, min(rests, 1.0), frame
+
+    def _height(self, upwards: np.ndarray) -> float:
+        return float(np.ptp(self._hull.vertices @ upwards))
+
+    def _upwards(self, up: str) -> tuple[np.ndarray, bool]:
+        """Return the direction that is up, and whether the stone stands that way."""
+        wanted = self._direction(up)
+        parts = self._parts_below(wanted)
+        if up[-1] in OF_SCAN:
+            return wanted, any(stands and normal @ wanted < -1.0 + 1e-9 for normal, stands in parts)
+        standing = [-normal for normal, _ in islice((part for part in parts if part[1]), CANDIDATES)]
+        if not standing:
+            return wanted, False
+        flat = [self._flatness(upwards) for upwards in standing]
+        return standing[int(np.argmax(np.round(flat, 6)))], True
+
+    def _flatness(self, upwards: np.ndarray) -> float:
+        """Return the section just above what the stone would rest on [m^2]."""
+        x = np.cross(upwards, np.eye(3)[np.abs(upwards).argmin()])
+        x /= np.linalg.norm(x)
+        frame = np.stack([x, np.cross(upwards, x), upwards])
+        return float(sections_of(self.solid, frame, np.array([RESTS_WITHIN * self._height(upwards)])).area[0])
+
+    def _parts_below(self, upwards: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
+        """Yield the flat parts of the hull that look down, the largest first: normals, and whether it stands there."""
+        hull = self._hull
+        below = np.flatnonzero(hull.face_normals @ upwards < -np.cos(np.radians(TILT_DEG)))
+        if not len(below):
+            return
+        rounded = np.round(hull.face_normals[below], 6)
+        _, first, part = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        part = part.reshape(-1)
+        areas = np.bincount(part, hull.area_faces[below])
+        over = _over(self.solid.centre, hull.triangles[below], hull.face_normals[below])
+        stands = np.bincount(part, over) > 0.0
+        for k in np.argsort(-np.round(areas, 9), kind="stable"):
+            yield hull.face_normals[below[first[k]]], bool(stands[k])
+
+    def _whole_doubled(self) -> float:
+        """Return the share of the volume that the surface encloses twice."""
+        axes = self._box[0]
+        frames = (axes, axes[[1, 2, 0]], axes[[2, 0, 1]])
+        places = (np.arange(24) + 0.5) / 24
+        return max(doubled_share(self.solid, frame, places * self._height(frame[2])) for frame in frames)
+
+    def _cut(self, up: str, facing: str, frame: np.ndarray, sections: Sections, stands: bool, rests: float) -> Standing:
+        """Return the stone on the foot that the least cut in whole centimetres gives it; uncut where none is enough."""
+        height = self._height(frame[2])
+        length, width = sides_of(sections)
+        wide = (length >= LEAST_FOOT * length.max()) & (width >= LEAST_FOOT * width.max())
+        first = sections.height[wide.argmax()] - 0.5 * height / SECTIONS
+        steps = np.arange(np.floor(first / CUT_STEP_M + 1e-9), np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0)
+        for cut in steps * CUT_STEP_M:
+            found = self._at(up, facing, frame, sections, stands, rests, float(cut))
+            if found.has_foot:
+                return found
+        return self._at(up, facing, frame, sections, stands, rests, 0.0)
+
+    def _at(
+        self, up: str, facing: str, frame: np.ndarray, sections: Sections, stands: bool, rests: float, cut: float
+    ) -> Standing:
+        """Return the stone on the foot at a height."""
+        solid, height = self.solid, self._height(frame[2])
+        foot = float(((solid.vertices - solid.centre) @ frame[2]).min())
+        x, z = 0.0, -foot
+        moment, volume = solid.moment(frame[1]), solid.volume
+        if cut > 0.0:
+            nodes, weights = np.polynomial.legendre.leggauss(16)
+            below = sections_of(solid, frame, 0.5 * cut * (1.0 + nodes))
+            weights = 0.5 * cut * weights
+            lost = float((weights * below.area).sum())
+            x_lost = float((weights * below.area * below.middle[:, 0]).sum())
+            z_lost = float((weights * below.area * (below.height + foot)).sum())
+            about = moment - float((weights * (below.second[:, 0] + below.area * (below.height + foot) ** 2)).sum())
+            volume -= lost
+            x, z_moved = -x_lost / volume, -z_lost / volume
+            moment = about - volume * (x**2 + z_moved**2)
+            z = z_moved - foot - cut
+        profile = fitted(sections, cut, height, volume)
+        middle = profile.foot_x
+        above = sections.height > cut
+        outline = np.stack(
+            [
+                sections.height[above] - cut,
+                middle - sections.low[above, 0],
+                sections.high[above, 0] - middle,
+                (sections.high - sections.low)[above, 1],
+            ],
+            axis=1,
+        )
+        share = 1.0 - volume / solid.volume
+        return Standing(up, facing, frame, stands, cut, share, rests, profile, (x - middle, z), moment, volume, outline)
+
+
+def _is_nearest(towards: np.ndarray, x: int, y: int) -> bool:
+    """Return whether a direction is nearer to this one of the four quarters than to any other."""
+    return bool(x * towards[0] + y * towards[1] >= np.abs(towards[:2]).max() * (1.0 - 1e-12))
+
+
+def _over(centre: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return whether a point lies over each of n triangles, bool, shape (n,)."""
+    corner = triangles - centre
+    sides = np.einsum("ijk,ik->ij", np.cross(corner, np.roll(corner, -1, axis=1)), normals)
+    least = 1e-9 * np.abs(sides).max()
+    return (sides >= -least).all(axis=1) | (sides <= least).all(axis=1)
