@@ -33,6 +33,7 @@ from boulder_sweep.cli.report import report
 from boulder_sweep.cli.run import run
 from boulder_sweep.cli.simulate import simulate
 from boulder_sweep.cli.status import status
+from boulder_sweep.cli.stone import stone
 from boulder_sweep.cli.tradeoff import tradeoff
 from boulder_sweep.cli.uncertainty import uncertainty
 from boulder_sweep.cli.validate import validate
@@ -76,7 +77,7 @@ def start_light() -> None:
 
 
 GROUPS = {
-    "Ask": (new, check, need, uncertainty, capacity, simulate, explore),
+    "Ask": (new, check, stone, need, uncertainty, capacity, simulate, explore),
     "Tables": (run, status, explain, compare),
     "Share": (plot, report, export),
     "Model": (tradeoff, validate, fit_vehicle),

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -66,9 +66,9 @@ class Standing:
         Its moment of inertia about the axis across the travel through the centre, for 1 kg/m^3 [m^5].
     volume : float
         Volume of the cut stone [m^3].
-    outline : ndarray, shape (m, 4)
-        Height above the foot, distance of the near and of the far face from the middle of the foot, and width of the
-        stone as it is [m].
+    outline : ndarray, shape (m, 3)
+        The stone as it is, cut or not: height above the foot, distances of its sides before and behind the middle of
+        the foot [m].
     """
 
     up: str
@@ -114,7 +114,7 @@ class Stone:
 
     def __init__(self, solid: Solid, file: str) -> None:
         self.solid = solid
-        self._sections: dict[str, tuple[Sections, bool, float, np.ndarray]] = {}
+        self._ups: dict[str, _Up] = {}
         doubled = self._whole_doubled()
         if doubled > MOST_DOUBLED:
             raise ScanError(
@@ -187,23 +187,41 @@ class Stone:
         if up[-1] == facing[-1] or (up[-1] in OF_STONE) != (facing[-1] in OF_STONE):
             kinds = "one of a, b, c or one of x, y, z each"
             raise ScanError(f"up: {up} and facing: {facing} do not go together: give two different axes, {kinds}")
-        if up not in self._sections:
-            self._sections[up] = self._found(up)
-        sections, stands, rests, frame = self._sections[up]
+        if up not in self._ups:
+            self._ups[up] = self._found(up)
+        found = self._ups[up]
+        frame, cut = found.frame, found.cut
         # The frame is turned by quarters until x points away from the road.
         towards = self._direction(facing) @ frame.T
         quarters = next(k for k, (x, y) in enumerate(((-1, 0), (0, -1), (1, 0), (0, 1))) if _is_nearest(towards, x, y))
         for _ in range(quarters):
             frame = np.stack([frame[1], -frame[0], frame[2]])
-        return self._cut(up, facing, frame, sections.turned(quarters), stands, rests)
+        sections, left = found.sections.turned(quarters), self._left(frame, cut)
+        profile = fitted(sections, cut, self._height(frame[2]), left.volume)
+        low, high = sections.low[:, 0], sections.high[:, 0]
+        foot = float(((self.solid.vertices - self.solid.centre) @ frame[2]).min())
+        return Standing(
+            up,
+            facing,
+            frame,
+            found.stands,
+            cut,
+            1.0 - left.volume / self.solid.volume,
+            found.rests,
+            profile,
+            (left.x - profile.foot_x, left.z - foot - cut),
+            left.moment,
+            left.volume,
+            np.stack([sections.height - cut, profile.foot_x - low, high - profile.foot_x], axis=1),
+        )
 
     def _direction(self, end: str) -> np.ndarray:
         """Return an end as a unit vector in the axes of the scan."""
         axes, names = (self._box[0], OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
         return (-1.0 if end[0] == "-" else 1.0) * axes[names.index(end[-1])]
 
-    def _found(self, up: str) -> tuple[Sections, bool, float, np.ndarray]:
-        """Return sections over the height with one end up, whether it stands, how much of it rests, and the axes."""
+    def _found(self, up: str) -> _Up:
+        """Return the stone with one end up."""
         upwards, stands = self._upwards(up)
         beside = next(end for end in (OF_STONE if up[-1] in OF_STONE else OF_SCAN) if end != up[-1])
         x = self._direction(beside)
@@ -214,7 +232,7 @@ class Stone:
         places = (np.arange(SECTIONS) + 0.5) / SECTIONS
         sections = sections_of(self.solid, frame, places * height)
         rests = float(sections_of(self.solid, frame, np.array([RESTS_WITHIN * height])).area[0] / sections.area.max())
-        return sections, stands, min(rests, 1.0), frame
+        return _Up(frame, sections, stands, min(rests, 1.0), self._cut(frame, sections))
 
     def _height(self, upwards: np.ndarray) -> float:
         return float(np.ptp(self._hull.vertices @ upwards))
@@ -260,53 +278,55 @@ class Stone:
         places = (np.arange(24) + 0.5) / 24
         return max(doubled_share(self.solid, frame, places * self._height(frame[2])) for frame in frames)
 
-    def _cut(self, up: str, facing: str, frame: np.ndarray, sections: Sections, stands: bool, rests: float) -> Standing:
-        """Return the stone on the foot that the least cut in whole centimetres gives it; uncut where none is enough."""
-        height = self._height(frame[2])
-        length, width = sides_of(sections)
-        wide = (length >= LEAST_FOOT * length.max()) & (width >= LEAST_FOOT * width.max())
-        first = sections.height[wide.argmax()] - 0.5 * height / SECTIONS
-        steps = np.arange(np.floor(first / CUT_STEP_M + 1e-9), np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0)
-        for cut in steps * CUT_STEP_M:
-            found = self._at(up, facing, frame, sections, stands, rests, float(cut))
-            if found.has_foot:
-                return found
-        return self._at(up, facing, frame, sections, stands, rests, 0.0)
+    def _cut(self, frame: np.ndarray, sections: Sections) -> float:
+        """Return the least cut in whole centimetres that makes a foot, whichever face is to the road [m].
 
-    def _at(
-        self, up: str, facing: str, frame: np.ndarray, sections: Sections, stands: bool, rests: float, cut: float
-    ) -> Standing:
-        """Return the stone on the foot at a height."""
-        solid, height = self.solid, self._height(frame[2])
+        0 where none is enough.
+        """
+        height = self._height(frame[2])
+        sides = sides_of(sections)
+        wide = np.logical_and(*(side >= LEAST_FOOT * side.max() for side in sides))
+        first = max(sections.height[wide.argmax()] - height / SECTIONS, 0.0)
+        steps = np.arange(np.floor(first / CUT_STEP_M), np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0)
+        for cut in steps * CUT_STEP_M:
+            left = self._left(frame, cut)
+            if all(has_foot(fitted(sections.turned(k), cut, height, left.volume)) for k in range(2)):
+                return float(cut)
+        return 0.0
+
+    def _left(self, frame: np.ndarray, cut: float) -> _Left:
+        """Return what is left above a cut, in the axes of a frame whose origin is the centre of mass of the whole."""
+        solid = self.solid
+        moment = solid.moment(frame[1])
+        if cut == 0.0:
+            return _Left(solid.volume, 0.0, 0.0, moment)
         foot = float(((solid.vertices - solid.centre) @ frame[2]).min())
-        x, z = 0.0, -foot
-        moment, volume = solid.moment(frame[1]), solid.volume
-        if cut > 0.0:
-            nodes, weights = np.polynomial.legendre.leggauss(16)
-            below = sections_of(solid, frame, 0.5 * cut * (1.0 + nodes))
-            weights = 0.5 * cut * weights
-            lost = float((weights * below.area).sum())
-            x_lost = float((weights * below.area * below.middle[:, 0]).sum())
-            z_lost = float((weights * below.area * (below.height + foot)).sum())
-            about = moment - float((weights * (below.second[:, 0] + below.area * (below.height + foot) ** 2)).sum())
-            volume -= lost
-            x, z_moved = -x_lost / volume, -z_lost / volume
-            moment = about - volume * (x**2 + z_moved**2)
-            z = z_moved - foot - cut
-        profile = fitted(sections, cut, height, volume)
-        middle = profile.foot_x
-        above = sections.height > cut
-        outline = np.stack(
-            [
-                sections.height[above] - cut,
-                middle - sections.low[above, 0],
-                sections.high[above, 0] - middle,
-                (sections.high - sections.low)[above, 1],
-            ],
-            axis=1,
-        )
-        share = 1.0 - volume / solid.volume
-        return Standing(up, facing, frame, stands, cut, share, rests, profile, (x - middle, z), moment, volume, outline)
+        nodes, weights = np.polynomial.legendre.leggauss(16)
+        below = sections_of(solid, frame, 0.5 * cut * (1.0 + nodes))
+        slices, height = 0.5 * cut * weights * below.area, below.height + foot
+        volume = solid.volume - float(slices.sum())
+        x, z = -float((slices * below.middle[:, 0]).sum()) / volume, -float((slices * height).sum()) / volume
+        lost = float((0.5 * cut * weights * below.second[:, 0] + slices * height**2).sum())
+        return _Left(volume, x, z, moment - lost - volume * (x**2 + z**2))
+
+
+class _Left(NamedTuple):
+    """What is left of a stone above a cut: volume, centre of mass, moment of inertia about y through it."""
+
+    volume: float
+    x: float
+    z: float
+    moment: float
+
+
+class _Up(NamedTuple):
+    """A stone with one end up, the first of its other axes in the direction of travel."""
+
+    frame: np.ndarray
+    sections: Sections
+    stands: bool
+    rests: float
+    cut: float
 
 
 def _is_nearest(towards: np.ndarray, x: int, y: int) -> bool:

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from boulder_sweep.drawing import draw
 from boulder_sweep.stones.reading import read_scan
 from boulder_sweep.stones.solid import solid_of
 from boulder_sweep.stones.standing import Standing, Stone
@@ -61,6 +62,16 @@ class ScannedStone:
                 "the scale of the scan or its unit is wrong"
             )
         return found
+
+    def plot(self, path: str | Path) -> None:
+        """Draw the stone with each of its six ends up, from the side and to scale, with its profile.
+
+        Raises
+        ------
+        PictureError
+            It cannot be drawn.
+        """
+        draw("stone", "draw_stone", self, path)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
