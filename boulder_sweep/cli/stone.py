@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 EXAMPLES = """\b
 Examples:
   sweep stone rock.ply --mass '18.2 t'
+  sweep stone rock.ply --mass '18.2 t' --up a --facing b
   sweep stone rock.stl --unit mm
   sweep stone rock.glb --plot rock.png
 """
@@ -30,14 +31,21 @@ Examples:
 @click.argument("rock", type=click.Path())
 @click.option("--mass", metavar="'18.2 t'", help="Mass of the whole stone [default: rock of 2650 kg/m³].")
 @click.option("--unit", default="m", metavar="UNIT", help="Unit of the scan: m, mm, cm, in or ft [m].")
+@click.option("--up", metavar="END", help="End that is up, for a block of settings: a, -a, b, -b, c, -c, x, ...")
+@click.option("--facing", metavar="END", help="End that faces the vehicle, with --up.")
 @click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw the stone with each of its six ends up.")
 @json_option
-def stone(rock: str, mass: str | None, unit: str, plot: str | None, as_json: bool) -> int:
+def stone(
+    rock: str, mass: str | None, unit: str, up: str | None, facing: str | None, plot: str | None, as_json: bool
+) -> int:
     """Weigh and measure ROCK, a scan of a stone (.ply, .stl, .obj or .glb).
 
     The scan is closed where it is open. Every way to stand gets a flat foot by the least cut, and a profile: width
-    and distances of the near and the far face over the height.
+    and distances of the near and the far face over the height. The ends a, b and c are those of the long, the middle
+    and the short axis of the stone, a the slimmer end and -a the other; x, y and z are the axes of the scan.
     """
+    if (up is None) != (facing is None):
+        raise click.UsageError("--up and --facing belong together; give both")
     mass_kg = None if mass is None else quantity_of("--mass", mass, "kg")
     metres = quantity_of("--unit", f"1 {unit}", "m")
     if plot is not None:
@@ -49,7 +57,12 @@ def stone(rock: str, mass: str | None, unit: str, plot: str | None, as_json: boo
     found = scanned(rock, metres=metres, mass_kg=mass_kg)
     for caution in found.cautions:
         say(f"caution: {caution}")
-    show(*([json.dumps(found.to_dict())] if as_json else [*stone_lines(found), "", *standing_lines(found)]))
+    chosen = None if up is None or facing is None else found.stone.standing(up, facing)
+    if as_json:
+        show(json.dumps(found.to_dict() if chosen is None else found.to_dict((chosen,))))
+    else:
+        ways = standing_lines(found) if chosen is None else settings_lines(found, chosen)
+        show(*stone_lines(found), "", *ways)
     if plot is not None:
         found.plot(plot)
     return 0
@@ -102,6 +115,21 @@ def standing_lines(found: ScannedStone) -> list[str]:
     return [*table_lines(columns, rows, 80), *_legend(found.standings)]
 
 
+def settings_lines(found: ScannedStone, own: Standing) -> list[str]:
+    """Return one way to stand as a block of settings."""
+    profile = own.profile
+    points = zip(profile.height, profile.width, profile.near, profile.far, strict=True)
+    cut = f", {own.cut_m:.2f} m cut off for a foot" if own.cut_m else ""
+    return [
+        f"# {found.file}: {own.up} up, {own.facing} to the vehicle{cut}",
+        "boulder:",
+        f"  mass: {found.density_kg_m3 * own.volume / 1e3:.3f} t",
+        "  profile:",
+        *(f"    - {{height: {z:.3f} m, width: {w:.3f} m, near: {n:.3f} m, far: {f:.3f} m}}" for z, w, n, f in points),
+        *([] if own.has_foot else ["  foot: rounded"]),
+    ]
+
+
 def foot_text(own: Standing) -> str:
     """Return length and width of a foot, or that there is none."""
     return f"{own.profile.length[0]:.2f} × {own.profile.width[0]:.2f}" if own.has_foot else "rounded"
@@ -111,7 +139,7 @@ def _legend(standings: Iterable[Standing]) -> list[str]:
     """Return what the columns mean, as far as they say something."""
     lines = [
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
-        "cut: what is cut off below for a foot at least half as long and wide as the stone",
+        "cut: cut off below, for a foot at least half as long and wide as the stone",
         "rests: section of the uncut stone just above the ground over its largest one",
         "fit: error of the profile, root mean square over the volume",
     ]

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from boulder_sweep.errors import ScanError
-from boulder_sweep.text import counted, one_line, why
+from boulder_sweep.text import one_line, why
 
 MAX_BYTES = 400_000_000
 """Largest file that is read."""
@@ -90,7 +90,7 @@ def read_scan(path: str | Path, metres: float = 1.0) -> Scan:
     _check_counts(path, _FACES[kind], data)
     vertices, faces = _loaded(path, kind, data)
     if not len(faces):
-        raise ScanError(f"{path}: holds {counted(len(vertices), 'point')} and no faces; export the scan as a mesh")
+        raise ScanError(f"{path}: holds no faces; export the scan as a mesh, not as points")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise ScanError(f"{path}: is damaged: a face names a point that is not there")
     used = vertices[np.unique(faces)]

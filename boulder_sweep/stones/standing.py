@@ -24,13 +24,16 @@ if TYPE_CHECKING:
 OF_STONE, OF_SCAN = "abc", "xyz"
 DIRECTIONS = tuple(f"{sign}{axis}" for axes in (OF_STONE, OF_SCAN) for axis in axes for sign in ("", "-"))
 """Ends of a stone by name: of its own axes, and of the axes of the scan."""
-TILT_DEG = 20.0
+TILT_DEG = 10.0
 """How far a stone is tilted to stand on the flattest part near an end."""
 CANDIDATES = 8
 """Parts of the surface near an end that are tried, the largest first."""
 RESTS_WITHIN = 0.02
 """What is this near to the plane below the stone rests on it, as a share of the height."""
+FINE_HULL = 1500
+"""Faces of a convex hull up to which all are tried as sides of the box; beyond, one in every direction."""
 SECTIONS = 128
+"""Sections over the height to which a profile is fitted."""
 LEAST_FOOT = 0.5
 """Least length and width of a foot as a share of those of the largest section: shorter ones count as rounded."""
 MOST_CUT = 0.25
@@ -127,7 +130,7 @@ class Stone:
         """Axes a, b and c as rows, and the sides of the box along them [m]."""
         from trimesh.bounds import oriented_bounds
 
-        placing, extents = oriented_bounds(self._hull)
+        placing, extents = oriented_bounds(self._hull, angle_digits=6 if len(self._hull.faces) <= FINE_HULL else 1)
         order = np.argsort(-np.round(extents, 9), kind="stable")
         axes = np.asarray(placing)[:3, :3][order]
         offset = np.asarray(placing)[:3, :3] @ self.solid.centre + np.asarray(placing)[:3, 3]
@@ -182,8 +185,11 @@ class Stone:
         Raises
         ------
         ScanError
-            Up and facing are ends of one axis, or of two kinds of axes.
+            Up or facing is no end, or they are ends of one axis, or of two kinds of axes.
         """
+        for key, end in (("up", up), ("facing", facing)):
+            if end not in DIRECTIONS:
+                raise ScanError(f"{key}: '{end}' is no end of a stone; there are {', '.join(DIRECTIONS)}")
         if up[-1] == facing[-1] or (up[-1] in OF_STONE) != (facing[-1] in OF_STONE):
             kinds = "one of a, b, c or one of x, y, z each"
             raise ScanError(f"up: {up} and facing: {facing} do not go together: give two different axes, {kinds}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -73,8 +74,8 @@ class ScannedStone:
         """
         draw("stone", "draw_stone", self, path)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
+    def to_dict(self, standings: Sequence[Standing] | None = None) -> dict[str, Any]:
+        """Return everything as plain data, with some ways to stand; with all of them by default."""
         stone, solid = self.stone, self.stone.solid
         axes = stone.axes
         return {
@@ -93,7 +94,7 @@ class ScannedStone:
             "hull_share": stone.hull_share,
             "centre_m": solid.centre.tolist(),
             "inertia_kg_m2": (self.density_kg_m3 * axes @ solid.inertia @ axes.T).tolist(),
-            "standings": [self._standing(own) for own in self.standings],
+            "standings": [self._standing(own) for own in (self.standings if standings is None else standings)],
         }
 
     def _standing(self, own: Standing) -> dict[str, Any]:
