@@ -139,7 +139,7 @@ def _legend(standings: Iterable[Standing]) -> list[str]:
     """Return what the columns mean, as far as they say something."""
     lines = [
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
-        "cut: cut off below, for a foot at least half as long and wide as the stone",
+        "cut: cut off below, for a flat foot under the centre of mass",
         "rests: section of the uncut stone just above the ground over its largest one",
         "fit: error of the profile, root mean square over the volume",
     ]

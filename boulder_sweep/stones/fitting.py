@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 MOST_PIECES = 8
 GOOD_FIT = 0.005
 """Root mean square of the error, as a share of the largest side, with which no further piece is tried."""
+LEAST_SECTIONS = 4
+"""Sections that a piece holds at least."""
+LEAST_WEIGHT = 0.1
+"""Weight of the smallest sections in a fit, as a share of that of the largest."""
 LEAST_SIDE = 0.02
 """Shortest side of a profile, as a share of its longest: a pointed top ends in a small flat."""
 
@@ -94,7 +98,7 @@ def fitted(sections: Sections, foot: float, top: float, volume: float) -> Profil
     """Return the profile of a stone that has been cut off at its foot.
 
     The points of the pieces are chosen by dynamic programming, the sides there by least squares, weighted by the area
-    of the sections. The lengths are then changed in proportion, so that the volume is that of the stone.
+    of the sections and a little more. The lengths are then changed in proportion, so that the volume is kept.
 
     Parameters
     ----------
@@ -110,7 +114,8 @@ def fitted(sections: Sections, foot: float, top: float, volume: float) -> Profil
     length, width = (side[within] for side in sides_of(sections))
     middle = sections.middle[within, 0]
     curves = np.stack([length, width, middle], axis=1)
-    weights = sections.area[within] / sections.area[within].sum()
+    weights = sections.area[within] + LEAST_WEIGHT * sections.area[within].max()
+    weights /= weights.sum()
     size = float(max(length.max(), width.max()))
     points = np.concatenate([[0.0], 0.5 * (z[:-1] + z[1:]), [top - foot]])
     for places in _divisions(z, curves, weights):
@@ -135,11 +140,11 @@ def _hats(z: np.ndarray, knots: np.ndarray) -> np.ndarray:
 def _divisions(z: np.ndarray, curves: np.ndarray, weights: np.ndarray) -> Iterator[list[int]]:
     """Yield where n sections are divided into one piece, two, ... with the least squared error.
 
-    Every piece is fitted by a line of its own and holds two sections or more. A place is the number of sections below.
+    Every piece is fitted by a line of its own. A place is the number of sections below.
     """
     costs = _costs(z, curves, weights)
     best, before = costs[0], [np.zeros(len(z) + 1, dtype=int)]
-    for pieces in range(1, min(MOST_PIECES, len(z) // 2) + 1):
+    for pieces in range(1, min(MOST_PIECES, len(z) // LEAST_SECTIONS) + 1):
         places = [len(z)]
         for chosen in reversed(before):
             places.append(int(chosen[places[-1]]))
@@ -153,7 +158,7 @@ def _divisions(z: np.ndarray, curves: np.ndarray, weights: np.ndarray) -> Iterat
 def _costs(z: np.ndarray, curves: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Return the squared error of the best lines through sections i to j - 1, shape (n + 1, n + 1).
 
-    It is infinite for fewer than two sections.
+    It is infinite for fewer than `LEAST_SECTIONS`.
     """
 
     def sums(part: np.ndarray) -> np.ndarray:
@@ -170,7 +175,7 @@ def _costs(z: np.ndarray, curves: np.ndarray, weights: np.ndarray) -> np.ndarray
             y, yy, yz = sums(curve), sums(curve * curve), sums(curve * z)
             total += yy - y * y / n - (yz - s * y / n) ** 2 / spread
     place = np.arange(len(n))
-    return np.where(place[None, :] - place[:, None] >= 2, np.maximum(total, 0.0), np.inf)
+    return np.where(place[None, :] - place[:, None] >= LEAST_SECTIONS, np.maximum(total, 0.0), np.inf)
 
 
 def _least_squares(

@@ -25,7 +25,7 @@ OF_STONE, OF_SCAN = "abc", "xyz"
 DIRECTIONS = tuple(f"{sign}{axis}" for axes in (OF_STONE, OF_SCAN) for axis in axes for sign in ("", "-"))
 """Ends of a stone by name: of its own axes, and of the axes of the scan."""
 TILT_DEG = 10.0
-"""How far a stone is tilted to stand on the flattest part near an end."""
+"""How far a stone is tilted to stand on a flat part near an end."""
 CANDIDATES = 8
 """Parts of the surface near an end that are tried, the largest first."""
 RESTS_WITHIN = 0.02
@@ -91,6 +91,13 @@ class Standing:
     def has_foot(self) -> bool:
         """Whether its foot is long and wide enough to count as flat."""
         return has_foot(self.profile)
+
+
+def is_firm(profile: Profile) -> bool:
+    """Return whether a foot reaches far enough out before and behind the centre of mass."""
+    x = profile.centre[0]
+    reach = min(profile.near[0] + x, profile.far[0] - x)
+    return bool(reach >= 0.5 * LEAST_FOOT * profile.length.max() * (1.0 - 1e-9))
 
 
 def has_foot(profile: Profile) -> bool:
@@ -179,7 +186,7 @@ class Stone:
     def standing(self, up: str, facing: str) -> Standing:
         """Return the stone with one end up and another to the road.
 
-        With an end of its own axes up the stone is tilted to the flattest part of its surface on which it stands; with
+        With an end of its own axes up the stone may be tilted to a part of its surface on which it stands firmly; with
         an axis of the scan up it stands as it was scanned.
 
         Raises
@@ -228,39 +235,37 @@ class Stone:
 
     def _found(self, up: str) -> _Up:
         """Return the stone with one end up."""
-        upwards, stands = self._upwards(up)
-        beside = next(end for end in (OF_STONE if up[-1] in OF_STONE else OF_SCAN) if end != up[-1])
-        x = self._direction(beside)
-        x = x - (x @ upwards) * upwards
-        x /= np.linalg.norm(x)
-        frame = np.stack([x, np.cross(upwards, x), upwards])
-        height = self._height(upwards)
+        frame, stands = self._steadiest(up)
+        height = self._height(frame[2])
         places = (np.arange(SECTIONS) + 0.5) / SECTIONS
         sections = sections_of(self.solid, frame, places * height)
-        rests = float(sections_of(self.solid, frame, np.array([RESTS_WITHIN * height])).area[0] / sections.area.max())
+        rests = float(self._resting(frame).area[0] / sections.area.max())
         return _Up(frame, sections, stands, min(rests, 1.0), self._cut(frame, sections))
 
     def _height(self, upwards: np.ndarray) -> float:
         return float(np.ptp(self._hull.vertices @ upwards))
 
-    def _upwards(self, up: str) -> tuple[np.ndarray, bool]:
-        """Return the direction that is up, and whether the stone stands that way."""
-        wanted = self._direction(up)
-        parts = self._parts_below(wanted)
-        if up[-1] in OF_SCAN:
-            return wanted, any(stands and normal @ wanted < -1.0 + 1e-9 for normal, stands in parts)
-        standing = [-normal for normal, _ in islice((part for part in parts if part[1]), CANDIDATES)]
-        if not standing:
-            return wanted, False
-        flat = [self._flatness(upwards) for upwards in standing]
-        return standing[int(np.argmax(np.round(flat, 6)))], True
+    def _resting(self, frame: np.ndarray) -> Sections:
+        """Return the one section just above what the stone lies on."""
+        return sections_of(self.solid, frame, np.array([RESTS_WITHIN * self._height(frame[2])]))
 
-    def _flatness(self, upwards: np.ndarray) -> float:
-        """Return the section just above what the stone would rest on [m^2]."""
-        x = np.cross(upwards, np.eye(3)[np.abs(upwards).argmin()])
-        x /= np.linalg.norm(x)
-        frame = np.stack([x, np.cross(upwards, x), upwards])
-        return float(sections_of(self.solid, frame, np.array([RESTS_WITHIN * self._height(upwards)])).area[0])
+    def _steadiest(self, up: str) -> tuple[np.ndarray, bool]:
+        """Return the axes in which the stone stands with one end up, and whether it does so without a cut.
+
+        Of the flat parts near the other end on which it stands, and of the end itself, the one is taken from whose
+        edges the centre of mass is farthest.
+        """
+        wanted = self._direction(up)
+        beside = next(end for end in (OF_STONE if up[-1] in OF_STONE else OF_SCAN) if end != up[-1])
+        parts = list(self._parts_below(wanted))
+        level = any(stands and normal @ wanted < -1.0 + 1e-9 for normal, stands in parts)
+        ways = [(wanted, level)]
+        if up[-1] in OF_STONE:
+            ways += islice(((-normal, True) for normal, stands in parts if stands), CANDIDATES)
+        frames = [_frame(upwards, self._direction(beside)) for upwards, _ in ways]
+        rooms = [min(found.high.min(), -found.low.max()) for found in map(self._resting, frames)]
+        best = int(np.argmax(np.round(rooms, 6)))
+        return frames[best], ways[best][1]
 
     def _parts_below(self, upwards: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
         """Yield the flat parts of the hull that look down, the largest first: normals, and whether it stands there."""
@@ -285,20 +290,25 @@ class Stone:
         return max(doubled_share(self.solid, frame, places * self._height(frame[2])) for frame in frames)
 
     def _cut(self, frame: np.ndarray, sections: Sections) -> float:
-        """Return the least cut in whole centimetres that makes a foot, whichever face is to the road [m].
+        """Return the least cut in whole centimetres after which the stone stands firmly on a foot [m].
 
-        0 where none is enough.
+        The foot must reach out from the centre of mass, on each of its four sides, by a quarter of the largest section.
+        Where no cut is enough, a foot that is half as long and wide as this will do; 0 where there is none either.
         """
         height = self._height(frame[2])
         sides = sides_of(sections)
         wide = np.logical_and(*(side >= LEAST_FOOT * side.max() for side in sides))
         first = max(sections.height[wide.argmax()] - height / SECTIONS, 0.0)
+        enough = 0.0
         steps = np.arange(np.floor(first / CUT_STEP_M), np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0)
         for cut in steps * CUT_STEP_M:
             left = self._left(frame, cut)
-            if all(has_foot(fitted(sections.turned(k), cut, height, left.volume)) for k in range(2)):
-                return float(cut)
-        return 0.0
+            profiles = [fitted(sections.turned(k), cut, height, left.volume) for k in range(2)]
+            if all(map(has_foot, profiles)):
+                if all(map(is_firm, profiles)):
+                    return float(cut)
+                enough = enough or float(cut)
+        return enough
 
     def _left(self, frame: np.ndarray, cut: float) -> _Left:
         """Return what is left above a cut, in the axes of a frame whose origin is the centre of mass of the whole."""
@@ -333,6 +343,13 @@ class _Up(NamedTuple):
     stands: bool
     rests: float
     cut: float
+
+
+def _frame(upwards: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Return right-handed axes, z upwards and x near another direction, shape (3, 3)."""
+    x = beside - (beside @ upwards) * upwards
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(upwards, x), upwards])
 
 
 def _is_nearest(towards: np.ndarray, x: int, y: int) -> bool:

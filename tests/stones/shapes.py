@@ -44,7 +44,7 @@ def sphere(radius: float, finer: int = 4) -> Surface:
     return _of(trimesh.creation.icosphere(finer, radius))
 
 
-def rock(seed: int, finer: int = 4) -> Surface:
+def rock(seed: int, finer: int = 3) -> Surface:
     points, faces = rock_surface(seed, finer=finer)
     return askew(points, seed), faces
 

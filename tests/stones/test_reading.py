@@ -135,7 +135,7 @@ def test_flipped_bytes_give_an_answer_or_a_refusal(kind, tmp_path):
     data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     random = np.random.default_rng(7)
     answers = 0
-    for _ in range(60):
+    for _ in range(40):
         wrong = data.copy()
         wrong[random.integers(len(wrong), size=random.integers(1, 9))] = random.integers(256)
         path.write_bytes(wrong.tobytes())
