@@ -71,7 +71,6 @@ def stone(
 def stone_lines(found: ScannedStone) -> list[str]:
     """Return what the stone is."""
     own = found.stone
-    repairs = "; ".join(own.solid.repairs) or "closed as it is"
     density = f"{found.density_kg_m3:,.0f} kg/m³"
     mass = {
         "mass": f"{found.mass_kg / 1e3:.2f} t as given, {density}",
@@ -82,7 +81,8 @@ def stone_lines(found: ScannedStone) -> list[str]:
     moments = own.axes @ own.solid.inertia @ own.axes.T * found.density_kg_m3 / 1e3
     turning = ", ".join(f"{moments[k, k]:.2f}" for k in range(3))
     return [
-        f"{found.file}: {counted(len(own.solid.faces), 'face')}, {repairs}",
+        f"{found.file}: {counted(len(own.solid.faces), 'face')}{'' if own.solid.repairs else ', closed as it is'}",
+        *(f"  repaired    {words}" for words in own.solid.repairs),
         f"  volume      {own.solid.volume:.3f} m³",
         f"  mass        {mass[found.density_from]}",
         f"  sides       a {a}, b {b}, c {c} m: the smallest box around it",

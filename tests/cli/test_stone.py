@@ -36,6 +36,18 @@ def test_a_block(sweep, block):
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_what_was_repaired(sweep, block):
+    points, faces = box(1.2, 1.6, 2.5)
+    below = (points[faces][:, :, 2] < 0.0).all(axis=1)
+    written((points, faces[~below, ::-1]), Path("open.ply"))
+    code, out, _ = sweep("stone", "open.ply")
+    assert code == 0
+    assert out.splitlines()[0] == "open.ply: 14 faces"
+    assert re.search(r"^  repaired    1 hole closed, 11 % of the surface, over \d+ % of the volume$", out, re.MULTILINE)
+    assert "  repaired    its inside was outside; turned\n" in out
+    assert "volume      4.800 m³" in out
+
+
 def test_without_a_mass_its_density_is_assumed(sweep, block):
     _, out, err = sweep("stone", block)
     assert "mass        12.72 t, if its density is 2,650 kg/m³; weigh it and give --mass" in out
