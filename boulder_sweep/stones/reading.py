@@ -21,7 +21,7 @@ from boulder_sweep.text import one_line, why
 
 MAX_BYTES = 400_000_000
 """Largest file that is read."""
-MAX_FACES = 2_000_000
+MAX_FACES = 1_000_000
 """Most faces, and most vertices, of a scan. A phone makes some 100,000, and a profile needs a few thousand."""
 DECIMATE = "reduce it first, for example to 200,000 faces in MeshLab or CloudCompare"
 LEAST_SIZE_M, LARGEST_SIZE_M = 0.1, 20.0

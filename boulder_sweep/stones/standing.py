@@ -39,6 +39,8 @@ LEAST_FOOT = 0.5
 MOST_CUT = 0.25
 """Largest part of the height that is cut off to get a foot."""
 CUT_STEP_M = 0.01
+NEARLY = 0.8
+"""Share of a foot that a section must have to be tried as one."""
 MOST_DOUBLED = 0.01
 """Largest share of the volume that a surface may enclose twice."""
 
@@ -296,19 +298,23 @@ class Stone:
         Where no cut is enough, a foot that is half as long and wide as this will do; 0 where there is none either.
         """
         height = self._height(frame[2])
-        sides = sides_of(sections)
-        wide = np.logical_and(*(side >= LEAST_FOOT * side.max() for side in sides))
-        first = max(sections.height[wide.argmax()] - height / SECTIONS, 0.0)
-        enough = 0.0
-        steps = np.arange(np.floor(first / CUT_STEP_M), np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0)
-        for cut in steps * CUT_STEP_M:
+        sides = np.stack(sides_of(sections), axis=1)
+        asked = LEAST_FOOT * sides.max(axis=0)
+        # A fit smooths the sections: those that are nearly large enough are looked at.
+        wide = (sides >= NEARLY * asked).all(axis=1)
+        firm = (sides - 2.0 * np.abs(sections.middle) >= NEARLY * asked).all(axis=1)
+        enough = None
+        for cut in np.arange(np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0) * CUT_STEP_M:
+            place = int(np.searchsorted(sections.height, cut))
+            if not (wide[place] if enough is None else firm[place]):
+                continue
             left = self._left(frame, cut)
             profiles = [fitted(sections.turned(k), cut, height, left.volume) for k in range(2)]
             if all(map(has_foot, profiles)):
                 if all(map(is_firm, profiles)):
                     return float(cut)
-                enough = enough or float(cut)
-        return enough
+                enough = float(cut) if enough is None else enough
+        return enough or 0.0
 
     def _left(self, frame: np.ndarray, cut: float) -> _Left:
         """Return what is left above a cut, in the axes of a frame whose origin is the centre of mass of the whole."""

@@ -143,6 +143,18 @@ def test_what_is_cut_off_is_taken_from_the_moments():
     assert left.z + whole.solid.centre[2] - 0.75 == pytest.approx(upper.solid.centre[2], abs=1e-9)
 
 
+def test_a_foot_is_under_the_centre_of_mass():
+    """A box whose underside slants by 0.2 m: cut by 0.1 m, half of it would stand, with its centre over an edge."""
+    points, faces = box(1.0, 1.0, 2.0)
+    below = points[:, 2:] < 0.0
+    points = points + np.where(below, (0.5 - points[:, :1]) * (0.0, 0.0, 0.2), 0.0)
+    own = stone((points, faces)).standing("z", "x")
+    assert own.cut_m == pytest.approx(0.15, abs=0.03)
+    reach = own.profile.near[0] + own.centre[0], own.profile.far[0] - own.centre[0]
+    assert min(reach) >= 0.25 * own.profile.length.max() - 0.005
+    assert not own.stands
+
+
 def test_a_point_that_no_cut_makes_a_foot():
     own = stone(frustum(0.02, 1.0, 3.0)).standing("z", "x")
     assert not own.has_foot
