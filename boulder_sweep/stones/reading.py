@@ -127,8 +127,17 @@ def _check_counts(path: Path, count: Callable[[bytes], int], data: bytes) -> Non
     """Refuse a file that says that it holds too much, or does not say how much."""
     try:
         most = count(data)
-    except (ValueError, LookupError, TypeError, AttributeError, struct.error, RecursionError) as problem:
-        raise ScanError(f"{path}: is damaged or of another format ({one_line(problem)})") from None
+    except (
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        struct.error,
+        RecursionError,
+    ) as problem:
+        words = str(problem) if isinstance(problem, ValueError) else one_line(problem)
+        raise ScanError(f"{path}: is damaged or of another format ({words})") from None
     if most > MAX_FACES:
         raise ScanError(f"{path}: has {most:,} faces or points; at most {MAX_FACES:,} are read: {DECIMATE}")
 

@@ -99,6 +99,8 @@ def test_parts_of_a_scene_are_placed(tmp_path):
         ("rock.glb", glb({"extensionsUsed": ["KHR_draco_mesh_compression"]}), "export it without compression"),
         ("rock.glb", glb({"nodes": [{"children": [1, 1]}, {}]}), "a node has two parents"),
         ("rock.glb", glb({"accessors": [{"count": -1}]}), "a count is negative"),
+        ("rock.glb", glb({"accessors": [{"count": float("inf")}]}), "is damaged or of another format"),
+        ("rock.glb", glb({"nodes": [{"children": [0]}], "scenes": [{"nodes": [0]}], "scene": 0}), "rock.glb: "),
         ("rock.glb", glb({"accessors": [{"count": 10**12}]}), r"1,000,000,000,000 faces or points; at most"),
         ("rock.glb", glb({}), "no faces"),
     ],
@@ -107,6 +109,18 @@ def test_files_that_cannot_be_used(name, content, words, file):
     with pytest.raises(ScanError, match=words) as refusal:
         read_scan(file(name, content))
     assert str(refusal.value).count("\n") == 0
+
+
+def test_nodes_in_a_circle(tmp_path):
+    """A mesh whose node is its own child, and two nodes that are each other's."""
+    data = written(rock(1, finer=1), tmp_path / "rock.glb").read_bytes()
+    length = struct.unpack_from("<I", data, 12)[0]
+    header = json.loads(data[20 : 20 + length])
+    binary = data[20 + length + 8 :]
+    for nodes in ([{"mesh": 0, "children": [0]}], [{"mesh": 0, "children": [1]}, {"children": [0]}]):
+        (tmp_path / "rock.glb").write_bytes(glb(header | {"nodes": nodes, "scenes": [{"nodes": [0]}]}, binary))
+        with suppress(ScanError):
+            assert solid_of(read_scan(tmp_path / "rock.glb")).volume > 0.0
 
 
 def test_points_without_faces(file):
