@@ -86,6 +86,10 @@ class ReportError(BoulderSweepError):
     """A report cannot be written."""
 
 
+class ScanError(BoulderSweepError):
+    """A scan of a stone that cannot be used."""
+
+
 class Interrupted(KeyboardInterrupt):
     """A run was stopped by a signal; the finished rows are safe and the run can be resumed.
 

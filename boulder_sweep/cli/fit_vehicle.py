@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, json_option, refuse_unwritable
+from boulder_sweep.cli.options import OUTPUT, json_option, quantity_of, refuse_unwritable
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ def fit_vehicle(pulse: str, mass: str, speed: str | None, stages: int, plot: str
 
     With `--stages 2` also a second, stiffer spring from a crush on; refused where it fits no better than one spring.
     """
-    mass_kg = _quantity("--mass", mass, "kg")
-    speed_m_s = None if speed is None else _quantity("--speed", speed, "m/s")
+    mass_kg = quantity_of("--mass", mass, "kg")
+    speed_m_s = None if speed is None else quantity_of("--speed", speed, "m/s")
     from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
     from boulder_sweep.crash_tests.pulse import read_pulse
 
@@ -101,20 +101,3 @@ def _second_rows(fit: StagedFit) -> list[tuple[str, str]]:
         ("second spring", f"{wall.second_spring_N_m / 1e3:.1f} ± {fit.second_error_N_m / 1e3:.1f} kN/m"),
         ("acts from a crush of", f"{wall.second_spring_from_m:.3f} ± {fit.from_error_m:.3f} m"),
     ]
-
-
-def _quantity(option: str, text: str, unit: str) -> float:
-    """Read a number with its unit from the command line."""
-    from boulder_sweep.settings.numbers import NumberError, split_number
-    from boulder_sweep.settings.units import EXPECTED, UnitError, factor
-
-    try:
-        number, unit_text = split_number(text, unit)
-        if not unit_text:
-            raise click.UsageError(f"{option} '{text}': write the unit too ({EXPECTED[unit].examples})")
-        value = float(number * factor(unit_text, unit))
-    except (NumberError, UnitError) as error:
-        raise click.UsageError(f"{option}: {error}") from None
-    if not value > 0.0:
-        raise click.UsageError(f"{option} '{text}': must be positive")
-    return value

@@ -161,3 +161,20 @@ def refuse_unwritable_history(
         from boulder_sweep.views.side_view import checked_animation
 
         checked_animation(animation)
+
+
+def quantity_of(option: str, text: str, unit: str) -> float:
+    """Return the positive number that an option gives with its unit, in the unit of the table."""
+    from boulder_sweep.settings.numbers import NumberError, split_number
+    from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+
+    try:
+        number, unit_text = split_number(text, unit)
+        if not unit_text:
+            raise click.UsageError(f"{option} '{text}': write the unit too ({EXPECTED[unit].examples})")
+        value = float(number * factor(unit_text, unit))
+    except (NumberError, UnitError) as error:
+        raise click.UsageError(f"{option}: {error}") from None
+    if not value > 0.0:
+        raise click.UsageError(f"{option} '{text}': must be positive")
+    return value

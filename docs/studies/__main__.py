@@ -11,12 +11,14 @@ from docs.studies import stamps
 from docs.studies.contents import CONTENTS, compute
 from docs.studies.documents import differences, write
 from docs.studies.example_pulse import example_pulse
+from docs.studies.example_rock import example_rock
 from docs.studies.json_schema import FILE as SCHEMA
 from docs.studies.json_schema import text as schema_text
 from docs.studies.pictures import draw_all
 
 PULSE = Path("docs/examples/rigid_wall_pulse.csv")
-WRITTEN = {PULSE: example_pulse, SCHEMA: schema_text}
+ROCK = Path("docs/examples/rock.ply")
+WRITTEN = {PULSE: example_pulse, ROCK: example_rock, SCHEMA: schema_text}
 """Whole files, and what writes them."""
 
 

@@ -21,6 +21,7 @@ from docs.studies.example_pulse import example_pulse
 from docs.studies.knife_edge import draw_knife_edge
 from docs.studies.readings import readings_study
 from docs.studies.readings_plot import draw_readings
+from docs.studies.stones import example_stone
 
 FOLDER = Path("docs/images")
 STILL_AT_S = 0.06
@@ -61,6 +62,7 @@ def draw_all(root: Path) -> list[Path]:
     need(load(root / SITE), both_readings=True).plot(named("design_chart.png"))
     uncertainty(load(root / UNCERTAIN)).plot(named("uncertainty.png"))
     draw_knife_edge(named("knife_edge.png"))
+    example_stone(root).plot(named("stone.png"))
     with tempfile.TemporaryDirectory() as scratch:
         pulse = Path(scratch) / "pulse.csv"
         pulse.write_text(example_pulse(), encoding="utf-8")

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ("new", "run", "check", "need", "uncertainty", "capacity", "simulate", "status")
-HEAVY = ("numba", "pandas", "scipy", "pyarrow", "matplotlib", "joblib", "rich", "pint", "pydantic", "dask")
+COMMANDS = ("new", "run", "check", "stone", "need", "uncertainty", "capacity", "simulate", "status")
+HEAVY = ("numba", "pandas", "scipy", "pyarrow", "matplotlib", "joblib", "rich", "pint", "pydantic", "dask", "trimesh")
 BESIDE_THE_KERNELS = (
     "numba",
     "llvmlite",
@@ -59,6 +59,7 @@ def test_help_groups_the_commands(sweep):
     assert re.findall(r"^  (\S+)", ask, re.MULTILINE) == [
         "new",
         "check",
+        "stone",
         "need",
         "uncertainty",
         "capacity",
@@ -99,6 +100,7 @@ def test_version(sweep):
     [
         (["--help"], (*HEAVY, "numpy")),
         (["run", "--help"], (*HEAVY, "numpy")),
+        (["stone", "--help"], (*HEAVY, "numpy")),
         (["--version"], (*HEAVY, "numpy")),
         (["check", str(ROOT / "configs" / "m30_sizing.yaml")], HEAVY),
         (["check", str(ROOT / "configs" / "crash_tests.yaml")], HEAVY),

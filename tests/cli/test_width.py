@@ -15,6 +15,7 @@ WORDS = {
     "new": ("made.yaml", "--yes"),
     "run": (SITE,),
     "check": (CONFIGS / "m30_sizing.yaml",),
+    "stone": (CONFIGS.parent / "docs" / "examples" / "rock.ply", "--mass", "23.5 t"),
     "need": (SITE, *US),
     "uncertainty": (CONFIGS / "uncertain_site.yaml", "--half-width", "0.2", "--doubts", *US),
     "capacity": (SITE, *US),

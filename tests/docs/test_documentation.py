@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep import load
-from docs.studies.__main__ import PULSE, main
+from docs.studies.__main__ import PULSE, ROCK, main
 from docs.studies.contents import CONTENTS, EVERY, GRID, readings_of_grid
 from docs.studies.documents import blocks, pages
 from docs.studies.energy import AUDIT_DESIGNS
 from docs.studies.example_pulse import NOISE_G, NOISE_MM, example_pulse
+from docs.studies.example_rock import example_rock
 from docs.studies.extremes import box_shares_table, is_left_open
 from docs.studies.pictures import draw_all
 from tests.docs.links import broken_links
@@ -41,6 +42,10 @@ def test_few_designs_of_the_box_stay_open(sample: tuple[int, ...]) -> None:
 
 def test_example_pulse_is_what_the_command_writes() -> None:
     assert (ROOT / PULSE).read_text(encoding="utf-8") == example_pulse()
+
+
+def test_example_rock_is_what_the_command_writes() -> None:
+    assert (ROOT / ROCK).read_text(encoding="utf-8") == example_rock()
 
 
 def test_every_study_stands_on_a_page() -> None:

@@ -1,0 +1,145 @@
+"""``sweep stone``: what the scan of a stone says of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+import click
+
+from boulder_sweep.cli.options import OUTPUT, json_option, quantity_of, refuse_unwritable
+from boulder_sweep.cli.output import say, show
+from boulder_sweep.text import counted
+
+if TYPE_CHECKING:
+    from boulder_sweep.answers.printing import Column
+    from boulder_sweep.stones.standing import Standing
+    from boulder_sweep.stones.weighing import ScannedStone
+
+EXAMPLES = """\b
+Examples:
+  sweep stone rock.ply --mass '18.2 t'
+  sweep stone rock.ply --mass '18.2 t' --up a --facing b
+  sweep stone rock.stl --unit mm
+  sweep stone rock.glb --plot rock.png
+"""
+
+
+@click.command("stone", short_help="Volume, mass, foot and profile of a scanned stone.", epilog=EXAMPLES)
+@click.argument("rock", type=click.Path())
+@click.option("--mass", metavar="'18.2 t'", help="Mass of the whole stone [default: rock of 2650 kg/m³].")
+@click.option("--unit", default="m", metavar="UNIT", help="Unit of the scan: m, mm, cm, in or ft [m].")
+@click.option("--up", metavar="END", help="End that is up, for a block of settings: a, -a, b, -b, c, -c, x, ...")
+@click.option("--facing", metavar="END", help="End that faces the vehicle, with --up.")
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw the stone with each of its six ends up.")
+@json_option
+def stone(
+    rock: str, mass: str | None, unit: str, up: str | None, facing: str | None, plot: str | None, as_json: bool
+) -> int:
+    """Weigh and measure ROCK, a scan of a stone (.ply, .stl, .obj or .glb).
+
+    The scan is closed where it is open. Every way to stand gets a flat foot by the least cut, and a profile: width
+    and distances of the near and the far face over the height. The ends a, b and c are those of the long, the middle
+    and the short axis of the stone, a the slimmer end and -a the other; x, y and z are the axes of the scan.
+    """
+    if (up is None) != (facing is None):
+        raise click.UsageError("--up and --facing belong together; give both")
+    mass_kg = None if mass is None else quantity_of("--mass", mass, "kg")
+    metres = quantity_of("--unit", f"1 {unit}", "m")
+    if plot is not None:
+        refuse_unwritable(None, plot)
+    from boulder_sweep.stones.weighing import scanned
+
+    found = scanned(rock, metres=metres, mass_kg=mass_kg)
+    for caution in found.cautions:
+        say(f"caution: {caution}")
+    chosen = None if up is None or facing is None else found.stone.standing(up, facing)
+    if as_json:
+        show(json.dumps(found.to_dict() if chosen is None else found.to_dict((chosen,))))
+    else:
+        ways = standing_lines(found) if chosen is None else settings_lines(found, chosen)
+        show(*stone_lines(found), "", *ways)
+    if plot is not None:
+        found.plot(plot)
+    return 0
+
+
+def stone_lines(found: ScannedStone) -> list[str]:
+    """Return what the stone is."""
+    own = found.stone
+    density = f"{found.density_kg_m3:,.0f} kg/m³"
+    mass = {
+        "mass": f"{found.mass_kg / 1e3:.2f} t as given, {density}",
+        "density": f"{found.mass_kg / 1e3:.2f} t, at {density} as given",
+        "assumed": f"{found.mass_kg / 1e3:.2f} t, if its density is {density}; weigh it and give --mass",
+    }
+    a, b, c = (f"{side:.2f}" for side in own.sides_m)
+    moments = own.axes @ own.solid.inertia @ own.axes.T * found.density_kg_m3 / 1e3
+    turning = ", ".join(f"{moments[k, k]:.2f}" for k in range(3))
+    return [
+        f"{found.file}: {counted(len(own.solid.faces), 'face')}{'' if own.solid.repairs else ', closed as it is'}",
+        *(f"  repaired    {words}" for words in own.solid.repairs),
+        f"  volume      {own.solid.volume:.3f} m³",
+        f"  mass        {mass[found.density_from]}",
+        f"  sides       a {a}, b {b}, c {c} m: the smallest box around it",
+        f"  solidity    {own.solidity:.2f} of that box, {own.hull_share:.2f} of the convex hull",
+        f"  inertia     {turning} t·m² about a, b, c",
+    ]
+
+
+def standing_lines(found: ScannedStone) -> list[str]:
+    """Return how it can stand: a line for each end up and each pair of opposite faces to the road."""
+    from boulder_sweep.answers.printing import table_lines
+
+    rows = [{"standing": own} for own in found.standings if not own.facing.startswith("-")]
+
+    def column(head: tuple[str, str], text: Callable[[Standing], str]) -> Column:
+        return head, lambda row: text(row["standing"])
+
+    columns = [
+        column(("up", ""), lambda own: own.up),
+        column(("facing", ""), lambda own: f"±{own.facing}"),
+        column(("height", "m"), lambda own: f"{own.profile.height[-1]:.2f}"),
+        column(("length", "m"), lambda own: f"{own.profile.length.max():.2f}"),
+        column(("width", "m"), lambda own: f"{own.profile.width.max():.2f}"),
+        column(("foot", "m"), foot_text),
+        column(("cut", "m"), lambda own: f"{own.cut_m:.2f}"),
+        column(("cut", "of mass"), lambda own: f"{own.cut_share:.1%}"),
+        column(("rests", "uncut"), lambda own: f"{own.rests:.0%}"),
+        column(("fit", "m"), lambda own: f"{own.profile.error:.3f}"),
+    ]
+    return [*table_lines(columns, rows, 80), *_legend(found.standings)]
+
+
+def settings_lines(found: ScannedStone, own: Standing) -> list[str]:
+    """Return one way to stand as a block of settings."""
+    profile = own.profile
+    points = zip(profile.height, profile.width, profile.near, profile.far, strict=True)
+    cut = f", {own.cut_m:.2f} m cut off for a foot" if own.cut_m else ""
+    return [
+        f"# {found.file}: {own.up} up, {own.facing} to the vehicle{cut}",
+        "boulder:",
+        f"  mass: {found.density_kg_m3 * own.volume / 1e3:.3f} t",
+        "  profile:",
+        *(f"    - {{height: {z:.3f} m, width: {w:.3f} m, near: {n:.3f} m, far: {f:.3f} m}}" for z, w, n, f in points),
+        *([] if own.has_foot else ["  foot: rounded"]),
+    ]
+
+
+def foot_text(own: Standing) -> str:
+    """Return length and width of a foot, or that there is none."""
+    return f"{own.profile.length[0]:.2f} × {own.profile.width[0]:.2f}" if own.has_foot else "rounded"
+
+
+def _legend(standings: Iterable[Standing]) -> list[str]:
+    """Return what the columns mean, as far as they say something."""
+    lines = [
+        "up, facing: the end of the stone that is up, and the one that faces the vehicle",
+        "cut: cut off below, for a flat foot under the centre of mass",
+        "rests: section of the uncut stone just above the ground over its largest one",
+        "fit: error of the profile, root mean square over the volume",
+    ]
+    if any(not own.has_foot for own in standings):
+        lines.append("rounded: no cut of a quarter of the height makes a foot; bed it in concrete")
+    return lines

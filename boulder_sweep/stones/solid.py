@@ -1,0 +1,257 @@
+"""From a surface to a solid: what is wrong with it is repaired, and what was done is said.
+
+A surface encloses a volume if its oriented edges cancel, each run through as often in one direction as in the other.
+Holes are closed by fans from the middle of their rims, which always reaches that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.errors import ScanError
+from boulder_sweep.text import counted
+
+if TYPE_CHECKING:
+    from boulder_sweep.stones.reading import Scan
+
+MOST_CLOSED = 0.25
+"""Largest part of the surface of a stone that may be a hole; the side on which a block lies is a fifth of it."""
+MOST_CRUMBS = 0.02
+"""Largest part of its volume that bodies beside the stone may have, to be left out."""
+LEAST_VOLUME = 1e-3
+"""Least volume, as a share of a cube on the largest side."""
+MOST_PATCHES = 1000
+"""Patches that hang together by points only, of which the faces are turned to the same side, the largest first."""
+SAME_POINT = 1e-7
+"""Distance within which points are one, as a share of the largest side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed stone.
+
+    Attributes
+    ----------
+    vertices : ndarray of float64, shape (n, 3)
+        Points in the axes of the scan [m].
+    faces : ndarray of int64, shape (m, 3)
+        Triangles with their outer side where their points run anticlockwise.
+    volume : float
+        Volume [m^3].
+    centre : ndarray, shape (3,)
+        Centre of mass of a homogeneous stone [m].
+    inertia : ndarray, shape (3, 3)
+        Moments of inertia about the centre for a density of 1 kg/m^3 [m^5].
+    repairs : tuple of str
+        What was done to the surface, in words; nothing where it was closed.
+    closed : float
+        Part of the surface that was added to close it.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    volume: float
+    centre: np.ndarray
+    inertia: np.ndarray
+    repairs: tuple[str, ...] = ()
+    closed: float = 0.0
+
+    def moment(self, axis: np.ndarray) -> float:
+        """Return the moment of inertia about an axis (unit vector) through the centre, for 1 kg/m^3 [m^5]."""
+        return float(axis @ self.inertia @ axis)
+
+
+def solid_of(scan: Scan) -> Solid:
+    """Return the stone that a scan is the surface of.
+
+    Parameters
+    ----------
+    scan
+        The surface.
+
+    Raises
+    ------
+    ScanError
+        It is flat, holds several bodies, or is too open to be closed.
+    """
+    repairs: list[str] = []
+    vertices, faces = _merged(scan.vertices, scan.faces)
+    if len(faces) < 4:
+        raise ScanError(f"{scan.file}: has {counted(len(faces), 'face')} with an area; a stone has at least 4")
+    faces, crumbs = _largest_body(vertices, faces, scan.file)
+    if crumbs:
+        repairs.append(f"{_bodies(crumbs)} beside the stone left out")
+    faces, turned = _consistent(faces)
+    if turned:
+        repairs.append(f"{counted(turned, 'face')} turned to the side of the others")
+    open_volume = abs(_volume(vertices, faces))
+    vertices, faces, closed, holes = _closed(vertices, faces)
+    if closed > MOST_CLOSED:
+        raise ScanError(
+            f"{scan.file}: is open: {closed:.0%} of its surface would be added to close it, at most {MOST_CLOSED:.0%} "
+            "is; scan the stone from all sides"
+        )
+    volume = _volume(vertices, faces)
+    if volume < 0.0:
+        faces, volume = faces[:, ::-1], -volume
+        repairs.append("its inside was outside; turned")
+    largest = float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max())
+    if not volume > LEAST_VOLUME * largest**3:
+        raise ScanError(
+            f"{scan.file}: encloses no volume to speak of ({volume:.2g} m³); it is flat, or no closed surface"
+        )
+    if holes:
+        words = f"{counted(holes, 'hole')} closed, {100 * closed:.2g} % of the surface"
+        repairs.append(f"{words}, over {100 * abs(volume - open_volume) / volume:.2g} % of the volume")
+    used, places = np.unique(faces, return_inverse=True)
+    vertices, faces = np.ascontiguousarray(vertices[used]), np.ascontiguousarray(places.reshape(-1, 3))
+    return Solid(vertices, faces, *_moments(vertices, faces), tuple(repairs), closed)
+
+
+def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a surface whose points are single and whose faces have an area, each once."""
+    import trimesh
+
+    low = vertices[faces].reshape(-1, 3).min(axis=0)
+    size = float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max())
+    mesh = trimesh.Trimesh((vertices - low) / size, faces, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=round(-np.log10(SAME_POINT)))
+    mesh.update_faces(mesh.unique_faces())
+    corners = mesh.faces
+    mesh.update_faces((corners != corners[:, [1, 2, 0]]).all(axis=1))
+    return np.asarray(mesh.vertices) * size + low, np.asarray(mesh.faces, dtype=np.int64)
+
+
+def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the three oriented edges of every face: both points, lower number first, and whether these run upwards."""
+    ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    up = ends[:, 0] < ends[:, 1]
+    return np.where(up, ends[:, 0], ends[:, 1]), np.where(up, ends[:, 1], ends[:, 0]), up
+
+
+def _neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return pairs of faces that share an edge with each other only, and whether they run through it the same way."""
+    low, high, up = _edges(faces)
+    key = low * (faces.max() + 1) + high
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
+    twice = starts[np.diff(np.r_[starts, len(ordered)]) == 2]
+    first, second = order[twice], order[twice + 1]
+    return first // 3, second // 3, up[first] == up[second]
+
+
+def _consistent(faces: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return faces that all have their outer side on the same side, and how many were turned for it."""
+    first, second, same = _neighbours(faces)
+    if not same.any():
+        return faces, 0
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    count = len(faces)
+    # An entry of 1 where the neighbours agree, 2 where one must be turned.
+    graph = coo_array((np.where(same, 2, 1), (first, second)), shape=(count, count)).tocsr()
+    graph = graph + graph.T
+    body = connected_components(graph, directed=False)[1]
+    starts, sizes = np.unique(body, return_index=True, return_counts=True)[1:]
+    turn = np.zeros(count, dtype=bool)
+    for start in starts[np.argsort(-sizes, kind="stable")][:MOST_PATCHES]:
+        order, before = breadth_first_order(graph, start, directed=False)
+        weights = np.asarray(graph[order[1:], before[order[1:]]]).reshape(-1) if len(order) > 1 else np.empty(0)
+        for face, parent, weight in zip(order[1:], before[order[1:]], weights, strict=True):
+            turn[face] = turn[parent] ^ (weight == 2)
+        own = body == body[start]
+        if 2 * turn[own].sum() > own.sum():
+            turn[own] = ~turn[own]
+    faces = faces.copy()
+    faces[turn] = faces[turn][:, ::-1]
+    return faces, int(turn.sum())
+
+
+def _largest_body(vertices: np.ndarray, faces: np.ndarray, file: str) -> tuple[np.ndarray, int]:
+    """Return the faces of the largest body, and how many small ones are left out."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    size = len(vertices)
+    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    body = connected_components(graph, directed=False)[1][faces[:, 0]]
+    names, counts = np.unique(body, return_counts=True)
+    if len(names) == 1:
+        return faces, 0
+    # By the volume of the box around each: a body may be open, and its own volume then says nothing.
+    bulk = np.empty(len(names))
+    order = np.argsort(body, kind="stable")
+    for place, own in enumerate(np.split(order, np.cumsum(counts)[:-1])):
+        bulk[place] = np.prod(np.ptp(vertices[faces[own]].reshape(-1, 3), axis=0))
+    largest = int(bulk.argmax())
+    others = float(np.delete(bulk, largest).sum() / max(bulk[largest], 1e-300))
+    if others > MOST_CRUMBS:
+        raise ScanError(
+            f"{file}: holds {_bodies(len(names))}, and the others are {others:.0%} as large as the largest; leave only "
+            "the stone in the scan, as one surface"
+        )
+    return faces[body == names[largest]], len(names) - 1
+
+
+def _closed(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int]:
+    """Return a surface without holes, the part of it that was added, and how many holes there were."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    low, high, up = _edges(faces)
+    key = low * len(vertices) + high
+    edges, places = np.unique(key, return_inverse=True)
+    balance = np.bincount(places, np.where(up, 1, -1)).astype(np.int64)
+    rims = np.flatnonzero(balance)
+    if not len(rims):
+        return vertices, faces, 0.0, 0
+    # A face added along a rim runs through it the other way, as often as the edge lacks it.
+    lacking = np.repeat(rims, np.abs(balance[rims]))
+    start, end = edges[lacking] // len(vertices), edges[lacking] % len(vertices)
+    start, end = np.where(balance[lacking] > 0, (end, start), (start, end))
+    size = len(vertices)
+    graph = coo_array((np.ones(len(start), dtype=np.int8), (start, end)), shape=(size, size))
+    hole = np.unique(connected_components(graph, directed=False)[1][start], return_inverse=True)[1]
+    holes = int(hole.max()) + 1
+    length = np.linalg.norm(vertices[end] - vertices[start], axis=1)
+    middles = np.stack(
+        [
+            np.bincount(hole, length * 0.5 * (vertices[start, k] + vertices[end, k])) / np.bincount(hole, length)
+            for k in range(3)
+        ],
+        axis=1,
+    )
+    fans = np.stack([start, end, size + hole], axis=1)
+    vertices = np.concatenate([vertices, middles])
+    added = _area(vertices, fans)
+    return vertices, np.concatenate([faces, fans]), added / (added + _area(vertices, faces)), holes
+
+
+def _bodies(count: int) -> str:
+    return "1 body" if count == 1 else f"{count:,} bodies"
+
+
+def _area(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """Return the area of a surface."""
+    corner = vertices[faces]
+    return 0.5 * float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum())
+
+
+def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """Return the volume between a surface and the middle of its points, negative where it is inside out."""
+    corner = vertices[faces] - vertices[np.unique(faces)].mean(axis=0)
+    return float(np.einsum("ij,ij->i", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum()) / 6.0
+
+
+def _moments(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return volume, centre of mass, and moments of inertia about it for a density of 1 kg/m^3."""
+    from trimesh.triangles import mass_properties
+
+    found = mass_properties(vertices[faces], density=1.0)
+    return float(found.volume), np.asarray(found.center_mass), np.asarray(found.inertia)

@@ -1,0 +1,371 @@
+"""How a stone can stand: which way up, on which part of its surface, and with which face to the road.
+
+The axes a, b and c of a stone are the long, the middle and the short side of the smallest box around it, as for
+particles of sediment. The end a is the one farther from the centre of mass, the slimmer one; -a is the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from boulder_sweep.errors import ScanError
+from boulder_sweep.stones.fitting import Profile, fitted, sides_of
+from boulder_sweep.stones.sections import Sections, doubled_share, sections_of
+
+if TYPE_CHECKING:
+    from boulder_sweep.stones.solid import Solid
+
+OF_STONE, OF_SCAN = "abc", "xyz"
+DIRECTIONS = tuple(f"{sign}{axis}" for axes in (OF_STONE, OF_SCAN) for axis in axes for sign in ("", "-"))
+"""Ends of a stone by name: of its own axes, and of the axes of the scan."""
+TILT_DEG = 10.0
+"""How far a stone is tilted to stand on a flat part near an end."""
+CANDIDATES = 8
+"""Parts of the surface near an end that are tried, the largest first."""
+RESTS_WITHIN = 0.02
+"""What is this near to the plane below the stone rests on it, as a share of the height."""
+FINE_HULL = 1500
+"""Faces of a convex hull up to which all are tried as sides of the box; beyond, one in every direction."""
+SECTIONS = 128
+"""Sections over the height to which a profile is fitted."""
+LEAST_FOOT = 0.5
+"""Least length and width of a foot as a share of those of the largest section: shorter ones count as rounded."""
+MOST_CUT = 0.25
+"""Largest part of the height that is cut off to get a foot."""
+CUT_STEP_M = 0.01
+NEARLY = 0.8
+"""Share of a foot that a section must have to be tried as one."""
+MOST_DOUBLED = 0.01
+"""Largest share of the volume that a surface may enclose twice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A stone on its foot, with one face to the road.
+
+    Attributes
+    ----------
+    up, facing : str
+        Which end is up, and which faces the vehicle: names of `DIRECTIONS`.
+    axes : ndarray, shape (3, 3)
+        Direction of travel, across it to the left, and up, in the axes of the scan.
+    stands : bool
+        Whether the stone stands by itself before it is cut, its centre of mass over what it rests on.
+    cut_m : float
+        What is cut off at the foot [m].
+    cut_share : float
+        The same as a share of the volume.
+    rests : float
+        Section of the uncut stone just above what it lies on, as a share of its largest section.
+    profile : Profile
+        The stone above the cut.
+    centre : tuple of float
+        Centre of mass of the cut stone: beyond the middle of the foot of the profile, and above the cut [m].
+    moment : float
+        Its moment of inertia about the axis across the travel through the centre, for 1 kg/m^3 [m^5].
+    volume : float
+        Volume of the cut stone [m^3].
+    outline : ndarray, shape (m, 3)
+        The stone as it is, cut or not: height above the foot, distances of its sides before and behind the middle of
+        the foot [m].
+    """
+
+    up: str
+    facing: str
+    axes: np.ndarray
+    stands: bool
+    cut_m: float
+    cut_share: float
+    rests: float
+    profile: Profile
+    centre: tuple[float, float]
+    moment: float
+    volume: float
+    outline: np.ndarray
+
+    @property
+    def has_foot(self) -> bool:
+        """Whether its foot is long and wide enough to count as flat."""
+        return has_foot(self.profile)
+
+
+def is_firm(profile: Profile) -> bool:
+    """Return whether a foot reaches far enough out before and behind the centre of mass."""
+    x = profile.centre[0]
+    reach = min(profile.near[0] + x, profile.far[0] - x)
+    return bool(reach >= 0.5 * LEAST_FOOT * profile.length.max() * (1.0 - 1e-9))
+
+
+def has_foot(profile: Profile) -> bool:
+    """Return whether the foot of a profile is long and wide enough to count as flat."""
+    sides = (profile.length, profile.width)
+    return all(side[0] >= LEAST_FOOT * side.max() * (1.0 - 1e-9) for side in sides)
+
+
+class Stone:
+    """A stone that can be set up.
+
+    Parameters
+    ----------
+    solid
+        The stone.
+    file
+        Its scan, for messages.
+
+    Raises
+    ------
+    ScanError
+        Its surface crosses itself.
+    """
+
+    def __init__(self, solid: Solid, file: str) -> None:
+        self.solid = solid
+        self._ups: dict[str, _Up] = {}
+        doubled = self._whole_doubled()
+        if doubled > MOST_DOUBLED:
+            raise ScanError(
+                f"{file}: the surface crosses itself: {doubled:.0%} of the stone lies inside it twice or inside out; "
+                "repair the scan first, for example in MeshLab"
+            )
+
+    @cached_property
+    def _box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Axes a, b and c as rows, and the sides of the box along them [m]."""
+        from trimesh.bounds import oriented_bounds
+
+        placing, extents = oriented_bounds(self._hull, angle_digits=6 if len(self._hull.faces) <= FINE_HULL else 1)
+        order = np.argsort(-np.round(extents, 9), kind="stable")
+        axes = np.asarray(placing)[:3, :3][order]
+        offset = np.asarray(placing)[:3, :3] @ self.solid.centre + np.asarray(placing)[:3, 3]
+        for k in range(2):
+            lean = -offset[order[k]]
+            if abs(lean) < 1e-6 * extents[order[k]]:
+                lean = axes[k][np.abs(axes[k]).argmax()]
+            axes[k] *= np.sign(lean) or 1.0
+        axes[2] = np.cross(axes[0], axes[1])
+        return axes, np.asarray(extents)[order]
+
+    @cached_property
+    def _hull(self) -> Any:
+        """The convex hull."""
+        import trimesh
+
+        return trimesh.Trimesh(self.solid.vertices, self.solid.faces, process=False).convex_hull
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Directions of a, b and c in the axes of the scan, shape (3, 3)."""
+        return self._box[0]
+
+    @property
+    def sides_m(self) -> np.ndarray:
+        """Sides a, b and c of the smallest box around the stone [m], shape (3,)."""
+        return self._box[1]
+
+    @property
+    def solidity(self) -> float:
+        """Volume over that of the smallest box."""
+        return self.solid.volume / float(np.prod(self.sides_m))
+
+    @property
+    def hull_share(self) -> float:
+        """Volume over that of the convex hull."""
+        return self.solid.volume / float(self._hull.volume)
+
+    def standings(self) -> Iterator[Standing]:
+        """Yield the 24 ways to stand: six ends up, four to the road."""
+        for up in DIRECTIONS[:6]:
+            for facing in DIRECTIONS[:6]:
+                if facing[-1] != up[-1]:
+                    yield self.standing(up, facing)
+
+    def standing(self, up: str, facing: str) -> Standing:
+        """Return the stone with one end up and another to the road.
+
+        With an end of its own axes up the stone may be tilted to a part of its surface on which it stands firmly; with
+        an axis of the scan up it stands as it was scanned.
+
+        Raises
+        ------
+        ScanError
+            Up or facing is no end, or they are ends of one axis, or of two kinds of axes.
+        """
+        for key, end in (("up", up), ("facing", facing)):
+            if end not in DIRECTIONS:
+                raise ScanError(f"{key}: '{end}' is no end of a stone; there are {', '.join(DIRECTIONS)}")
+        if up[-1] == facing[-1] or (up[-1] in OF_STONE) != (facing[-1] in OF_STONE):
+            kinds = "one of a, b, c or one of x, y, z each"
+            raise ScanError(f"up: {up} and facing: {facing} do not go together: give two different axes, {kinds}")
+        if up not in self._ups:
+            self._ups[up] = self._found(up)
+        found = self._ups[up]
+        frame, cut = found.frame, found.cut
+        # The frame is turned by quarters until x points away from the road.
+        towards = self._direction(facing) @ frame.T
+        quarters = next(k for k, (x, y) in enumerate(((-1, 0), (0, -1), (1, 0), (0, 1))) if _is_nearest(towards, x, y))
+        for _ in range(quarters):
+            frame = np.stack([frame[1], -frame[0], frame[2]])
+        sections, left = found.sections.turned(quarters), self._left(frame, cut)
+        profile = fitted(sections, cut, self._height(frame[2]), left.volume)
+        low, high = sections.low[:, 0], sections.high[:, 0]
+        foot = float(((self.solid.vertices - self.solid.centre) @ frame[2]).min())
+        return Standing(
+            up,
+            facing,
+            frame,
+            found.stands,
+            cut,
+            1.0 - left.volume / self.solid.volume,
+            found.rests,
+            profile,
+            (left.x - profile.foot_x, left.z - foot - cut),
+            left.moment,
+            left.volume,
+            np.stack([sections.height - cut, profile.foot_x - low, high - profile.foot_x], axis=1),
+        )
+
+    def _direction(self, end: str) -> np.ndarray:
+        """Return an end as a unit vector in the axes of the scan."""
+        axes, names = (self._box[0], OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
+        return (-1.0 if end[0] == "-" else 1.0) * axes[names.index(end[-1])]
+
+    def _found(self, up: str) -> _Up:
+        """Return the stone with one end up."""
+        frame, stands = self._steadiest(up)
+        height = self._height(frame[2])
+        places = (np.arange(SECTIONS) + 0.5) / SECTIONS
+        sections = sections_of(self.solid, frame, places * height)
+        rests = float(self._resting(frame).area[0] / sections.area.max())
+        return _Up(frame, sections, stands, min(rests, 1.0), self._cut(frame, sections))
+
+    def _height(self, upwards: np.ndarray) -> float:
+        return float(np.ptp(self._hull.vertices @ upwards))
+
+    def _resting(self, frame: np.ndarray) -> Sections:
+        """Return the one section just above what the stone lies on."""
+        return sections_of(self.solid, frame, np.array([RESTS_WITHIN * self._height(frame[2])]))
+
+    def _steadiest(self, up: str) -> tuple[np.ndarray, bool]:
+        """Return the axes in which the stone stands with one end up, and whether it does so without a cut.
+
+        Of the flat parts near the other end on which it stands, and of the end itself, the one is taken from whose
+        edges the centre of mass is farthest.
+        """
+        wanted = self._direction(up)
+        beside = next(end for end in (OF_STONE if up[-1] in OF_STONE else OF_SCAN) if end != up[-1])
+        parts = list(self._parts_below(wanted))
+        level = any(stands and normal @ wanted < -1.0 + 1e-9 for normal, stands in parts)
+        ways = [(wanted, level)]
+        if up[-1] in OF_STONE:
+            ways += islice(((-normal, True) for normal, stands in parts if stands), CANDIDATES)
+        frames = [_frame(upwards, self._direction(beside)) for upwards, _ in ways]
+        rooms = [min(found.high.min(), -found.low.max()) for found in map(self._resting, frames)]
+        best = int(np.argmax(np.round(rooms, 6)))
+        return frames[best], ways[best][1]
+
+    def _parts_below(self, upwards: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
+        """Yield the flat parts of the hull that look down, the largest first: normals, and whether it stands there."""
+        hull = self._hull
+        below = np.flatnonzero(hull.face_normals @ upwards < -np.cos(np.radians(TILT_DEG)))
+        if not len(below):
+            return
+        rounded = np.round(hull.face_normals[below], 6)
+        _, first, part = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        part = part.reshape(-1)
+        areas = np.bincount(part, hull.area_faces[below])
+        over = _over(self.solid.centre, hull.triangles[below], hull.face_normals[below])
+        stands = np.bincount(part, over) > 0.0
+        for k in np.argsort(-np.round(areas, 9), kind="stable"):
+            yield hull.face_normals[below[first[k]]], bool(stands[k])
+
+    def _whole_doubled(self) -> float:
+        """Return the share of the volume that the surface encloses twice."""
+        axes = self._box[0]
+        frames = (axes, axes[[1, 2, 0]], axes[[2, 0, 1]])
+        places = (np.arange(24) + 0.5) / 24
+        return max(doubled_share(self.solid, frame, places * self._height(frame[2])) for frame in frames)
+
+    def _cut(self, frame: np.ndarray, sections: Sections) -> float:
+        """Return the least cut in whole centimetres after which the stone stands firmly on a foot [m].
+
+        The foot must reach out from the centre of mass, on each of its four sides, by a quarter of the largest section.
+        Where no cut is enough, a foot that is half as long and wide as this will do; 0 where there is none either.
+        """
+        height = self._height(frame[2])
+        sides = np.stack(sides_of(sections), axis=1)
+        asked = LEAST_FOOT * sides.max(axis=0)
+        # A fit smooths the sections: those that are nearly large enough are looked at.
+        wide = (sides >= NEARLY * asked).all(axis=1)
+        firm = (sides - 2.0 * np.abs(sections.middle) >= NEARLY * asked).all(axis=1)
+        enough = None
+        for cut in np.arange(np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0) * CUT_STEP_M:
+            place = int(np.searchsorted(sections.height, cut))
+            if not (wide[place] if enough is None else firm[place]):
+                continue
+            left = self._left(frame, cut)
+            profiles = [fitted(sections.turned(k), cut, height, left.volume) for k in range(2)]
+            if all(map(has_foot, profiles)):
+                if all(map(is_firm, profiles)):
+                    return float(cut)
+                enough = float(cut) if enough is None else enough
+        return enough or 0.0
+
+    def _left(self, frame: np.ndarray, cut: float) -> _Left:
+        """Return what is left above a cut, in the axes of a frame whose origin is the centre of mass of the whole."""
+        solid = self.solid
+        moment = solid.moment(frame[1])
+        if cut == 0.0:
+            return _Left(solid.volume, 0.0, 0.0, moment)
+        foot = float(((solid.vertices - solid.centre) @ frame[2]).min())
+        nodes, weights = np.polynomial.legendre.leggauss(16)
+        below = sections_of(solid, frame, 0.5 * cut * (1.0 + nodes))
+        slices, height = 0.5 * cut * weights * below.area, below.height + foot
+        volume = solid.volume - float(slices.sum())
+        x, z = -float((slices * below.middle[:, 0]).sum()) / volume, -float((slices * height).sum()) / volume
+        lost = float((0.5 * cut * weights * below.second[:, 0] + slices * height**2).sum())
+        return _Left(volume, x, z, moment - lost - volume * (x**2 + z**2))
+
+
+class _Left(NamedTuple):
+    """What is left of a stone above a cut: volume, centre of mass, moment of inertia about y through it."""
+
+    volume: float
+    x: float
+    z: float
+    moment: float
+
+
+class _Up(NamedTuple):
+    """A stone with one end up, the first of its other axes in the direction of travel."""
+
+    frame: np.ndarray
+    sections: Sections
+    stands: bool
+    rests: float
+    cut: float
+
+
+def _frame(upwards: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Return right-handed axes, z upwards and x near another direction, shape (3, 3)."""
+    x = beside - (beside @ upwards) * upwards
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(upwards, x), upwards])
+
+
+def _is_nearest(towards: np.ndarray, x: int, y: int) -> bool:
+    """Return whether a direction is nearer to this one of the four quarters than to any other."""
+    return bool(x * towards[0] + y * towards[1] >= np.abs(towards[:2]).max() * (1.0 - 1e-12))
+
+
+def _over(centre: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return whether a point lies over each of n triangles, bool, shape (n,)."""
+    corner = triangles - centre
+    sides = np.einsum("ijk,ik->ij", np.cross(corner, np.roll(corner, -1, axis=1)), normals)
+    least = 1e-9 * np.abs(sides).max()
+    return (sides >= -least).all(axis=1) | (sides <= least).all(axis=1)

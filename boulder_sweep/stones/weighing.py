@@ -1,0 +1,149 @@
+"""What a scanned stone is: its mass and the figures that a file and a drawing ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from boulder_sweep.drawing import draw
+from boulder_sweep.stones.reading import read_scan
+from boulder_sweep.stones.solid import solid_of
+from boulder_sweep.stones.standing import Standing, Stone
+
+ROCK_KG_M3 = 2650.0
+"""Density that is assumed where none is known."""
+POINT = ("height_m", "width_m", "near_m", "far_m")
+"""Entries of a point of a profile."""
+USUAL_ROCK_KG_M3 = (2000.0, 3300.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ScannedStone:
+    """A stone from a scan, with its mass. Made by `scanned`.
+
+    Attributes
+    ----------
+    file, sha256 : str
+        The scan, and the hash of its content.
+    stone : Stone
+        The stone.
+    density_kg_m3 : float
+        Its density.
+    density_from : str
+        Where that comes from: ``mass``, ``density`` or ``assumed``.
+    """
+
+    file: str
+    sha256: str
+    stone: Stone
+    density_kg_m3: float
+    density_from: str
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of the whole stone, before anything is cut off."""
+        return self.density_kg_m3 * self.stone.solid.volume
+
+    @cached_property
+    def standings(self) -> tuple[Standing, ...]:
+        """The 24 ways to stand."""
+        return tuple(self.stone.standings())
+
+    @property
+    def cautions(self) -> list[str]:
+        """What makes one doubt the figures."""
+        low, high = USUAL_ROCK_KG_M3
+        found = []
+        if not low <= self.density_kg_m3 <= high:
+            found.append(
+                f"its density is {self.density_kg_m3:,.0f} kg/m³, and rock has {low:,.0f} to {high:,.0f}: the mass, "
+                "the scale of the scan or its unit is wrong"
+            )
+        return found
+
+    def plot(self, path: str | Path) -> None:
+        """Draw the stone with each of its six ends up, from the side and to scale, with its profile.
+
+        Raises
+        ------
+        PictureError
+            It cannot be drawn.
+        """
+        draw("stone", "draw_stone", self, path)
+
+    def to_dict(self, standings: Sequence[Standing] | None = None) -> dict[str, Any]:
+        """Return everything as plain data, with some ways to stand; with all of them by default."""
+        stone, solid = self.stone, self.stone.solid
+        axes = stone.axes
+        return {
+            "file": self.file,
+            "sha256": self.sha256,
+            "faces": len(solid.faces),
+            "repairs": list(solid.repairs),
+            "closed_share": solid.closed,
+            "volume_m3": solid.volume,
+            "mass_kg": self.mass_kg,
+            "density_kg_m3": self.density_kg_m3,
+            "density_from": self.density_from,
+            "sides_m": stone.sides_m.tolist(),
+            "axes": axes.tolist(),
+            "solidity": stone.solidity,
+            "hull_share": stone.hull_share,
+            "centre_m": solid.centre.tolist(),
+            "inertia_kg_m2": (self.density_kg_m3 * axes @ solid.inertia @ axes.T).tolist(),
+            "standings": [self._standing(own) for own in (self.standings if standings is None else standings)],
+        }
+
+    def _standing(self, own: Standing) -> dict[str, Any]:
+        """Return one way to stand as plain data."""
+        profile = own.profile
+        points = zip(profile.height, profile.width, profile.near, profile.far, strict=True)
+        return {
+            "up": own.up,
+            "facing": own.facing,
+            "stands": own.stands,
+            "cut_m": own.cut_m,
+            "cut_share": own.cut_share,
+            "rests_share": own.rests,
+            "has_foot": own.has_foot,
+            "mass_kg": self.density_kg_m3 * own.volume,
+            "centre_m": list(own.centre),
+            "moment_kg_m2": self.density_kg_m3 * own.moment,
+            "profile_error_m": profile.error,
+            "profile_moment_kg_m2": self.density_kg_m3 * profile.moment,
+            "profile": [dict(zip(POINT, map(float, point), strict=True)) for point in points],
+        }
+
+
+def scanned(
+    path: str | Path, *, metres: float = 1.0, mass_kg: float | None = None, density_kg_m3: float | None = None
+) -> ScannedStone:
+    """Read and weigh a stone.
+
+    Parameters
+    ----------
+    path
+        PLY, STL, OBJ or GLB file.
+    metres
+        Length of its unit [m].
+    mass_kg
+        Mass of the whole stone, from which its density follows.
+    density_kg_m3
+        Its density, where no mass is given; that of `ROCK_KG_M3` where neither is.
+
+    Raises
+    ------
+    ScanError
+        The scan cannot be used.
+    """
+    scan = read_scan(path, metres)
+    solid = solid_of(scan)
+    stone = Stone(solid, scan.file)
+    if mass_kg is not None:
+        return ScannedStone(scan.file, scan.sha256, stone, mass_kg / solid.volume, "mass")
+    if density_kg_m3 is not None:
+        return ScannedStone(scan.file, scan.sha256, stone, density_kg_m3, "density")
+    return ScannedStone(scan.file, scan.sha256, stone, ROCK_KG_M3, "assumed")

@@ -1,0 +1,84 @@
+"""A scanned stone from the side, to scale: as it is, and as the profile that is computed with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boulder_sweep.views.figures import BLACK, BLUE, GREY, caption, figure, headline
+from boulder_sweep.views.scene import STYLES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from boulder_sweep.stones.standing import Standing
+    from boulder_sweep.stones.weighing import ScannedStone
+
+PANEL_IN = 3.1
+ROOM_M = 0.25
+"""Around the largest stone of a picture."""
+
+
+def draw_stone(found: ScannedStone, path: str | Path) -> None:
+    """Draw a stone with each of its six ends up.
+
+    Parameters
+    ----------
+    found
+        The stone.
+    path
+        Picture to write.
+
+    Raises
+    ------
+    PictureError
+        The picture cannot be written.
+    """
+    shown = [
+        next(own for own in found.standings if own.up == up) for up in dict.fromkeys(s.up for s in found.standings)
+    ]
+    with figure(path, 3 * PANEL_IN, 2 * PANEL_IN + 0.9) as fig:
+        panels = list(fig.subplots(2, 3).flat)
+        _same_scale(panels, shown)
+        for axes, own in zip(panels, shown, strict=True):
+            draw_standing(axes, own)
+            foot = f"cut {own.cut_m:.2f} m" if own.cut_m else "no cut"
+            axes.set_title(f"{own.up} up, {own.facing} to the vehicle: {foot if own.has_foot else 'rounded foot'}")
+        headline(fig, f"{found.file}: {found.mass_kg / 1e3:.3g} t")
+        caption(
+            fig,
+            "From the side, the vehicle coming from the left. Grey: the stone as scanned, dashed what is cut off; "
+            "blue: the profile, whose sections are rectangles of the same area. Dot: centre of mass. Metres.",
+        )
+
+
+def draw_standing(axes: Axes, own: Standing, ground_m: float = 0.0) -> None:
+    """Draw one stone; the ground is at this height over its foot [m]."""
+    from matplotlib.patches import Polygon
+
+    style = STYLES["boulder"]
+    height, near, far = own.outline.T
+    outline = np.concatenate([np.stack([-near, height], axis=1), np.stack([far, height], axis=1)[::-1]])
+    axes.add_patch(Polygon(outline - (0.0, ground_m), facecolor="none", edgecolor=style.line, linestyle="--", lw=0.9))
+    above = outline[outline[:, 1] >= 0.0] - (0.0, ground_m)
+    axes.add_patch(Polygon(above, facecolor=style.fill, edgecolor=style.line, linewidth=1.0))
+    profile = own.profile
+    sides = [np.stack([side, profile.height - ground_m], axis=1) for side in (-profile.near, profile.far)]
+    axes.add_patch(Polygon(np.concatenate([sides[0], sides[1][::-1]]), facecolor="none", edgecolor=BLUE, linewidth=1.6))
+    axes.plot(own.centre[0], own.centre[1] - ground_m, "o", color=BLACK, markersize=4.0)
+
+
+def _same_scale(panels: Sequence[Axes], shown: Sequence[Standing]) -> None:
+    """Give all panels one scale, with room for the largest stone."""
+    left = max(float(own.outline[:, 1].max()) for own in shown) + ROOM_M
+    right = max(float(own.outline[:, 2].max()) for own in shown) + ROOM_M
+    low = min(float(own.outline[:, 0].min()) for own in shown) - ROOM_M
+    high = max(float(own.outline[:, 0].max()) for own in shown) + ROOM_M
+    for axes in panels:
+        axes.set_xlim(-left, right)
+        axes.set_ylim(low, high)
+        axes.set_aspect("equal")
+        axes.tick_params(colors=GREY, labelsize=7.5)

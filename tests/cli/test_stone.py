@@ -1,0 +1,145 @@
+"""``sweep stone``: what a scan says, as lines, as an object and as a picture; what is refused."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from boulder_sweep.stones.weighing import scanned
+from tests.stones.shapes import box, frustum, sphere, written
+
+ROCK = Path(__file__).parents[2] / "docs" / "examples" / "rock.ply"
+
+
+@pytest.fixture
+def block(tmp_path, monkeypatch):
+    """Work in an empty folder with the scan of a block of 1.2 by 1.6 by 2.5 m."""
+    monkeypatch.chdir(tmp_path)
+    return written(box(1.2, 1.6, 2.5), Path("block.ply"))
+
+
+def test_a_block(sweep, block):
+    code, out, err = sweep("stone", block, "--mass", "12.48 t")
+    assert (code, err) == (0, "")
+    assert "block.ply: 12 faces, closed as it is" in out
+    assert "volume      4.800 m³" in out
+    assert "mass        12.48 t as given, 2,600 kg/m³" in out
+    assert "sides       a 2.50, b 1.60, c 1.20 m" in out
+    assert "solidity    1.00 of that box, 1.00 of the convex hull" in out
+    assert "inertia     4.16, 8.00, 9.16 t·m² about a, b, c" in out
+    assert re.search(r"^ a +±b +2\.50 +1\.60 +1\.20 +1\.60 × 1\.20 +0\.00 +0\.0% +100% +0\.000$", out, re.MULTILINE)
+    assert len(re.findall(r"^ ?-?[abc] +±[abc] ", out, re.MULTILINE)) == 12
+    assert "rounded" not in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_what_was_repaired(sweep, block):
+    points, faces = box(1.2, 1.6, 2.5)
+    below = (points[faces][:, :, 2] < 0.0).all(axis=1)
+    written((points, faces[~below, ::-1]), Path("open.ply"))
+    code, out, _ = sweep("stone", "open.ply")
+    assert code == 0
+    assert out.splitlines()[0] == "open.ply: 14 faces"
+    assert re.search(r"^  repaired    1 hole closed, 11 % of the surface, over \d+ % of the volume$", out, re.MULTILINE)
+    assert "  repaired    its inside was outside; turned\n" in out
+    assert "volume      4.800 m³" in out
+
+
+def test_without_a_mass_its_density_is_assumed(sweep, block):
+    _, out, err = sweep("stone", block)
+    assert "mass        12.72 t, if its density is 2,650 kg/m³; weigh it and give --mass" in out
+    assert err == ""
+
+
+def test_a_mass_that_no_rock_has(sweep, block):
+    code, _, err = sweep("stone", block, "--mass", "30 t")
+    assert code == 0
+    assert err.startswith("caution: its density is 6,250 kg/m³, and rock has 2,000 to 3,300: the mass, the scale of")
+
+
+def test_units_of_the_scan(sweep, block):
+    metres = sweep("stone", block)[1]
+    points, faces = box(1200.0, 1600.0, 2500.0)
+    written((points, faces), Path("block.ply"))
+    code, _, err = sweep("stone", block)
+    assert code == 2
+    assert err.startswith("error: block.ply: its largest side is 2500 m; ")
+    assert sweep("stone", block, "--unit", "mm")[1] == metres
+
+
+def test_a_block_of_settings(sweep, block):
+    written(frustum(1.0, 0.5, 2.0, sides=400), Path("cone.stl"))
+    _, out, _ = sweep("stone", "cone.stl", "--mass", "9.6 t", "--up", "z", "--facing", "x")
+    _, head, text = out.partition("# cone.stl: z up, x to the vehicle")
+    assert head
+    found = YAML(typ="safe").load(text)
+    side = np.sqrt(np.pi)
+    assert found["boulder"]["mass"] == "9.600 t"
+    assert found["boulder"]["profile"] == [
+        {"height": "0.000 m", "width": f"{side:.3f} m", "near": f"{side / 2:.3f} m", "far": f"{side / 2:.3f} m"},
+        {"height": "2.000 m", "width": f"{side / 2:.3f} m", "near": f"{side / 4:.3f} m", "far": f"{side / 4:.3f} m"},
+    ]
+    assert "foot" not in found["boulder"]
+
+
+def test_a_block_of_settings_says_what_is_cut_off(sweep, block):
+    written(sphere(1.0, 4), Path("ball.obj"))
+    _, out, _ = sweep("stone", "ball.obj", "--mass", "11 t", "--up", "a", "--facing", "-b")
+    cut = re.search(r"# ball.obj: a up, -b to the vehicle, (.*) m cut off for a foot\nboulder:\n  mass: (.*) t\n", out)
+    assert float(cut[1]) == pytest.approx(1.0 - np.sqrt(0.75), abs=0.011)
+    cap = 0.25 * float(cut[1]) ** 2 * (3.0 - float(cut[1]))
+    assert float(cut[2]) == pytest.approx(11.0 * (1.0 - cap), abs=0.02)
+
+
+def test_a_foot_that_is_rounded(sweep, block):
+    written(frustum(0.02, 1.0, 3.0), Path("cone.stl"))
+    _, out, _ = sweep("stone", "cone.stl", "--up", "z", "--facing", "x")
+    assert out.rstrip().endswith("  foot: rounded")
+    _, out, _ = sweep("stone", "cone.stl")
+    assert "rounded: no cut of a quarter of the height makes a foot; bed it in concrete" in out
+
+
+def test_as_one_object(sweep, block):
+    code, out, _ = sweep("stone", ROCK, "--mass", "24 t", "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert found["mass_kg"] == pytest.approx(24000.0)
+    assert found["sha256"] == scanned(ROCK).sha256
+    assert len(found["standings"]) == 24
+    one = json.loads(sweep("stone", ROCK, "--mass", "24 t", "--json", "--up", "-a", "--facing", "c")[1])
+    assert one["standings"] == [own for own in found["standings"] if (own["up"], own["facing"]) == ("-a", "c")]
+    assert one["standings"][0]["profile"][0]["height_m"] == 0.0
+
+
+def test_the_same_scan_gives_the_same_text(sweep, block):
+    assert sweep("stone", ROCK, "--json")[1] == sweep("stone", ROCK, "--json")[1]
+
+
+def test_a_picture(sweep, block):
+    assert sweep("stone", ROCK, "--plot", "rock.png")[0] == 0
+    assert Path("rock.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["none.ply"], "error: none.ply: there is no such file"),
+        (["block.ply", "--up", "a"], "--up and --facing belong together"),
+        (["block.ply", "--up", "a", "--facing", "-a"], "error: up: a and facing: -a do not go together"),
+        (["block.ply", "--up", "top", "--facing", "a"], "error: up: 'top' is no end of a stone"),
+        (["block.ply", "--mass", "18.2"], "--mass '18.2': write the unit too"),
+        (["block.ply", "--mass", "18.2 m"], "--mass"),
+        (["block.ply", "--mass", "-1 t"], "must be positive"),
+        (["block.ply", "--unit", "kg"], "--unit"),
+        (["block.ply", "--plot", "rock.doc"], "the name of a picture must end in"),
+        (["block.txt"], "is not a scan that can be read"),
+    ],
+)
+def test_what_is_refused(sweep, block, words, message):
+    code, out, err = sweep("stone", *words)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert "Traceback" not in err
