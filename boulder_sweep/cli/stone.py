@@ -121,6 +121,7 @@ def settings_lines(found: ScannedStone, own: Standing) -> list[str]:
         f"# {found.file}: {own.up} up, {own.facing} to the vehicle{cut}",
         "boulder:",
         f"  mass: {found.density_kg_m3 * own.volume / 1e3:.3f} t",
+        *([f"  density: {found.density_kg_m3:.0f} kg/m^3"] if found.density_from != "assumed" else []),
         "  profile:",
         *(f"    - {{height: {z:.3f} m, width: {w:.3f} m, near: {n:.3f} m, far: {f:.3f} m}}" for z, w, n, f in points),
         *([] if own.has_foot else ["  foot: rounded"]),

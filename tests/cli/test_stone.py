@@ -85,6 +85,26 @@ def test_a_block_of_settings(sweep, block):
     assert "foot" not in found["boulder"]
 
 
+SITE = """
+site: {embedment_depth: 2.3 m}
+soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 25 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+@pytest.mark.parametrize(("mass", "solidity"), [(("--mass", "23.5 t"), 0.812), ((), 0.812)])
+def test_a_block_of_settings_is_taken_by_the_other_commands(sweep, tmp_path, mass, solidity):
+    """From a scan to the deepest rotation of the stone, with the stone drawn: it leans, and is weighed or not."""
+    _, out, _ = sweep("stone", ROCK, *mass, "--up", "a", "--facing", "b")
+    file = tmp_path / "stone.yaml"
+    file.write_text(out[out.index("# rock.ply") :] + SITE, encoding="utf-8")
+    assert sweep("check", file)[0] == 0
+    code, out, _ = sweep("simulate", file, "--json")
+    row = json.loads(out)
+    assert (code, row["verdict"], row["robustness"]) == (0, "pass", "open")
+    assert row["solidity"] == pytest.approx(solidity, abs=0.01)
+
+
 def test_a_block_of_settings_says_what_is_cut_off(sweep, block):
     written(sphere(1.0, 4), Path("ball.obj"))
     _, out, _ = sweep("stone", "ball.obj", "--mass", "11 t", "--up", "a", "--facing", "-b")
