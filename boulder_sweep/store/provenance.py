@@ -37,7 +37,7 @@ _DECIDING_SOURCES = (
     "elementary.py",
     "soils.py",
     "judge/*.py",
-    *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "notes")),
+    *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "notes", "shape")),
 )
 """Modules, in addition to the kernels, whose code determines the rows: of the settings those that the others import."""
 

@@ -73,6 +73,21 @@ def test_simple_bodies():
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("layered", [False, True])
+def test_pieces_are_sums_of_many_elements(shape, layered):
+    """To what a thousand of them can tell; boundaries of layers lie between two."""
+    design, layers = (design_of(LAYERED), layers_of(LAYERED)) if layered else (RWG, None)
+    outline = SHAPES[shape](design)
+    pieces, sums = (constants(design, outline, elements, layers=layers) for elements in (0, 1000))
+    assert (pieces.m_eff, pieces.J_eff) == pytest.approx((sums.m_eff, sums.J_eff), rel=1e-5)
+    rng = np.random.default_rng(4)
+    states = [lines(random_state(rng), pieces) for _ in range(8)]
+    known, found = (np.array([reactions(k, c) for k in states]) for c in (sums, pieces))
+    assert np.abs((found - known) / np.abs(known).max(axis=0)).max() < 1e-4
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("layered", [False, True])
 def test_pieces_are_the_limit_of_elements(shape, layered):
     """Of second order in their number, and to 1e-8 at 50 000.
 
