@@ -17,6 +17,8 @@ from boulder_sweep.views.figures import VERDICTS
 
 COLOURS = {**VERDICTS, "none": "#BBBBBB"}
 """Colours of verdicts, those of `sweep plot`."""
+HATCHES = {"sensitive": "/", "open": "."}
+"""Patterns of passes that are not robust, by their grade."""
 LINES = ("#1E88C9", "#D55E00", "#009E73")
 PLASTIC_WORK = "soil_plastic"
 PARTS = {
@@ -94,24 +96,31 @@ def curves(panel: str, parts: Sequence[str]) -> list[figure]:
 def verdict_map(panel: str) -> figure:
     """Return a map of verdicts: rectangles over two inputs, which can be chosen."""
     ends = {end: [0.0] for end in ("left", "right", "bottom", "top")}
-    cells = ColumnDataSource({**ends, "colour": ["white"], "hatch": [" "]}, name=f"{panel}-cells")
+    cells = ColumnDataSource({**ends, "colour": ["white"]}, name=f"{panel}-cells")
     plot = _plot(panel, "map", [("", "@verdict"), ("across", "@across{0.000a}"), ("up", "@up{0.000a}")], height=420)
     drawn = plot.quad(
-        left="left",
-        right="right",
-        bottom="bottom",
-        top="top",
+        **{end: end for end in ends},
         source=cells,
         fill_color="colour",
         line_color="colour",
         line_width=0.5,
-        hatch_pattern="hatch",
-        hatch_color="white",
-        hatch_scale=8,
         nonselection_fill_alpha=1.0,
         nonselection_line_alpha=1.0,
         selection_line_color="black",
     )
+    # One glyph for each pattern: Bokeh makes canvases for every rectangle where patterns differ within a glyph.
+    for grade, pattern in HATCHES.items():
+        hatched = ColumnDataSource({end: [] for end in ends}, name=f"{panel}-{grade}")
+        plot.quad(
+            **{end: end for end in ends},
+            source=hatched,
+            fill_color=None,
+            line_color=None,
+            hatch_pattern=pattern,
+            hatch_color="white",
+            hatch_scale=8,
+        )
+    plot.hover.renderers = [drawn]
     plot.add_tools(TapTool(renderers=[drawn]))
     here = ColumnDataSource({"x": [0.0], "y": [0.0]}, name=f"{panel}-here")
     plot.scatter("x", "y", source=here, marker="cross", size=18, line_width=3, line_color="white", level="overlay")

@@ -22,8 +22,8 @@ from docs.studies.wild import wild_table
 from docs.studies.wording import balance_words, caution_text, convergence_words, fit_text, readings_words
 
 GRID = Path("configs/m30_sizing.yaml")
-EVERY = 7
-"""Every so many-th design of the grid is in the readings study; 7 divides the length of none of its axes."""
+EVERY = 29
+"""Every so many-th design of the grid is in the readings study; 29 divides the length of none of its axes."""
 
 
 def compute(root: Path, names: Iterable[str] | None = None) -> dict[str, str]:
@@ -298,3 +298,10 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "stone-settings": stones.settings_of_example,
 }
 """Function of every block by its name."""
+
+LONG = {
+    *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
+    *(name for name in CONTENTS if name.startswith("forms-")),
+    *("wild-families", "uncertainty-cases", "moves", "partial-factors"),
+}
+"""Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""

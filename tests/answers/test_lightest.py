@@ -181,6 +181,7 @@ def shallow_bounds(rng: np.random.Generator) -> dict[str, str]:
     return changes | {"site": f"embedment_ratio: {ratios}", "height": height, "subgrade": subgrade}
 
 
+@pytest.mark.nightly
 def test_no_boulder_around_one_that_slides_is_lighter() -> None:
     """The lattice alone ended 363 kg too heavy."""
     sides = {"length": "[0.94, 2.0] m", "width": "[1.16, 2.27] m", "height": "[1.4, 2.91] m"}

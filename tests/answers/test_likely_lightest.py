@@ -50,6 +50,7 @@ def test_the_answer_passes_often_enough_and_lighter_ones_do_not(found):
             assert chance_of(width, height).p_pass < 0.9
 
 
+@pytest.mark.nightly
 def test_more_certainty_needs_more_mass(found):
     surer = need(read(TEXT), "mass", probability=0.97).frame.iloc[0]
     assert surer.boulder_mass_kg > 1.01 * found.frame.boulder_mass_kg[0]

@@ -30,6 +30,12 @@ def passes(frame: pd.DataFrame, **inputs: np.ndarray) -> np.ndarray:
     return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS
 
 
+@pytest.fixture(scope="module")
+def reserves_of_many() -> pd.DataFrame:
+    """What random designs withstand."""
+    return reserves(random_designs(240)).frame
+
+
 def with_constants(sweep: Sweep, **values: float) -> Sweep:
     return dataclasses.replace(sweep, constants=sweep.constants | values)
 
@@ -42,8 +48,10 @@ def with_constants(sweep: Sweep, **values: float) -> Sweep:
         ("withstands_friction_angle_deg", "friction_angle_deg", -0.01),
     ],
 )
-def test_a_design_passes_at_what_it_withstands_and_not_beyond(column: str, own: str, worse: float) -> None:
-    frame = reserves(random_designs(400)).frame
+def test_a_design_passes_at_what_it_withstands_and_not_beyond(
+    reserves_of_many: pd.DataFrame, column: str, own: str, worse: float
+) -> None:
+    frame = reserves_of_many
     ends = [getattr(reserve, end) for reserve in RESERVES if reserve.column == column for end in ("best", "worst")]
     there = frame[frame[column].notna()]
     assert len(there) > 100

@@ -44,7 +44,15 @@ def problems() -> dict[str, bk.Problem]:
     }
 
 
-@pytest.mark.parametrize("kind", problems())
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "uniform",
+        "second spring",
+        "layers",
+        *(pytest.param(one, marks=pytest.mark.nightly) for one in ("elements", "plastic")),
+    ],
+)
 def test_the_bits_are_those_of_numba(kind: str) -> None:
     """Of one impact, whatever its soil and vehicle, maxima, times and status."""
     ahead = _ahead.call(simulate, (problems()[kind], READINGS, HOW, bk.no_record()))

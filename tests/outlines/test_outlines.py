@@ -161,7 +161,7 @@ def test_the_weight_of_a_crooked_boulder_turns_about_the_ends_of_its_foot():
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_whole_impacts_are_those_of_the_oracle(shape):
-    elements = 300
+    elements = 60
     outline = SHAPES[shape](RWG)
     known = outlined_oracle.simulate(stone_of(outline), oracle.RWG, 0.45, elements)
     assert known.imbalance < 1e-7

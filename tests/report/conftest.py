@@ -64,9 +64,10 @@ def report(result):
 class Opened:
     """A page that was opened from disk, and what it said and asked for meanwhile."""
 
-    def __init__(self, browser, file, **options):
+    def __init__(self, browser, file, before="", **options):
         self.context = browser.new_context(accept_downloads=True, **options)
         self.tab = self.context.new_page()
+        self.tab.add_init_script(before)
         self.tab.set_default_timeout(1000 * HANG_GUARD_S)  # hang guard
         self.complaints, self.requests, self.dialogs = [], [], []
         self.tab.on("console", lambda message: self._heard(message))

@@ -8,7 +8,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.report import write_explorer
 from boulder_sweep.settings.problems import SettingsError
-from tests.report.conftest import LIST, SITE, reported
+from tests.report.conftest import GRID, LIST, SITE, reported
 from tests.soils.test_ground import IN_FILE
 
 STRIP = SITE.replace("height: 3.4 m", "height: {from: 1.8 m, to: 3.6 m, count: 19}")
@@ -94,6 +94,31 @@ REFUSED = (
     ("embedment_depth_m", "", "site.embedment_depth", "''"),
     ("strain_rate_factor", "", "soil.strain_rate_factor", "''"),
 )
+
+
+COUNT_CANVASES = """
+window.canvases = 0;
+const usual = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (...words) {
+  window.canvases += 1;
+  return usual.apply(this, words);
+};
+"""
+
+
+def test_passes_that_are_not_robust_are_hatched(tmp_path, opened, chromium):
+    text = GRID.replace("[1.5, 1.9]", "1.9").replace("[36, 40]", "40")
+    page = opened(reported(f"{text}model: {{second_opinion: width_capped}}\n", tmp_path), before=COUNT_CANVASES)
+    grades = boulder_sweep.read(tmp_path / "site.sweep").robustness.value_counts()
+    sizes = page.evaluate(
+        "['cells', 'sensitive', 'open'].map((one) => page.plots.find(`sweep-${one}`).data.left.length)"
+    )
+    assert sizes == [63, grades["sensitive"], grades["open"]]
+    assert min(sizes) > 3
+    assert page.evaluate("[...document.querySelectorAll('.legend i.sensitive, .legend i.open')].length") == 2
+    # Bokeh made twenty for each rectangle, and a page took seven seconds to open.
+    assert page.evaluate("window.canvases") < 5000
+    assert page.complaints == []
 
 
 @pytest.fixture(scope="module")

@@ -26,8 +26,8 @@ const STRIP = 0.5;
 /** Verdicts, from the best to the worst that a rectangle can show for designs that lie on each other. */
 const WORSE = ["pass", "not computed yet", "undecided", "error", "fail"];
 
-/** Patterns of passes that are not robust. @type {Record<string, string>} */
-const HATCHES = { "pass: sensitive": "/", "pass: open": "." };
+/** Sources of the hatched rectangles: passes that are not robust. @type {Record<string, string>} */
+const HATCHES = { "pass: sensitive": "sensitive", "pass: open": "open" };
 
 /** @param {string} name verdict and reason, or grade @returns {boolean} */
 function isPass(name) {
@@ -77,13 +77,19 @@ function drawCells(plots, panel, cells, labels, shownUnits, units, colours, here
   const [xs, ys] = [steps(cells.map((cell) => cell.x)), steps(cells.map((cell) => cell.y))];
   /** @param {Map<number, number[]>} map @param {number} value @param {number} end */
   const limit = (map, value, end) => /** @type {number[]} */ (map.get(value))[end];
+  /** @param {Cell[]} some */
+  const places = (some) => ({
+    left: some.map((cell) => limit(xs, cell.x, 0) / sx),
+    right: some.map((cell) => limit(xs, cell.x, 1) / sx),
+    bottom: some.map((cell) => limit(ys, cell.y, 0) / sy),
+    top: some.map((cell) => limit(ys, cell.y, 1) / sy),
+  });
+  for (const [name, hatched] of Object.entries(HATCHES)) {
+    plots.fill(`${panel}-${hatched}`, places(cells.filter((cell) => cell.name === name)));
+  }
   plots.fill(`${panel}-cells`, {
-    left: cells.map((cell) => limit(xs, cell.x, 0) / sx),
-    right: cells.map((cell) => limit(xs, cell.x, 1) / sx),
-    bottom: cells.map((cell) => limit(ys, cell.y, 0) / sy),
-    top: cells.map((cell) => limit(ys, cell.y, 1) / sy),
+    ...places(cells),
     colour: cells.map((cell) => colourOf(cell.name, colours)),
-    hatch: cells.map((cell) => HATCHES[cell.name] ?? " "),
     verdict: cells.map(wordsOf),
     across: cells.map((cell) => cell.x / sx),
     up: cells.map((cell) => cell.y / sy),

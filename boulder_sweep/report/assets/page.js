@@ -248,7 +248,7 @@ class Page {
         const item = element("li", "");
         const box = document.createElement("i");
         box.style.backgroundColor = colourOf(name, this.data.colours);
-        if (name in HATCHES) box.classList.add("hatched");
+        if (name in HATCHES) box.classList.add(HATCHES[name]);
         item.append(box, `${name.replaceAll("_", " ")} (${count.toLocaleString("en-US")})`);
         return item;
       }),
