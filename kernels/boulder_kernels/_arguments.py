@@ -10,7 +10,12 @@ from typing import Any
 
 import numpy as np
 
-KINDS = {np.dtype(np.float64): "f8", np.dtype(np.int64): "i8", np.dtype(np.int8): "i1", np.dtype(np.bool_): "b1"}
+KINDS: dict[np.dtype[Any], str] = {
+    np.dtype(np.float64): "f8",
+    np.dtype(np.int64): "i8",
+    np.dtype(np.int8): "i1",
+    np.dtype(np.bool_): "b1",
+}
 """Numbers that an array may hold."""
 REAL, WHOLE, TRUTH, NOTHING = "f", "i", "b", "n"
 _SCALARS = {float: REAL, np.float64: REAL, int: WHOLE, np.int64: WHOLE, bool: TRUTH, np.bool_: TRUTH}
@@ -68,7 +73,7 @@ _SIMPLE = {REAL: 0.0, WHOLE: 0, TRUTH: False, NOTHING: None}
 
 def _empty(code: str) -> np.ndarray:
     """Return an array without numbers, by the code of what it may hold and its number of dimensions."""
-    return np.empty((0,) * int(code[2:]), {code: kind for kind, code in KINDS.items()}[code[:2]])
+    return np.empty((0,) * int(code[2:]), next(kind for kind, name in KINDS.items() if name == code[:2]))
 
 
 @functools.cache

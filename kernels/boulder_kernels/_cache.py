@@ -127,7 +127,7 @@ LEVELS = {
     "x86-64-v3": _V3,
     "aarch64": {"aarch64"},
 }
-"""Targets that a wheel may carry libraries for, the fastest first, and the architecture and features that each needs."""
+"""Targets that a wheel may carry libraries for, the fastest first, and the architecture and features each needs."""
 SHIPPED = Path(__file__).with_name("compiled")
 """Folder of such libraries: for each target a folder with the hash of the sources that they were compiled from."""
 SOURCES = "sources"
