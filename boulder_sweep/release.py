@@ -9,13 +9,14 @@ of the last ten years.
 
 from __future__ import annotations
 
-import importlib
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
 from boulder_kernels import _ahead, source_hash
@@ -75,8 +76,10 @@ def compile_recorded(recorded: Path, target: Path) -> None:
     target.mkdir(parents=True)
     for file in sorted(recorded.glob(f"*{_ahead.RETURNS}")):
         module, kernel, _ = file.stem.rsplit("-", 2)
-        wanted = getattr(importlib.import_module(f"boulder_kernels.{module}"), kernel)
+        wanted = getattr(import_module(f"boulder_kernels.{module}"), kernel)
         types = _ahead.described(file)["types"]
+        for of_record in re.findall(r"([\w.]+):", types):
+            import_module(of_record)
         code, library, kept = wanted.compiler.compiled_ahead(wanted, examples(types), types)
         if library is None:
             raise RuntimeError(f"{module}.{kernel} cannot be linked by {os.environ.get('CC', 'cc')}")

@@ -1,19 +1,71 @@
-"""What a repository carries beside its code: the version is stated once, and what repeats it agrees."""
+"""What a repository carries beside its code: version and URLs are stated once, and what repeats them agrees."""
 
 from __future__ import annotations
 
+import json
+import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
+import pytest
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+SOURCE = PROJECT["urls"]["Source"]
 
 
 def test_the_citation_has_the_version_and_licence_of_the_package() -> None:
     citation = YAML(typ="safe").load(ROOT / "CITATION.cff")
     assert (citation["version"], citation["license"]) == (PROJECT["version"], PROJECT["license"])
+
+
+def test_the_changelog_begins_with_the_version_of_the_package() -> None:
+    """Behind what is not released yet, if there is any."""
+    versions = re.findall(r"^## \[(.*?)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert next(version for version in versions if version != "Unreleased") == PROJECT["version"]
+
+
+def test_urls_of_the_project_stand_in_one_file() -> None:
+    """A new home of the project is one edit."""
+    files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    found = [name for name in files.split("\0")[:-1] if SOURCE.encode() in (ROOT / name).read_bytes()]
+    assert found == ["pyproject.toml"]
+
+
+@pytest.fixture(scope="module")
+def built() -> dict[str, Any]:
+    """Metadata of the package as a build writes them."""
+    command = [sys.executable, "-m", "hatchling", "metadata"]
+    metadata: dict[str, Any] = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout)
+    return metadata
+
+
+def test_a_package_index_can_follow_the_links_of_the_readme(built: dict[str, Any]) -> None:
+    """To files of the version; each of them is there, and the rest of the text is that of the README."""
+    readme, version = built["readme"]["text"], PROJECT["version"]
+    links = re.findall(r"\]\(([^)]+)\)", readme)
+    ours = {link.removeprefix(f"{SOURCE}/") for link in links if link.startswith(SOURCE)}
+    assert [link for link in links if not link.startswith(("https://", "#"))] == []
+    for link in ours:
+        kind, tag, path = link.split("/", 2)
+        file = path.partition("#")[0]
+        assert (kind, tag) == ("raw" if file.endswith(".png") else "blob", f"v{version}")
+        assert (ROOT / file).is_file(), path
+    plain = re.sub(rf"{SOURCE}/(raw|blob)/v{version}/", "", readme)
+    assert plain == (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(ours) > 20
+
+
+def test_classifiers_name_the_versions_of_python(built: dict[str, Any]) -> None:
+    """From the oldest one that is admitted, without a gap."""
+    named = re.findall(r"Python :: 3\.(\d+)", "\n".join(PROJECT["classifiers"]))
+    oldest = int(built["requires-python"].removeprefix(">=3."))
+    assert [int(minor) for minor in named] == list(range(oldest, oldest + len(named)))
+    assert len(named) > 1
 
 
 def test_pre_commit_runs_the_tools_of_the_lock() -> None:

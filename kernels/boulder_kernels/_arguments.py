@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import re
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -54,7 +54,10 @@ def flatten(value: Any, reals: list[float], wholes: list[int], arrays: list[np.n
 
 
 def examples(types: str) -> tuple[Any, ...]:
-    """Return arguments of the types that `flatten` has given as text, with commas between them; arrays are empty."""
+    """Return arguments of the types that `flatten` has given as text, with commas between them; arrays are empty.
+
+    The modules of records must have been imported.
+    """
     values: list[tuple[Any, list[Any]]] = [(tuple, [])]  # what makes each record that is not closed yet, and its fields
     for name, end in re.findall(r"([^(),]*)([(),]|$)", types):
         if end == "(":
@@ -101,7 +104,7 @@ def build(returns: Any, numbers: Any) -> Any:
 def record_of(name: str) -> Any:
     """Return a type of records by its name."""
     module, _, inside = name.partition(":")
-    return getattr(importlib.import_module(module), inside)
+    return getattr(sys.modules[module], inside)
 
 
 def function_of(source: str, **names: Any) -> Callable[..., Any]:
