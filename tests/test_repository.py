@@ -68,10 +68,43 @@ def test_classifiers_name_the_versions_of_python(built: dict[str, Any]) -> None:
     assert len(named) > 1
 
 
+def pins(file: str) -> dict[str, str]:
+    """Versions that a file of requirements pins, by the name of the package."""
+    lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
+    return dict(line.split(";")[0].strip().split("==") for line in lines)
+
+
+def bounds() -> dict[str, str]:
+    """What `pyproject.toml` asks of the packages that users install, by their name."""
+    extras = [one for extra, wanted in PROJECT["optional-dependencies"].items() for one in wanted if extra in USED]
+    wanted = [re.split(r"(?=[<>=])", one, maxsplit=1) for one in [*PROJECT["dependencies"], *extras]]
+    return {name.replace(".", "-"): bound for name, bound in wanted}
+
+
+USED = ("plot", "query", "report", "scan", "dask", "s3")
+"""The extras of users; the others are for developers."""
+
+
+def test_the_lowest_versions_are_those_that_are_tested() -> None:
+    """By `.ci/bounds lowest`, every night: each bound is the version in the file, or what that version begins with."""
+    pinned = pins("requirements-lowest.txt")
+    for name, bound in bounds().items():
+        lowest = bound.removeprefix(">=").partition(",")[0]
+        assert f"{pinned[name]}.0.".startswith(f"{lowest}."), name
+    assert f"'.[{','.join(USED)}]'" in (ROOT / ".ci" / "bounds").read_text(encoding="utf-8")
+
+
+def test_numba_is_admitted_up_to_the_version_that_is_tested() -> None:
+    """Not the next one: the compiler and the loader of `boulder_kernels` use what Numba and llvmlite may change.
+
+    To admit it, put it into the lock, and make `tests/kernels/test_ahead.py` pass.
+    """
+    major, minor, _ = pins("requirements-dev.lock")["numba"].split(".")
+    assert bounds()["numba"].partition(",")[2] == f"<{major}.{int(minor) + 1}"
+
+
 def test_pre_commit_runs_the_tools_of_the_lock() -> None:
-    locked = dict(
-        line.split(";")[0].strip().split("==") for line in (ROOT / "requirements-dev.lock").read_text().splitlines()
-    )
+    locked = pins("requirements-dev.lock")
     hooks = {
         repo["repo"].rsplit("/", 1)[1]: repo["rev"].lstrip("v")
         for repo in YAML(typ="safe").load(ROOT / ".pre-commit-config.yaml")["repos"]
