@@ -23,7 +23,7 @@ from boulder_kernels import _ahead, source_hash
 from boulder_kernels._arguments import examples
 from boulder_kernels._cache import CACHE_VARIABLE, LEVELS, SHIPPED, SOURCES
 
-CONFIG = Path(__file__).parents[1] / "configs" / "rwg.yaml"
+CONFIGS = Path(__file__).parents[1] / "configs"
 SPRINGS = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
 WET, COHESIVE = "soil.water_table=0.5 m", "soil.cohesion=5 kPa"
 ELEMENTS = "model.soil={elements: 50}"
@@ -46,11 +46,13 @@ GLIBC = "2.17"
 def record(folder: Path) -> Path:
     """Compile what the commands need for this machine, in a folder, and return the folder of the compiled kernels."""
     environment = os.environ | {CACHE_VARIABLE: f"{folder}/cache"}
+    commands = [["need", str(CONFIGS / "site.yaml"), "--margin", "25%"]]
     for overrides in VARIANTS:
-        case = [str(CONFIG), "--quiet", *(word for override in overrides for word in ("--set", override))]
-        for words in (["run", *case, "-o", f"{folder}/table", "--overwrite"], ["simulate", *case]):
-            command = [sys.executable, "-m", "boulder_sweep", *words]
-            subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+        case = [str(CONFIGS / "rwg.yaml"), *(word for override in overrides for word in ("--set", override))]
+        commands += [["run", *case, "-o", f"{folder}/table", "--overwrite"], ["simulate", *case]]
+    for words in commands:
+        command = [sys.executable, "-m", "boulder_sweep", *words, "--quiet"]
+        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
     (compiled,) = folder.glob("cache/kernels-*/native-*")
     return compiled
 
@@ -92,6 +94,7 @@ def main() -> None:
     if sys.argv[1:]:
         compile_recorded(*map(Path, sys.argv[1:]))
         return
+    shutil.rmtree(SHIPPED, ignore_errors=True)  # the commands would use them, and compile nothing
     with tempfile.TemporaryDirectory() as name:
         recorded = record(Path(name))
         for level, needed in LEVELS.items():
