@@ -190,6 +190,9 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
     for name, value in settings.items():
         if isinstance(value, Mapping):
             lines += [f"{indent}{name}:", *setting_lines(value, f"{indent}  ")]
+        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+            for place, one in enumerate(value, 1):
+                lines += [f"{indent}{name} {place}:", *setting_lines(one, f"{indent}  ")]
         else:
             shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in _as_list(value))
             lines.append(f"{indent}{name}: {shown}")

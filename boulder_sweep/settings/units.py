@@ -78,6 +78,7 @@ EXPECTED: dict[str, Expected] = {
     "kg": Expected("a mass", "kg, t, lb or short_ton"),
     "s": Expected("a time", "s or ms"),
     "m/s": Expected("a speed", "m/s, km/h, mph or ft/s"),
+    "m/s^2": Expected("an acceleration", "m/s^2 or ft/s^2"),
     "deg": Expected("an angle", "deg or rad"),
     "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3"),
     "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci"),
@@ -91,7 +92,6 @@ _KINDS = (
     ("m^2", "an area"),
     ("m^3", "a volume"),
     ("N", "a force"),
-    ("m/s^2", "an acceleration"),
     ("1/s", "a frequency"),
     ("N*m", "a moment"),
 )
