@@ -16,7 +16,7 @@ from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
-from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, VERDICTS
+from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD, VERDICTS
 from boulder_sweep.columns import REASONS as VERDICT_REASONS
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.judge.inputs import SOURCES
@@ -256,7 +256,7 @@ def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _units() -> list[str]:
-    return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES)} | {"J", "N"})
+    return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES, *TO_BUILD)} | {"J", "N"})
 
 
 def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any], ground: Ground) -> dict[str, Any]:
