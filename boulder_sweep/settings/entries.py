@@ -15,7 +15,7 @@ from boulder_sweep.settings.distribution_reader import read_input
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_single
 from boulder_sweep.settings.problems import Position, ProblemList, nearest, shorten
-from boulder_sweep.settings.site_data import APPROACH, unfold_approaches
+from boulder_sweep.settings.site_data import APPROACH, CORRELATION, METHODS, SOIL_KEYS, unfold_approaches, unfold_soils
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ SIDES = ("length", "width", "height")
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table", "report")
-SITE_KEYS = {"vehicle": (APPROACH,)}
+SITE_KEYS = {"soil": METHODS, "vehicle": (APPROACH,)}
 """Keys of a block that stand for others; see `boulder_sweep.settings.site_data`."""
 
 
@@ -81,6 +81,9 @@ class Entries:
         self._read_site_data()
         for section in fields.SECTIONS:
             self._read_block(section)
+        both = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
+        if any(both <= set(soil) for soil in self.derived.get("soil", ())):
+            self.settings.setdefault("correlation", CORRELATION)
         if "profile" in self.settings:
             self._take_sides(self.settings["profile"])
         elif "boulder.profile" in self.given:  # its mistakes are reported, and its sides are not missing
@@ -94,6 +97,14 @@ class Entries:
             self.problems.add(mistake.position, f"vehicle.{APPROACH}", mistake.message)
         if approaches:
             self.derived[APPROACH] = approaches
+        columns = () if self.table is None else self.table.columns
+        listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in columns]
+        mistakes, soils = unfold_soils(self.root, listed)
+        for mistake in mistakes:
+            self.given |= {f"soil.{key}" for key in SOIL_KEYS}
+            self.problems.add(mistake.position, "soil", mistake.message)
+        if soils:
+            self.derived["soil"] = soils
 
     def _take_sides(self, points: tuple[ProfilePoint, ...]) -> None:
         """Take the sides of the boulder from its profile, which must not be given beside it."""

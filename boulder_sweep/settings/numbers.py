@@ -155,6 +155,7 @@ _SAMPLES = {
     "kg/m^3": "2650 kg/m^3 or 116 pcf",
     "MN/m^3": "95 MN/m^3 or 350 pci",
     "kPa": "5 kPa",
+    "MPa": "14 MPa",
     "N/m": "3103.3 kN/m",
     "N*s/m": "138.91 kN*s/m",
 }

@@ -306,6 +306,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
     "published-spreads": answers.published_spreads,
+    "borehole-notes": site_data.notes_of_borehole,
     "speed-street": site_data.speed_of_street,
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,

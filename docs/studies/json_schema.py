@@ -21,7 +21,15 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
 )
-from boulder_sweep.settings.site_data import APPROACH, APPROACH_FIELDS, SPEED
+from boulder_sweep.settings.site_data import (
+    APPROACH,
+    APPROACH_FIELDS,
+    METHODS,
+    READING_FIELDS,
+    RELATIVE_DENSITY,
+    SOIL_KEYS,
+    SPEED,
+)
 from boulder_sweep.settings.starter import default_of
 from boulder_sweep.settings.units import EXPECTED
 
@@ -223,7 +231,18 @@ _FORMS: dict[str, Schema] = {
 """Entries that are more than a quantity."""
 
 
+_BY_TEST = {
+    method: {"anyOf": [reading, {"type": "array", "minItems": 1, "items": reading}]}
+    for method, reading in (
+        (method, _object({key: _value(field) for key, field in known.items()}, ()))
+        for method, known in READING_FIELDS.items()
+    )
+}
 _SITE_DATA: dict[str, Schema] = {
+    "soil": {
+        **{method: {**form, "description": f"readings ({method})"} for method, form in _BY_TEST.items()},
+        RELATIVE_DENSITY.key: {**_value(RELATIVE_DENSITY), "description": RELATIVE_DENSITY.meaning},
+    },
     "vehicle": {
         APPROACH: {
             **_object({key: _value(field) for key, field in APPROACH_FIELDS.items()}, ("length", "acceleration")),
@@ -248,6 +267,9 @@ def _what_is_required() -> Schema:
             needed += [] if field.section == "boulder" else [field.key]
     sections["vehicle"]["required"].remove(SPEED)
     sections["vehicle"]["anyOf"] = [{"required": [SPEED]}, {"required": [APPROACH]}]
+    constants = {"required": sections["soil"].pop("required")}
+    assert set(constants["required"]) == set(SOIL_KEYS)
+    sections["soil"]["anyOf"] = [constants, *({"required": [method]} for method in METHODS)]
     for section in set(NAMED_SETS) & set(sections):
         sections[section]["items"] = dict(sections[section])
     embedment = [field for field in INPUTS if field.name in EMBEDMENT]
