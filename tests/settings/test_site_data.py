@@ -1,4 +1,4 @@
-"""What a site gives stands for plain entries: the same designs, the same rows, and nothing added to files without it."""
+"""What a site gives stands for plain entries: the same designs, the same rows; files without it stay as they are."""
 
 from __future__ import annotations
 
