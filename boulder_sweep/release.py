@@ -1,25 +1,29 @@
 """Compile the kernels that a wheel carries: ``python -m boulder_sweep.release``, before the wheel is built.
 
-For each target that this processor can run, the commands below are called in processes whose kernels are compiled for
-it, and the libraries are put among the sources. zig links them (from PyPI, a part of the development packages) for an
-old version of the C library, so that they load on systems of the last ten years.
+The commands below are called once. What they compile for this machine is the list of what a wheel must carry: which
+kernels, for which types of arguments. All of it is compiled again for each target of this architecture, in a process
+that calls none of it, so the processor need not be one that could. The libraries are put among the sources. zig links
+them (from PyPI, a part of the development packages) for an old version of the C library, so that they load on systems
+of the last ten years.
 """
 
 from __future__ import annotations
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
-from boulder_kernels import source_hash
-from boulder_kernels._cache import SHIPPED, SOURCES, levels
-from boulder_sweep.store.files import put_file
+from boulder_kernels import _ahead, source_hash
+from boulder_kernels._arguments import examples
+from boulder_kernels._cache import CACHE_VARIABLE, LEVELS, SHIPPED, SOURCES
 
-CONFIG = Path(__file__).parents[1] / "configs" / "rwg.yaml"
+CONFIGS = Path(__file__).parents[1] / "configs"
 SPRINGS = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
 WET, COHESIVE = "soil.water_table=0.5 m", "soil.cohesion=5 kPa"
 ELEMENTS = "model.soil={elements: 50}"
@@ -33,34 +37,71 @@ VARIANTS: tuple[tuple[str, ...], ...] = (
     (ELEMENTS, "model.unloading=plastic_with_gap"),
 )
 """Settings for which kernels of their own are compiled."""
-FEATURES = {"x86-64-v4": "-prefer-256-bit"}
-"""What Numba is told of a processor beside its name: as `boulder_kernels._numba` asks for on such a machine."""
+TARGETS = {"x86-64-v4": ("x86-64-v4", "-prefer-256-bit"), "aarch64": ("generic", "")}
+"""Name and features of the processor that Numba is told of, where the name is not that of the target. The features are
+those that `boulder_kernels._numba` asks for on such a machine."""
 GLIBC = "2.17"
 
 
-def compile_for(level: str, target: Path) -> None:
-    """Compile all kernels for a target, and put the libraries and the hash of their sources into a folder."""
-    with tempfile.TemporaryDirectory() as name:
-        linker = f"{sys.executable} -m ziglang cc -target {platform.machine()}-linux-gnu.{GLIBC}"
-        own = {"BOULDER_SWEEP_CACHE_DIR": f"{name}/cache", "NUMBA_CPU_NAME": level, "CC": linker}
-        environment = os.environ | own | {"NUMBA_CPU_FEATURES": FEATURES.get(level, "")}
-        for overrides in VARIANTS:
-            case = [str(CONFIG), "--quiet", *(word for override in overrides for word in ("--set", override))]
-            for words in (["run", *case, "-o", f"{name}/table", "--overwrite"], ["simulate", *case]):
-                command = [sys.executable, "-m", "boulder_sweep", *words]
-                subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
-        shutil.rmtree(target, ignore_errors=True)
-        (compiled,) = Path(name).glob("cache/kernels-*/native-*")
-        shutil.copytree(compiled, target)
-    put_file(target, SOURCES, source_hash().encode())
+def record(folder: Path) -> Path:
+    """Compile what the commands need for this machine, in a folder, and return the folder of the compiled kernels."""
+    environment = os.environ | {CACHE_VARIABLE: f"{folder}/cache"}
+    commands = [["need", str(CONFIGS / "site.yaml"), "--margin", "25%"]]
+    for overrides in VARIANTS:
+        case = [str(CONFIGS / "rwg.yaml"), *(word for override in overrides for word in ("--set", override))]
+        commands += [["run", *case, "-o", f"{folder}/table", "--overwrite"], ["simulate", *case]]
+    for words in commands:
+        command = [sys.executable, "-m", "boulder_sweep", *words, "--quiet"]
+        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+    (compiled,) = folder.glob("cache/kernels-*/native-*")
+    return compiled
+
+
+def compile_for(level: str, recorded: Path, target: Path) -> None:
+    """Compile recorded kernels for a target in another process, and put the libraries into a folder."""
+    name, features = TARGETS.get(level, (level, ""))
+    linker = f"{sys.executable} -m ziglang cc -target {platform.machine()}-linux-gnu.{GLIBC}"
+    own = {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": features, "CC": linker}
+    command = [sys.executable, "-m", "boulder_sweep.release", str(recorded), str(target)]
+    subprocess.run(command, env=os.environ | own, check=True)
+
+
+def compile_recorded(recorded: Path, target: Path) -> None:
+    """Compile recorded kernels as this process is told to, and put the libraries and the hash of their sources away.
+
+    Raises
+    ------
+    RuntimeError
+        They cannot be linked.
+    """
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    for file in sorted(recorded.glob(f"*{_ahead.RETURNS}")):
+        module, kernel, _ = file.stem.rsplit("-", 2)
+        wanted = getattr(import_module(f"boulder_kernels.{module}"), kernel)
+        types = _ahead.described(file)["types"]
+        for of_record in re.findall(r"([\w.]+):", types):
+            import_module(of_record)
+        code, library, kept = wanted.compiler.compiled_ahead(wanted, examples(types), types)
+        if library is None:
+            raise RuntimeError(f"{module}.{kernel} cannot be linked by {os.environ.get('CC', 'cc')}")
+        _ahead.keep(target / file.stem, code, library, kept)
+    (target / SOURCES).write_text(source_hash())
 
 
 def main() -> None:
-    """Compile for all targets that this processor can run."""
-    for level in levels():
-        compile_for(level, SHIPPED / level)
-        size = sum(file.stat().st_size for file in (SHIPPED / level).iterdir())
-        print(f"{SHIPPED / level}: {len(list((SHIPPED / level).iterdir())):,} files, {size:,} bytes")
+    """Compile for all targets of this architecture; with two folders, what the one records into the other."""
+    if sys.argv[1:]:
+        compile_recorded(*map(Path, sys.argv[1:]))
+        return
+    shutil.rmtree(SHIPPED, ignore_errors=True)  # the commands would use them, and compile nothing
+    with tempfile.TemporaryDirectory() as name:
+        recorded = record(Path(name))
+        for level, needed in LEVELS.items():
+            if platform.machine() in needed:
+                compile_for(level, recorded, SHIPPED / level)
+                files = [file.stat().st_size for file in (SHIPPED / level).iterdir()]
+                print(f"{SHIPPED / level}: {len(files):,} files, {sum(files):,} bytes")
 
 
 if __name__ == "__main__":

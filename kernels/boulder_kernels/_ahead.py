@@ -102,9 +102,7 @@ def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
             # There may be no room on the disk, and what was linked may be for another machine.
             with contextlib.suppress(OSError, UnusableError):
                 kept_in.mkdir(mode=0o700, exist_ok=True)
-                ending, content = (OBJECT, code) if library is None else (LIBRARY, library)
-                put((kept_in / name).with_suffix(ending), content)
-                put((kept_in / name).with_suffix(RETURNS), json.dumps(kept).encode())
+                keep(kept_in / name, code, library, kept)
                 return loaded(kept_in / name)
         from . import _llvm
 
@@ -113,6 +111,13 @@ def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
 
 class UnusableError(Exception):
     """Files of a compiled kernel that are not there, or not whole."""
+
+
+def keep(file: Path, code: bytes, library: bytes | None, kept: dict[str, Any]) -> None:
+    """Write what `boulder_kernels._numba.compiled_ahead` returns beside each other, under a name without ending."""
+    ending, content = (OBJECT, code) if library is None else (LIBRARY, library)
+    put(file.with_suffix(ending), content)
+    put(file.with_suffix(RETURNS), json.dumps(kept).encode())
 
 
 def put(file: Path, content: bytes) -> None:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import functools
+import re
 import sys
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-KINDS = {np.dtype(np.float64): "f8", np.dtype(np.int64): "i8", np.dtype(np.int8): "i1", np.dtype(np.bool_): "b1"}
+KINDS: dict[np.dtype[Any], str] = {
+    np.dtype(np.float64): "f8",
+    np.dtype(np.int64): "i8",
+    np.dtype(np.int8): "i1",
+    np.dtype(np.bool_): "b1",
+}
 """Numbers that an array may hold."""
 REAL, WHOLE, TRUTH, NOTHING = "f", "i", "b", "n"
 _SCALARS = {float: REAL, np.float64: REAL, int: WHOLE, np.int64: WHOLE, bool: TRUTH, np.bool_: TRUTH}
@@ -45,6 +51,32 @@ def flatten(value: Any, reals: list[float], wholes: list[int], arrays: list[np.n
         record: Any = kind
         return f"{name_of(record)}({','.join([flatten(one, reals, wholes, arrays) for one in value])})"
     raise UnsuitableError
+
+
+def examples(types: str) -> tuple[Any, ...]:
+    """Return arguments of the types that `flatten` has given as text, with commas between them; arrays are empty.
+
+    The modules of records must have been imported.
+    """
+    values: list[tuple[Any, list[Any]]] = [(tuple, [])]  # what makes each record that is not closed yet, and its fields
+    for name, end in re.findall(r"([^(),]*)([(),]|$)", types):
+        if end == "(":
+            values.append((record_of(name)._make if name else tuple, []))
+            continue
+        if name:
+            values[-1][1].append(_SIMPLE[name] if name in _SIMPLE else _empty(name))
+        if end == ")":
+            make, fields = values.pop()
+            values[-1][1].append(make(fields))
+    return tuple(values[0][1])
+
+
+_SIMPLE = {REAL: 0.0, WHOLE: 0, TRUTH: False, NOTHING: None}
+
+
+def _empty(code: str) -> np.ndarray:
+    """Return an array without numbers, by the code of what it may hold and its number of dimensions."""
+    return np.empty((0,) * int(code[2:]), next(kind for kind, name in KINDS.items() if name == code[:2]))
 
 
 @functools.cache

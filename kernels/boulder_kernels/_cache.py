@@ -121,13 +121,13 @@ def processor() -> tuple[str, ...]:
     return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
 
 
-_V3 = {"avx2", "fma", "bmi1", "bmi2", "f16c", "abm", "movbe"}
+_V3 = {"x86_64", "avx2", "fma", "bmi1", "bmi2", "f16c", "abm", "movbe"}
 LEVELS = {
     "x86-64-v4": _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
     "x86-64-v3": _V3,
-    "aarch64": {"asimd"},
+    "aarch64": {"aarch64"},
 }
-"""Targets that a wheel may carry libraries for, the fastest first, and the features of a processor that each needs."""
+"""Targets that a wheel may carry libraries for, the fastest first, and the architecture and features each needs."""
 SHIPPED = Path(__file__).with_name("compiled")
 """Folder of such libraries: for each target a folder with the hash of the sources that they were compiled from."""
 SOURCES = "sources"
@@ -137,7 +137,7 @@ SOURCES = "sources"
 def levels() -> list[str]:
     """Return the targets whose code this processor can run, the fastest first."""
     features = {word for line in processor() if line.startswith(("flags", "Features")) for word in line.split()}
-    return [level for level, needed in LEVELS.items() if needed <= features]
+    return [level for level, needed in LEVELS.items() if needed <= features | {platform.machine()}]
 
 
 @functools.cache

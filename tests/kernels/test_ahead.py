@@ -12,7 +12,8 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import _ahead, _cache
-from boulder_kernels._arguments import UnsuitableError
+from boulder_kernels._arguments import UnsuitableError, examples, flatten
+from boulder_kernels._numba import numba_type
 from boulder_kernels.design import constants_of, is_computable
 from boulder_kernels.impact import simulate
 from boulder_kernels.layered import uniform_layers
@@ -75,6 +76,16 @@ def test_what_comes_back_has_its_types() -> None:
     assert is_computable(c._replace(d=-1.0)) is False
     table = bk.simulate_table(table_of(DESIGNS), READINGS, HOW)
     assert estimate_errors(table, table, table_of(DESIGNS), 1.5) is None
+
+
+@pytest.mark.parametrize("kind", problems())
+def test_types_tell_what_a_kernel_is_called_with(kind: str) -> None:
+    """A release compiles from them: examples of the types have the same types, for Numba, too."""
+    arguments = (problems()[kind], READINGS, HOW, bk.no_record(), True, 3, np.zeros((2, 3), np.int8))
+    types = ",".join([flatten(value, [], [], []) for value in arguments])
+    found = examples(types)
+    assert ",".join([flatten(value, [], [], []) for value in found]) == types
+    assert [*map(numba_type, found)] == [*map(numba_type, arguments)]
 
 
 def test_no_call_is_refused_that_numba_takes() -> None:
@@ -186,10 +197,13 @@ def test_libraries_that_came_with_the_package_are_used(
 
 
 def test_levels_of_processors(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the features that the system reports."""
+    """By the features that the system reports, on their architecture; every aarch64 has what its code needs."""
     wide = "avx512f avx512bw avx512cd avx512dq avx512vl"
     usual = "avx2 fma bmi1 bmi2 f16c abm movbe"
     for features, found in ((f"{wide} {usual}", ["x86-64-v4", "x86-64-v3"]), (usual, ["x86-64-v3"]), ("sse2", [])):
         monkeypatch.setattr(_cache, "processor", lambda flags=features: ("model name : any", f"flags : {flags}"))
+        monkeypatch.setattr(_cache.platform, "machine", lambda: "aarch64")
+        assert _cache.levels() == ["aarch64"]
+        monkeypatch.setattr(_cache.platform, "machine", lambda: "x86_64")
         assert _cache.levels() == found
         assert ("+fma" in _cache.target()) is (found != [])
