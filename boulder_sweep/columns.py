@@ -314,6 +314,24 @@ AT_REST: tuple[OutcomeColumn, ...] = (
 """Outcomes in plastic soil only (`model.unloading` other than ``elastic``); behind the others in a table.
 Null where the boulder overturns, where the vehicle still drives on at the end, or where the readings allow no proof."""
 
+TO_BUILD: tuple[ColumnSpec, ColumnSpec, ColumnSpec] = (
+    ColumnSpec("height_above_ground_m", "float64", "m", "height of the top of the boulder above the ground"),
+    ColumnSpec(
+        "excavated_m3",
+        "float64",
+        "m^3",
+        "soil to excavate: as wide as the boulder, on both sides as far as the wedge that the model relies on",
+    ),
+    ColumnSpec(
+        "backfill_m3",
+        "float64",
+        "m^3",
+        "compacted soil to put back: what is excavated less the buried part of the boulder",
+    ),
+)
+"""What a design takes to build, beside the mass of the boulder; see `boulder_sweep.judge.quantities`.
+In tables of answers and of `sweep export`; those of runs have what they follow from."""
+
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
 OPTIONAL_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OPTIONAL_INPUTS)
@@ -322,7 +340,7 @@ SECOND_SPRING_COLUMNS: tuple[str, str] = ("vehicle_second_spring_N_m", "vehicle_
 BOULDER_MASS = "boulder_mass_kg"
 """That of a boulder that has been weighed."""
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
-BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *AT_REST, *OPTIONAL_INPUTS)}
+BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *AT_REST, *OPTIONAL_INPUTS, *TO_BUILD)}
 
 
 def column_spec(name: str) -> ColumnSpec:

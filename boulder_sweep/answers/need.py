@@ -324,9 +324,8 @@ def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: in
 
     answers = [question.answered(start, stop) for question in asked]
     names = [question.sweep.model.preset for question in asked]
-    return answer_table(asked[0].key, start, answers, names, asked[0].sweep.model.shape.filled), sum(
-        answer.simulated for answer in answers
-    )
+    table = answer_table(asked[0].key, start, answers, names, asked[0].sweep)
+    return table, sum(answer.simulated for answer in answers)
 
 
 def _metadata(asked: Question | LightestQuestion, least_margin: float) -> dict[bytes, bytes]:

@@ -27,9 +27,12 @@ from boulder_sweep.answers.printing import (
     table_lines,
     table_texts,
     varies,
+    volume_columns,
+    volume_lines,
     word_of,
 )
 from boulder_sweep.columns import GRADES
+from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
 from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shown_units import shown_unit
@@ -93,7 +96,7 @@ def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "G
         lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} rows; -o writes them all)")
     if by_soil and need.others:
         lines.append("(by the readings of the file; -o writes those by the others as well)")
-    remarks = [*_legend(need, file), *_grades(need), *_outside(need)]
+    remarks = [*volume_lines(tables[0][0]), *_legend(need, file), *_grades(need), *_outside(need)]
     remarks += foot_lines(need.sweep.model, need.arrow["reason"].unique().to_pylist())
     if need.key.name == BOULDER_MASS.name:
         remarks += _edges(need, units, file)
@@ -103,7 +106,7 @@ def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "G
 def _shown_part(need: Need) -> pa.Table:
     """Return the columns that lines are made of: rows of all would take longer to make than to search."""
     needed = {*HEADS, *need.sweep.plan.labels, "design_id", "boulder_mass_kg", "passes_at", "robustness"}
-    needed |= {"margin", "p_pass"}
+    needed |= {"margin", "p_pass", EXCAVATED.name, BACKFILLED.name}
     answers = (need.key.answer, "found")
     return need.arrow.select([n for n in need.arrow.column_names if n in needed or n.startswith(answers)])
 
@@ -225,14 +228,24 @@ def need_columns(need: Need, units: str = "si") -> list[Column]:
         columns.append((("mass", unit), _answer(key, "", size)))
         columns += [(head_of(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]
         columns += [_margin_or_chance(need), _GRADE]
-        return columns + [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
+        columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
+        return [*columns, *_volumes(units)]
     columns.append((head_of(key.name, units), _answer(key, "", size)))
     if key.name == "embedment_depth_m":
         columns.append((("ratio", "d/H"), _ratio))
         columns.append((("above", unit), _above_ground))
     columns += [_mass(units), _margin_or_chance(need), _GRADE]
     columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
-    return columns
+    return [*columns, *_volumes(units)]
+
+
+def _volumes(units: str) -> list[Column]:
+    """Return the columns of volumes, empty where nothing passes."""
+
+    def where_it_passes(cell: Cell) -> Cell:
+        return lambda row: "" if row["passes_at"] is None else cell(row)
+
+    return [(head, where_it_passes(cell)) for head, cell in volume_columns(units)]
 
 
 _GRADE: Column = (GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
+from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3
 from boulder_sweep.settings.shown_units import shown_unit
@@ -61,6 +62,20 @@ Column = tuple[tuple[str, str], Cell]
 
 GRADE: Column = (("second", "opinion"), lambda row: row["robustness"] or "-")
 """Column of what second opinions say of a pass."""
+
+
+def volume_columns(units: str) -> list[Column]:
+    """Return the columns of the soil to excavate and to put back."""
+    unit = "yd³" if units == "us" else "m³"
+    return [
+        (("dig", unit), lambda row: f"{row[EXCAVATED.name]:.1f}"),
+        (("fill", unit), lambda row: f"{row[BACKFILLED.name]:.1f}"),
+    ]
+
+
+def volume_lines(heads: str) -> list[str]:
+    """Return what the columns of volumes are, where the heads of a table show that they fitted in."""
+    return ["dig, fill: soil to excavate and to put back (docs/model.md)"] if "  dig  " in heads else []
 
 
 def grade_lines(rows: Iterable[Row]) -> list[str]:
@@ -165,9 +180,11 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, u
         size = 1.0 if units == "si" else shown_unit(field.unit, units).size
         columns.append((head_of(field.name, units), _withstood(reserve, field.name, decimals, size)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
+    columns += volume_columns(units)
     lines = table_lines(columns, rows, width)
     if count > most:
         lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
+    lines += volume_lines(lines[0])
     if any(sign in line for line in lines for sign in "≥≤"):
         lines.append("≥, ≤: passes at the worst value tried")
     return [*lines, *grade_lines(rows), *foot_lines(found.sweep.model)]

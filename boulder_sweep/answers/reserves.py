@@ -209,7 +209,7 @@ def classes(
 
 def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     """Return the table of the designs ``[start, stop)``."""
-    from boulder_sweep.answers.tables import with_columns
+    from boulder_sweep.answers.tables import to_build, with_columns
     from boulder_sweep.store.schema import part_table
 
     rows = sweep.plan.given_rows(start, stop)
@@ -228,6 +228,7 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     columns.append(("simulated_class", "", meaning, classes(speed, mass)))
     meaning = "speed of tests to ISO 22343-1 (IWA 14-1) of 7200 kg that is withstood; simulated, which rates no barrier"
     columns.append(("simulated_iso_speed", "", meaning, classes(speed, mass, ISO_SPEEDS, ISO_MASS_KG)))
+    columns += to_build(block, sweep)
     return with_columns(
         part_table(replace(block, start=start, stop=stop, labels=sweep.block(start, stop).labels), judged, {}), columns
     )

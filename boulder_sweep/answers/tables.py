@@ -16,8 +16,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from boulder_sweep.answers.search import WORDS
-from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID, INPUTS
+from boulder_sweep.columns import BY_NAME, DESIGN_ID, INPUTS
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, QuestionError
+from boulder_sweep.judge.quantities import QUANTITIES, quantities
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.store.errors import settings_file
 from boulder_sweep.store.files import check_target, replacing
@@ -35,14 +36,12 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.subset import Failing
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
+    from boulder_sweep.settings import Sweep
 
 _IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
-MASS = ("boulder_mass_kg", "kg", "mass of the boulder, its volume times its density")
 
 
-def answer_table(
-    key: Key, start: int, answers: Sequence[Answers], readings: Sequence[str], filled: float = 1.0
-) -> pa.Table:
+def answer_table(key: Key, start: int, answers: Sequence[Answers], readings: Sequence[str], sweep: Sweep) -> pa.Table:
     """Return answers as a table: the inputs, the answer and its bracket, the outcome at the answer.
 
     Parameters
@@ -55,8 +54,8 @@ def answer_table(
         Answers with the readings of the sweep, then with others.
     readings
         Names of the readings, in the same order.
-    filled
-        Volume of the boulders over that of the boxes of their sides.
+    sweep
+        The sweep: shape of its boulders and layers of its soil.
     """
     own = answers[0]
     block = replace(own.block, start=start, stop=start + len(own.block))
@@ -76,7 +75,7 @@ def answer_table(
         ("passes_at", unit, "the same as the answer: judged as a run judges it", _numbers(own.passes)),
         ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(own.kind, WORDS)),
         ("passes_within", unit, "where it fails again further on: all stretches that pass", _words(own.stretches)),
-        *([] if BOULDER_MASS in block.columns else [(*MASS, number_array(filled * boulder_mass(block)))]),
+        *((name, unit, meaning, number_array(values)) for name, unit, meaning, values in to_build(block, sweep)),
     ]
     for other, name in zip(answers[1:], readings[1:], strict=True):
         columns += [
@@ -228,12 +227,11 @@ def with_columns(table: pa.Table, columns: Sequence[tuple[str, str, str, Any]]) 
     return table
 
 
-def boulder_mass(block: DesignBlock) -> np.ndarray:
-    """Mass of the boulders of a block [kg], shape (n,)."""
-    if BOULDER_MASS in block.columns:
-        return block.columns[BOULDER_MASS].to_numpy()
-    sides = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
-    return np.prod([block.columns[side].to_numpy() for side in sides], axis=0)
+def to_build(block: DesignBlock, sweep: Sweep) -> list[tuple[str, str, str, np.ndarray]]:
+    """Return what the designs of a block take to build as columns: name, unit, meaning, values."""
+    rows = {name: column.to_numpy() for name, column in block.columns.items()}
+    found = quantities(rows, sweep.model.shape, sweep.model.ground)
+    return [(own.name, own.unit, own.meaning, found[own.name]) for own in QUANTITIES if own.name not in block.columns]
 
 
 def joined_tables(tables: Sequence[pa.Table], metadata: Mapping[bytes, bytes]) -> pa.Table:

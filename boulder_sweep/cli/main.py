@@ -25,6 +25,7 @@ from boulder_sweep.cli.run import run, status
 from boulder_sweep.cli.settings_files import check, new
 from boulder_sweep.cli.share import explore, export, plot, report
 from boulder_sweep.cli.simulate import explain, simulate
+from boulder_sweep.cli.speed import speed
 from boulder_sweep.cli.stone import stone
 from boulder_sweep.cli.tradeoff import tradeoff
 from boulder_sweep.cli.validate import validate
@@ -68,7 +69,7 @@ def start_light() -> None:
 
 
 GROUPS = {
-    "Ask": (new, check, stone, need, uncertainty, capacity, simulate, explore),
+    "Ask": (new, check, stone, speed, need, uncertainty, capacity, simulate, explore),
     "Tables": (run, status, explain, compare),
     "Share": (plot, report, export),
     "Model": (tradeoff, validate, fit_vehicle),

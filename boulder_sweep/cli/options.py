@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,11 +96,14 @@ def cluster_options(function: Command) -> Command:
 
 
 def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
-    """Load settings and print the notes on them."""
+    """Load settings and print the notes on them, and how inputs follow from the data of a site."""
     from boulder_sweep.settings import load
+    from boulder_sweep.settings.site_data import derived_words
 
     sweep = load(path, overrides)
     if not quiet:
+        for words in derived_words(sweep.derived):
+            say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
         for note in sweep.notes:
             say(f"note: {note}")
     return sweep

@@ -97,11 +97,12 @@ def simulate(
         result = simulate_design(sweep, number)
     # Before anything else: there may be nothing to draw, and a film takes a while.
     row = result.summary()
+    whole = shown_values(row | _to_build(result), units)
     if as_json:
-        show(json.dumps(shown_values(row, units)))
+        show(json.dumps(whole))
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
-        columns = ["", *console.value_lines(shown_values(row, units))] if every else []
+        columns = ["", *console.value_lines(whole)] if every else []
         show(*console.wrap(verdict_line(result)), *lines, *_cautions(row | result.inputs, sweep.model), *columns)
     if plot is not None:
         result.plot(plot, units=units)
@@ -253,6 +254,27 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
         when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
         crush = f"{second.s_2 / metre:.4g} {length}"
         lines.append(f"  front: its second spring acts from a crush of {crush} on, {when}")
+    lines.append(build_line(history, units))
     if row["rotation_error_deg"] is not None:
         lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
     return lines
+
+
+def _to_build(history: Trajectory) -> dict[str, float]:
+    """Return what a design takes to build, by the names of columns."""
+    from boulder_sweep.judge.quantities import quantities_by
+
+    return {name: float(value) for name, value in quantities_by(history.inputs, history.settings).items()}
+
+
+def build_line(history: Trajectory, units: str = "si") -> str:
+    """Return in words what a design takes to build."""
+    from boulder_sweep.settings.shown_units import shown_unit
+
+    mass, above, dig, fill = _to_build(history).values()
+    (length, metre), (volume, cubic) = shown_unit("m", units), shown_unit("m^3", units)
+    tonnes = f"{mass / 1e3:.1f} t" if units == "si" else f"{mass / shown_unit('kg', units).size:,.0f} lb"
+    return (
+        f"  to build: {tonnes}, {above / metre:.3g} {length} above ground; "
+        f"dig {dig / cubic:.1f} {volume}, fill {fill / cubic:.1f} {volume}"
+    )

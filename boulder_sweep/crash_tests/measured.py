@@ -63,11 +63,12 @@ DECELERATION = Signal("deceleration", "m/s^2", ("vehicle_deceleration",))
 ROTATION = Signal("rotation", "deg", ("boulder_rotation", "angle"))
 BOULDER = Signal("boulder_displacement", "m", ("boulder_centre_displacement",))
 VEHICLE = Signal("vehicle_displacement", "m", ("truck_displacement",))
+VEHICLE_ACCELERATION = Signal("vehicle_acceleration", "m/s^2", ("truck_acceleration",))
 
 PULSE_SIGNALS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, DECELERATION)
 """What a crash pulse against a rigid wall may hold."""
-TEST_SIGNALS = (TIME, ROTATION, BOULDER, VEHICLE)
-"""What the film of a crash test may hold."""
+TEST_SIGNALS = (TIME, ROTATION, BOULDER, VEHICLE, VEHICLE_ACCELERATION)
+"""What the film and the accelerometers of a crash test may hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +275,7 @@ def _check_time(rows: list[_Row], column: int, time: np.ndarray, problems: Probl
         problems.add(rows[row + 1].position(column), TIME.name, message)
 
 
-UNITS = {"rotation": "deg", "boulder_displacement": "m", "vehicle_displacement": "m"}
+UNITS = {signal.name: signal.unit for signal in TEST_SIGNALS if signal is not TIME}
 
 
 @dataclass(frozen=True)
@@ -325,6 +326,8 @@ def simulated_signal(trajectory: Trajectory, name: str) -> np.ndarray:
         return np.degrees(trajectory.rotation_rad)
     if name == "boulder_displacement":
         return trajectory.boulder_centre_displacement_m
+    if name == VEHICLE_ACCELERATION.name:
+        return trajectory.vehicle_acceleration_m_s2
     return trajectory.vehicle_displacement_m
 
 
@@ -336,7 +339,7 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
     trajectory
         The simulation.
     measured
-        Signals ``rotation`` [deg], ``boulder_displacement`` and ``vehicle_displacement`` [m]; gaps are left out.
+        Signals of `TEST_SIGNALS`; gaps are left out.
 
     Returns
     -------
@@ -397,7 +400,7 @@ def deviation_table(by_preset: dict[str, list[Deviation]]) -> Table:
     )
     for preset, deviations in by_preset.items():
         for d in deviations:
-            digits = 2 if d.unit == "deg" else 4
+            digits = {"deg": 2, "m/s^2": 1}.get(d.unit, 4)
             unit = "°" if d.unit == "deg" else f" {d.unit}"
             share = "-" if math.isnan(d.peak_error) else f"{d.peak_error:+.1%}"
             texts = (number(value, digits) + unit for value in (d.rms, d.largest, d.measured_peak, d.simulated_peak))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from boulder_sweep.columns import GRADES
+from boulder_sweep.columns import GRADES, TO_BUILD
 from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS, meaning_of
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
 from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
@@ -149,6 +149,7 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
         *_beyond(rows, siblings, kinds),
         *(": ", Quantity(float(mass.flat[number]), "kg"), " of rock, "),
         *(Quantity(depth, "m"), f" deep (design {number:,}, P(pass) = {chances[number]:.1%}{_worst(rows, kinds)})."),
+        *_to_build(rows, number),
     )
     title = f"Lightest boulder that passes with a probability of {SAFE:.0%}"
     return [(sentence, Named(f"{title} {_where(rows, kinds)}".rstrip(), number))]
@@ -161,7 +162,8 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     margin = "" if row["margin"] is None else f", with a margin of {row['margin']:.1%}"
     verdict = f"{_in_words(name, 1)}{margin}{', at the means of its uncertain inputs' if uncertain else ''}"
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
-    sentences.append((f"The design {verdict}: ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep."))
+    what = (Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep.", *_to_build(rows, 0))
+    sentences.append((f"The design {verdict}: ", *what))
     grade = rows.grade(row)
     meaning = meaning_of({**row, "robustness": grade})
     if meaning is not None:
@@ -170,6 +172,21 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     if flags:
         sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))
     return Answer(tuple(sentences), (Named("The design", 0),))
+
+
+def _to_build(rows: Rows, number: int) -> Sentence:
+    """Say what a design takes to build beside its mass, as a sentence that follows another."""
+    found = rows.to_build(number)
+    above, excavated, backfilled = (Quantity(found[own.name], own.unit) for own in TO_BUILD)
+    return (
+        " It stands ",
+        above,
+        " above ground and takes ",
+        excavated,
+        " of excavation and ",
+        backfilled,
+        " of backfill.",
+    )
 
 
 def _meaning(flag: str) -> str:
@@ -294,5 +311,6 @@ def _least(rows: Rows, withstood: Withstood, what: str) -> tuple[Sentence, Named
         *_beyond(rows, siblings, kinds),
         *(": ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m")),
         f" deep (design {number:,}{held}{_worst(rows, kinds)}).",
+        *_to_build(rows, number),
     )
     return sentence, Named(f"{title} {where}".rstrip(), number)

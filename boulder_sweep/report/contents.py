@@ -16,7 +16,7 @@ from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
-from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, VERDICTS
+from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD, VERDICTS
 from boulder_sweep.columns import REASONS as VERDICT_REASONS
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.judge.inputs import SOURCES
@@ -190,6 +190,9 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
     for name, value in settings.items():
         if isinstance(value, Mapping):
             lines += [f"{indent}{name}:", *setting_lines(value, f"{indent}  ")]
+        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+            for place, one in enumerate(value, 1):
+                lines += [f"{indent}{name} {place}:", *setting_lines(one, f"{indent}  ")]
         else:
             shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in _as_list(value))
             lines.append(f"{indent}{name}: {shown}")
@@ -253,7 +256,7 @@ def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _units() -> list[str]:
-    return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES)} | {"J", "N"})
+    return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES, *TO_BUILD)} | {"J", "N"})
 
 
 def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any], ground: Ground) -> dict[str, Any]:

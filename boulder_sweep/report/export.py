@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from boulder_sweep.answers.files import AnswerFile, result_of
-from boulder_sweep.columns import BY_NAME, DESIGN_ID
+from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
+from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
@@ -34,6 +35,8 @@ JUDGED_BY = Shown(
 NUMBER_FORMATS = {
     "m": "0.000",
     "ft": "0.000",
+    "m^3": "0.0",
+    "yd^3": "0.0",
     "kg": "#,##0",
     "lb": "#,##0",
     "kg/m^3": "#,##0",
@@ -135,6 +138,7 @@ def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Tabl
     for table in finished.tables():
         if finished.judged_by:
             table = table.append_column(JUDGED_BY.stored, pa.array([finished.judged_by] * len(table)))
+        table = _with_quantities(table, finished.identity["settings"])
         columns = [JUDGED_BY if field.name == JUDGED_BY.stored else _shown(field, units) for field in table.schema]
         for place, column in enumerate(columns):
             if column.size != 1.0:
@@ -143,12 +147,27 @@ def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Tabl
         yield columns, table.rename_columns([column.name for column in columns])
 
 
+def _with_quantities(table: pa.Table, settings: Mapping[str, Any]) -> pa.Table:
+    """Return a table of designs with what these take to build, as far as it has no such columns yet."""
+    import pyarrow as pa
+
+    if not set(table.column_names) >= {*NEEDED}:
+        return table  # a time history
+    names = (*NEEDED, *({BOULDER_MASS} & set(table.column_names)))
+    found = quantities_by({name: table.column(name).to_numpy() for name in names}, settings)
+    for spec in QUANTITIES:
+        if spec.name not in table.column_names:
+            field = pa.field(spec.name, pa.float64(), metadata={"unit": spec.unit, "meaning": spec.meaning})
+            table = table.append_column(field, pa.array(found[spec.name], from_pandas=True))
+    return table
+
+
 def _shown(field: pa.Field, units: str) -> Shown:
     """Return how a column is shown, by the register of columns or, of an answer, by its own metadata.
 
-    Intervals are texts and stay in their unit.
+    Intervals are texts and stay in their unit. A mass is as weighed, or follows from the density.
     """
-    if field.name in BY_NAME or not field.metadata:
+    if (field.name in BY_NAME and field.name != BOULDER_MASS) or not field.metadata:
         return shown_column(field.name, units)
     unit, meaning = (field.metadata.get(key, b"").decode() for key in (b"unit", b"meaning"))
     return shown_as(field.name, unit, meaning, units if str(field.type) == "double" else "si")

@@ -19,10 +19,12 @@ from boulder_sweep.errors import ReportError
 from boulder_sweep.impact.explanation import one_design
 from boulder_sweep.judge.evaluation import evaluation_of, known_control
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.quantities import NEEDED, quantities_by
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import completed
+from boulder_sweep.settings.shape import Shape
 from boulder_sweep.store.reader import FinishedRows, read_row
 from boulder_sweep.text import counted
 
@@ -188,7 +190,14 @@ class Rows:
         if BOULDER_MASS in self.inputs:
             return self.inputs[BOULDER_MASS]
         length, width, height, density = (self.inputs[name] for name in SIZES)
-        return length * width * height * density
+        return length * width * height * density * Shape.of_list(self.settings["model"].get("profile", [])).filled
+
+    def to_build(self, number: int) -> dict[str, float]:
+        """Return what one design takes to build, by the names of `boulder_sweep.judge.quantities.QUANTITIES`."""
+        columns = self.inputs | {DEPTH: self.depth()}
+        names = (*NEEDED, *({BOULDER_MASS} & set(columns)))
+        own = {name: np.broadcast_to(columns[name], self.shape).flat[number] for name in names}
+        return {name: float(value) for name, value in quantities_by(own, self.settings).items()}
 
     def varying(self) -> tuple[str, ...]:
         """Axes of more than one value; of a list, the columns of more than one value."""

@@ -22,6 +22,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3, SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system
+from boulder_sweep.settings.site_data import derived_words
 from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
 from boulder_sweep.text import counted, printable, why
@@ -237,6 +238,7 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
     notes = [f"{FOOT_WORDS[settings['model']['foot']].capitalize()}."]
     if settings["model"].get("rock_assumed"):
         notes.append(f"The density of the rock was not given: {ROCK_KG_M3:g} kg/m³ is assumed, and no pass is robust.")
+    notes += [f"{words}." for words in derived_words(settings.get("derived", {}))]
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:

@@ -15,6 +15,7 @@ from boulder_sweep.settings.distribution_reader import read_input
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_single
 from boulder_sweep.settings.problems import Position, ProblemList, nearest, shorten
+from boulder_sweep.settings.site_data import APPROACH, CORRELATION, METHODS, SOIL_KEYS, unfold_approaches, unfold_soils
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ SIDES = ("length", "width", "height")
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table", "report")
+SITE_KEYS = {"soil": METHODS, "vehicle": (APPROACH,)}
+"""Keys of a block that stand for others; see `boulder_sweep.settings.site_data`."""
 
 
 class Entries:
@@ -50,6 +53,8 @@ class Entries:
         Names of the named sets of a block that is a list of them.
     table : DesignList or None
         The table named in the file.
+    derived : dict of str to Any
+        What inputs were worked out of, by the key of the file.
     """
 
     def __init__(self, root: Mapping, path: Path, problems: ProblemList) -> None:
@@ -62,6 +67,7 @@ class Entries:
         self.misspelled: set[str] = set()
         self.sets: dict[str, tuple[str, ...]] = {}
         self.table: DesignList | None = None
+        self.derived: dict[str, Any] = {}
 
     def read(self) -> None:
         """Read the whole file; mistakes go to `problems`."""
@@ -72,12 +78,33 @@ class Entries:
         for problem in unfold_springs(self.root):
             self.given.add("vehicle.spring")
             self.problems.add(problem.position, "vehicle.spring", problem.message)
+        self._read_site_data()
         for section in fields.SECTIONS:
             self._read_block(section)
+        both = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
+        if any(both <= set(soil) for soil in self.derived.get("soil", ())):
+            self.settings.setdefault("correlation", CORRELATION)
         if "profile" in self.settings:
             self._take_sides(self.settings["profile"])
         elif "boulder.profile" in self.given:  # its mistakes are reported, and its sides are not missing
             self.given |= {f"boulder.{key}" for key in SIDES}
+
+    def _read_site_data(self) -> None:
+        """Replace what stands for other entries by these."""
+        mistakes, approaches = unfold_approaches(self.root)
+        for mistake in mistakes:
+            self.given.add("vehicle.speed")
+            self.problems.add(mistake.position, f"vehicle.{APPROACH}", mistake.message)
+        if approaches:
+            self.derived[APPROACH] = approaches
+        columns = () if self.table is None else self.table.columns
+        listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in columns]
+        mistakes, soils = unfold_soils(self.root, listed)
+        for mistake in mistakes:
+            self.given |= {f"soil.{key}" for key in SOIL_KEYS}
+            self.problems.add(mistake.position, "soil", mistake.message)
+        if soils:
+            self.derived["soil"] = soils
 
     def _take_sides(self, points: tuple[ProfilePoint, ...]) -> None:
         """Take the sides of the boulder from its profile, which must not be given beside it."""
@@ -122,7 +149,7 @@ class Entries:
         for inner in node:
             field = known.get(inner.key)
             if field is None:
-                self.unknown(inner, section, tuple(known))
+                self.unknown(inner, section, (*known, *SITE_KEYS.get(section, ())))
                 continue
             self.given.add(field.path)
             try:
@@ -155,7 +182,8 @@ class Entries:
                     self.problems.add(inner.position, field.path, message)
                     continue
                 if field is None:
-                    self.unknown(inner, section, ("name", *(key for key in known if known[key] in fields.INPUTS)))
+                    inputs = (key for key in known if known[key] in fields.INPUTS)
+                    self.unknown(inner, section, ("name", *inputs, *SITE_KEYS.get(section, ())))
                     continue
                 self.given.add(field.path)
                 try:

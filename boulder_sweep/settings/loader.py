@@ -192,6 +192,7 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         partial_factor=factor,
         overrides=overrides,
         heading=heading,
+        derived=entries.derived,
     )
     positions = {field.name: entries.position_of(field) for field in fields.INPUTS}
     object.__setattr__(sweep, "notes", tuple(notes_on(sweep, positions)))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import Sweep
 
 # Constant of horizontal subgrade reaction [MN/m^3] over friction angle [deg] of the two families in use.
-_API_ANGLES, _API = np.array([30.0, 43.0]), np.array([10.5, 110.0])
+API_ANGLES, _API = np.array([30.0, 43.0]), np.array([10.5, 110.0])
 _TERZAGHI_ANGLES, _TERZAGHI = np.array([30.0, 35.0, 40.0]), np.array([2.2, 6.6, 17.6])
 
 FAMILY_FACTOR = 2.0
@@ -260,7 +260,7 @@ def _thinned(values: np.ndarray) -> np.ndarray:
 
 def api_curve(angle: np.ndarray) -> np.ndarray:
     """Constant of horizontal subgrade reaction [MN/m^3] by the API curve, over the friction angle [deg]."""
-    return _log_line(angle, _API_ANGLES, _API)
+    return _log_line(angle, API_ANGLES, _API)
 
 
 def terzaghi_curve(angle: np.ndarray) -> np.ndarray:

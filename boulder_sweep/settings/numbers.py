@@ -150,10 +150,12 @@ _SAMPLES = {
     "kg": "6800 kg or 15000 lb",
     "s": "1 s",
     "m/s": "13.4 m/s or 30 mph",
+    "m/s^2": "1.5 m/s^2",
     "deg": "36 deg",
     "kg/m^3": "2650 kg/m^3 or 116 pcf",
     "MN/m^3": "95 MN/m^3 or 350 pci",
     "kPa": "5 kPa",
+    "MPa": "14 MPa",
     "N/m": "3103.3 kN/m",
     "N*s/m": "138.91 kN*s/m",
 }

@@ -17,6 +17,8 @@ _ALTERNATIVES = {
     "site.embedment_depth": "embedment_ratio",
     "solver.accuracy": "step",
     "solver.step": "accuracy",
+    "vehicle.speed": "approach",
+    "vehicle.approach": "speed",
 }
 """Setting one removes the other from the file, which holds only one of them; two options contradict each other."""
 

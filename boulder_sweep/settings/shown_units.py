@@ -12,6 +12,7 @@ SYSTEMS = ("si", "us")
 
 _SHOWN: dict[str, tuple[str, str]] = {
     "m": ("m", "ft"),
+    "m^3": ("m^3", "yd^3"),
     "kg": ("kg", "lb"),
     "kg/m^3": ("kg/m^3", "pcf"),
     "MN/m^3": ("MN/m^3", "pci"),

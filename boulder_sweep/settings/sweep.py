@@ -112,6 +112,8 @@ class Sweep:
         Entries that replaced those of the file, as of ``--set``.
     heading : Heading
         Project, client, author and date for the heading of a report.
+    derived : dict of str to Any
+        What inputs were worked out of, by the key of the file: the run-up that gives a speed.
     notes : tuple of Problem
         Notes that are not errors.
     """
@@ -131,6 +133,7 @@ class Sweep:
     notes: tuple[Problem, ...] = ()
     overrides: tuple[str, ...] = ()
     heading: Heading = NO_HEADING
+    derived: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def plan(self) -> DesignPlan:
@@ -195,6 +198,8 @@ class Sweep:
             more["labels"] = {name: _texts_listed(label) for name, label in self.plan.labels.items()}
         if self.partial_factor != 1.0:
             more["partial_factor"] = {"friction_angle": self.partial_factor}
+        if self.derived:
+            more["derived"] = self.derived
         ground = self.model.ground
         return {
             "name": self.name,

@@ -51,6 +51,7 @@ psi = pound_force / inch ** 2
 ksi = kip / inch ** 2
 psf = pound_force / foot ** 2
 ksf = kip / foot ** 2
+tsf = 2 ksf
 pci = pound_force / inch ** 3
 pcf = pound_force / foot ** 3
 kci = kip / inch ** 3
@@ -78,10 +79,12 @@ EXPECTED: dict[str, Expected] = {
     "kg": Expected("a mass", "kg, t, lb or short_ton"),
     "s": Expected("a time", "s or ms"),
     "m/s": Expected("a speed", "m/s, km/h, mph or ft/s"),
+    "m/s^2": Expected("an acceleration", "m/s^2 or ft/s^2"),
     "deg": Expected("an angle", "deg or rad"),
     "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3"),
     "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci"),
     "kPa": Expected("a pressure", "kPa, Pa or MPa"),
+    "MPa": Expected("a pressure", "MPa, kPa or tsf"),
     "N/m": Expected("a stiffness", "kN/m, N/m or lb/in"),
     "N*s/m": Expected("a damping constant", "kN*s/m, N*s/m or lb*s/in"),
     "1": Expected("a plain number", "no unit, or %"),
@@ -91,7 +94,6 @@ _KINDS = (
     ("m^2", "an area"),
     ("m^3", "a volume"),
     ("N", "a force"),
-    ("m/s^2", "an acceleration"),
     ("1/s", "a frequency"),
     ("N*m", "a moment"),
 )

@@ -39,6 +39,8 @@ SIGNALS = (
     ("rotation", "Rotation of the boulder", "rotation [deg]"),
     ("vehicle_displacement", "Displacement of the vehicle", "displacement [m]"),
 )
+MEASURED = (*SIGNALS, ("vehicle_acceleration", "Acceleration of the vehicle", "acceleration [m/s²]"))
+"""Signals that a test may hold."""
 FIGURES = {"abg": ("12 to 14", "figures_12_to_14_abg.png"), "rwg": ("16 to 18", "figures_16_to_18_rwg.png")}
 
 
@@ -107,7 +109,7 @@ def draw_crash_test(
 
 def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory | None) -> None:
     """Draw one signal under all presets."""
-    title, label = next((title, label) for signal, title, label in SIGNALS if signal == name)
+    title, label = next((title, label) for signal, title, label in MEASURED if signal == name)
     for preset, trajectory in trajectories.items():
         style = STYLES.get(preset, {"color": BLACK})
         words = f"simulated, {preset.replace('_', ' ')}"

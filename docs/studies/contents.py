@@ -10,7 +10,19 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import against_tests, answers, energy, forms, free_region, moves, scale, soil, stones, unloading
+from docs.studies import (
+    against_tests,
+    answers,
+    energy,
+    forms,
+    free_region,
+    moves,
+    scale,
+    site_data,
+    soil,
+    stones,
+    unloading,
+)
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -294,6 +306,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
     "published-spreads": answers.published_spreads,
+    "borehole-notes": site_data.notes_of_borehole,
+    "speed-street": site_data.speed_of_street,
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
 }

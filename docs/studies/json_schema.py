@@ -21,6 +21,15 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
 )
+from boulder_sweep.settings.site_data import (
+    APPROACH,
+    APPROACH_FIELDS,
+    METHODS,
+    READING_FIELDS,
+    RELATIVE_DENSITY,
+    SOIL_KEYS,
+    SPEED,
+)
 from boulder_sweep.settings.starter import default_of
 from boulder_sweep.settings.units import EXPECTED
 
@@ -77,6 +86,7 @@ def _block(section: str, words: str) -> Schema:
             entry = {"description": _described(field), **_entry(field)}
             default = default_of(field)
             entries[field.key] = entry if default is None else {**entry, "default": default}
+    entries |= _SITE_DATA.get(section, {})
     block: Schema = {"description": words, "additionalProperties": False, "properties": entries}
     if section not in NAMED_SETS:
         return {"type": ["object", "null"], **block}
@@ -85,7 +95,10 @@ def _block(section: str, words: str) -> Schema:
         for field in INPUTS
         if field.section == section
     }
-    named = _object({"name": {"type": "string", "pattern": f"^({NAME.pattern})$"}, **inputs}, ("name",))
+    named = _object(
+        {"name": {"type": "string", "pattern": f"^({NAME.pattern})$"}, **inputs, **_SITE_DATA.get(section, {})},
+        ("name",),
+    )
     return {"type": ["object", "array", "null"], **block, "minItems": 1, "items": named}
 
 
@@ -218,6 +231,29 @@ _FORMS: dict[str, Schema] = {
 """Entries that are more than a quantity."""
 
 
+_BY_TEST = {
+    method: {"anyOf": [reading, {"type": "array", "minItems": 1, "items": reading}]}
+    for method, reading in (
+        (method, _object({key: _value(field) for key, field in known.items()}, ()))
+        for method, known in READING_FIELDS.items()
+    )
+}
+_SITE_DATA: dict[str, Schema] = {
+    "soil": {
+        **{method: {**form, "description": f"readings ({method})"} for method, form in _BY_TEST.items()},
+        RELATIVE_DENSITY.key: {**_value(RELATIVE_DENSITY), "description": RELATIVE_DENSITY.meaning},
+    },
+    "vehicle": {
+        APPROACH: {
+            **_object({key: _value(field) for key, field in APPROACH_FIELDS.items()}, ("length", "acceleration")),
+            "description": "the street to the boulder, in place of the speed",
+            "anyOf": [{"required": ["from"]}, {"required": ["curve_radius"]}],
+        }
+    },
+}
+"""Entries that stand for others."""
+
+
 DENSITY, BOULDER_MASS = "boulder_density_kg_m3", "boulder_mass_kg"
 """One of these suffices."""
 
@@ -229,8 +265,13 @@ def _what_is_required() -> Schema:
         if not field.optional:
             needed = sections.setdefault(field.section, {"required": []})["required"]
             needed += [] if field.section == "boulder" else [field.key]
+    sections["vehicle"]["required"].remove(SPEED)
+    sections["vehicle"]["anyOf"] = [{"required": [SPEED]}, {"required": [APPROACH]}]
+    constants = {"required": sections["soil"].pop("required")}
+    assert set(constants["required"]) == set(SOIL_KEYS)
+    sections["soil"]["anyOf"] = [constants, *({"required": [method]} for method in METHODS)]
     for section in set(NAMED_SETS) & set(sections):
-        sections[section]["items"] = {"required": sections[section]["required"]}
+        sections[section]["items"] = dict(sections[section])
     embedment = [field for field in INPUTS if field.name in EMBEDMENT]
     sections[embedment[0].section] = {"oneOf": [{"required": [field.key]} for field in embedment]}
     density_or_mass = [BY_NAME[name].key for name in (DENSITY, BOULDER_MASS)]

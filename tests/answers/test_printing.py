@@ -106,7 +106,7 @@ def test_many_answers_without_a_soil_that_varies_are_one_table() -> None:
         GRID.replace("[36, 38, 40, 42] deg", "40 deg").replace("[50, 80]", "50").replace("step: 0.2 m", "step: 0.04 m")
     )
     lines = need_lines(need(load_text(text, Path("grid.yaml")), tolerance="1 cm"))
-    assert lines[0].split() == ["W", "H", "depth", "ratio", "above", "mass", "margin", "second"]
+    assert lines[0].split() == ["W", "H", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
     assert [line.split()[1] for line in lines[3:55]].count("3.6") == 2
 
 

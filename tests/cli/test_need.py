@@ -23,11 +23,11 @@ def test_table_fits_the_terminal(sweep):
 def test_columns_of_the_table(sweep):
     _, out, _ = sweep("need", CONFIG, "-q")
     head = out.splitlines()[0].split()
-    assert head == ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "second"]
+    assert head == ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
     assert len(out.splitlines()) >= 3 + 12
     assert "printed" not in out
     _, out, _ = sweep("need", CONFIG, "-q", "--other-readings")
-    assert out.splitlines()[0].split()[-1] == "printed"
+    assert out.splitlines()[0].split()[8:] == ["printed", "dig", "fill"]
     assert "printed: by the equations as the paper prints them, misprints included" in out
 
 

@@ -158,6 +158,36 @@ def test_command_overlays_measured_data(sweep: Command, tmp_path: Path) -> None:
     assert content[0]["measured_peak"] == 12.0
 
 
+@pytest.mark.usefixtures("known_study")
+def test_the_command_scores_a_test(sweep: Command, tmp_path: Path) -> None:
+    rwg = (Path(__file__).parents[2] / "configs" / "rwg.yaml").read_text()
+    film = tmp_path / "film.csv"
+    film.write_text(
+        "time [ms],rotation [deg],boulder_displacement [cm],vehicle_displacement [m],vehicle_acceleration [g]\n"
+        "0,0,0,0,0\n30,0.5,1,0.4,-11\n60,2,4,0.7,-14\n100,4.4,9,1.0,-9\n300,,28,,0\n400,12,27,,0\n"
+    )
+    case = tmp_path / "own.yaml"
+    case.write_text(
+        rwg.replace("friction_angle: 43.2 deg", "friction_angle: {mean: 43.2 deg, sd: 3 deg}")
+        + "\nmodel: {second_opinion: [broms]}\n"
+    )
+    code, out, _ = sweep("validate", "--measured", film, "--case", case, "--json")
+    content = json.loads(out)
+    forms = list(dict.fromkeys(own["form"] for own in content["scores"]))
+    assert code == 0
+    assert forms == ["paper's law, as printed", "paper's law, corrected", "second opinion, broms"]
+    peak = next(
+        own
+        for own in content["scores"]
+        if own["form"] == "paper's law, corrected" and own["quantity"] == "peak rotation"
+    )
+    assert peak["simulated"] == pytest.approx(13.76, abs=0.01), "at the means, not at the unfavourable quantile"
+    assert (peak["measured"], peak["side"]) == (12.0, "safe")
+    _, out, _ = sweep("validate", "--measured", film, "--case", case)
+    assert "scores, up to the limit of the rotation:" in out
+    assert [text for text in out.splitlines() if len(text) > 80 and str(tmp_path) not in text] == []
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

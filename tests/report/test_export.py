@@ -17,6 +17,7 @@ import boulder_sweep
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import ReportError
+from boulder_sweep.judge.quantities import QUANTITIES
 from boulder_sweep.report import export as module
 from boulder_sweep.report import write_explorer, write_report, writing
 from boulder_sweep.report.export import export
@@ -61,7 +62,10 @@ def test_every_row_is_there_in_the_units_asked_for(result, table, tmp_path, kind
     read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "xlsx": lambda file: pd.read_excel(file, "designs")}[kind]
     found = read(target)
     assert len(found) == len(table)
-    assert list(found.columns) == [shown_column(name, "us").name for name in table.columns]
+    added = ["boulder_mass_lb", "height_above_ground_ft", "excavated_yd3", "backfill_yd3"]
+    assert list(found.columns) == [*(shown_column(name, "us").name for name in table.columns), *added]
+    buried = table.eval("boulder_length_m * boulder_width_m * embedment_depth_m") / 0.9144**3
+    np.testing.assert_allclose(found.excavated_yd3 - found.backfill_yd3, buried, rtol=1e-9)
     for name in table.columns:
         column = shown_column(name, "us")
         if table[name].dtype == float:
@@ -296,7 +300,8 @@ def test_files_of_answers_are_exported_like_results(answers, tmp_path, name, kin
     assert export(file, target, units="us") == len(table)
     read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "xlsx": lambda file: pd.read_excel(file, "designs")}[kind]
     found = read(target)
-    assert len(found.columns) == len(table.column_names)
+    added = QUANTITIES if name == "uncertainty" else ()  # tables of other answers have them
+    assert len(found.columns) == len(table.column_names) + len(added)
     for place, field in enumerate(table.schema):
         shown, own = found.columns[place], table.column(place).to_pylist()
         unit = field.metadata[b"unit"].decode() if field.metadata else ""

@@ -68,8 +68,12 @@ def test_the_answer_names_the_least_boulder_that_passes_in_every_soil(rows, tabl
     assert answer.named[0].number == lightest.design_id
     sentence = next(sentence for sentence in answer.sentences if "lightest" in str(sentence[0]))
     quantities = [part for part in sentence if isinstance(part, Quantity)]
-    assert [part.value for part in quantities] == pytest.approx([lightest.mass, lightest.embedment_depth_m])
-    assert f"margin {lightest.margin:.1%}" in sentence[-1]
+    above = lightest.boulder_height_m - lightest.embedment_depth_m
+    assert [part.value for part in quantities[:3]] == pytest.approx([lightest.mass, lightest.embedment_depth_m, above])
+    assert [part.unit for part in quantities] == ["kg", "m", "m", "m^3", "m^3"]
+    buried = lightest.boulder_length_m * lightest.boulder_width_m * lightest.embedment_depth_m
+    assert quantities[3].value - quantities[4].value == pytest.approx(buried)
+    assert any(f"margin {lightest.margin:.1%}" in str(part) for part in sentence)
     shallowest = table[everywhere].embedment_depth_m.min()
     assert table.embedment_depth_m[answer.named[1].number] == pytest.approx(shallowest)
 

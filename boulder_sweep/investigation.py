@@ -1,0 +1,162 @@
+"""Sand by what an investigation measures: blow counts, cone resistance, relative density, in plain numbers.
+
+Published correlations for clean sand. Where a source leaves a choice, the one with the weaker soil is taken: the stress
+that a reading is normalized by is that of dense soil without water where no density is measured, the normalization is
+limited to 1.7 (Youd et al. 2001), rods count as no longer than the depth (Skempton 1986), the excess pore pressure
+behind a cone is left out, and nothing is extrapolated. `docs/site_data.md` tells which of the sources were seen.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+G = 9.80665
+ATMOSPHERE_KPA = 101.325
+LARGEST_FACTOR = 1.7
+"""Largest normalization of a blow count or a cone resistance by the stress: Youd et al. (2001)."""
+RODS = ((4.0, 0.75), (6.0, 0.85), (10.0, 0.95), (math.inf, 1.0))
+"""Lengths of the rods [m] up to which each factor on blow counts holds: Skempton (1986)."""
+HAMMERS = 0.78
+"""Energy ratio of the hammers in Hatanaka and Uchida (1996), by UFC 3-220-10, Eq 8-6."""
+PCF = 16.018463373960142
+"""One pound per cubic foot [kg/m^3]."""
+
+
+class OutsideError(ValueError):
+    """A reading lies outside of what a correlation holds for; the message says so."""
+
+
+class Range(NamedTuple):
+    """What a correlation admits, ends included."""
+
+    low: float
+    high: float
+
+    def check(self, value: float, what: str, unit: str = "") -> None:
+        """Raise `OutsideError` where a value is outside by more than rounding, or is NaN."""
+        if not self.low * (1.0 - 1e-9) <= value <= self.high * (1.0 + 1e-9):
+            ends = f"{self.low:.4g} to {self.high:.4g}{unit}"
+            raise OutsideError(f"{what} is {value:.4g}{unit}; the correlation holds from {ends}")
+
+
+BLOW_COUNTS = Range(3.5 * HAMMERS / 0.6, 30.0 * HAMMERS / 0.6)
+"""(N1)60 that Hatanaka and Uchida's line is taken for: N1 from 3.5 to 30 with their hammers."""
+CONE_ANGLES = Range(30.0, 46.0)
+"""Friction angles [deg] that Kulhawy and Mayne's line is taken for."""
+RELATIVE_DENSITIES = Range(0.15, 0.85)
+"""Where the table of EM 1110-2-2504 gives both ends of the friction angle."""
+SPT_SD_DEG, CPT_SD_DEG, DENSITY_SD_DEG = 3.0, 2.8, 2.0
+"""Transformation uncertainty of the friction angle [deg], as a standard deviation: the scatter about Hatanaka and
+Uchida's line; that of Kulhawy and Mayne, with which Phoon and Kulhawy (1999) calculate; Bowles (1996), Table 3-4."""
+
+
+class State(NamedTuple):
+    """A state of sand in the table of EM 1110-2-2504 (Table 3-1, after Teng 1962)."""
+
+    name: str
+    relative_density: float
+    """Upper end [-]."""
+    friction_angle_deg: float
+    """At this end."""
+    lightest_pcf: float
+    heaviest_pcf: float
+    """Moist unit weight."""
+
+
+STATES = (
+    State("loose", 0.35, 30.0, 95.0, 125.0),
+    State("medium", 0.65, 36.0, 110.0, 130.0),
+    State("dense", 0.85, 41.0, 110.0, 140.0),
+)
+LOOSEST = (0.15, 28.0)
+"""Relative density and friction angle [deg] where the first of them begins."""
+
+
+def vertical_stress(depth_m: float, density_kg_m3: float | None) -> float:
+    """Return the vertical stress at a depth [kPa], in dense soil where no density is known; water is left out.
+
+    Both make it larger, and so the friction angle smaller.
+    """
+    density = STATES[-1].heaviest_pcf * PCF if density_kg_m3 is None else density_kg_m3
+    return density * G * depth_m / 1e3
+
+
+def stress_factor(stress_kPa: float) -> float:
+    """Return C_N = sqrt(p_a / sigma'), at most 1.7 (Liao and Whitman 1986; Youd et al. 2001); also for cones."""
+    return min(math.sqrt(ATMOSPHERE_KPA / stress_kPa), LARGEST_FACTOR)
+
+
+def rod_factor(length_m: float) -> float:
+    """Return the factor on a blow count for rods of a length [m], which lose energy where they are short."""
+    return next(factor for longest, factor in RODS if length_m <= longest)
+
+
+def normalized_blow_count(n: float, energy_ratio: float, depth_m: float, stress_kPa: float) -> float:
+    """Return (N1)60 = N (ER / 0.6) C_R C_N of a raw blow count.
+
+    Parameters
+    ----------
+    n
+        Blows for the last 300 mm (1 ft), as logged.
+    energy_ratio
+        Energy of the hammer that reaches the rods, a fraction.
+    depth_m
+        Depth of the reading, and least length of the rods [m].
+    stress_kPa
+        Effective vertical stress there [kPa].
+    """
+    return n * energy_ratio / 0.6 * rod_factor(depth_m) * stress_factor(stress_kPa)
+
+
+def angle_by_blow_count(n1_60: float) -> float:
+    """Return the friction angle [deg], sqrt(15.4 (N1)60) + 20 (Hatanaka and Uchida 1996; UFC 3-220-10, Eq 8-6).
+
+    Raises
+    ------
+    OutsideError
+        Outside `BLOW_COUNTS`.
+    """
+    BLOW_COUNTS.check(n1_60, "(N1)60")
+    return math.sqrt(15.4 * n1_60) + 20.0
+
+
+def angle_by_cone(resistance_MPa: float, stress_kPa: float) -> float:
+    """Return the friction angle [deg], 17.6 + 11 lg(q_c / p_a sqrt(p_a / sigma')) (Kulhawy and Mayne 1990).
+
+    The square root is limited as for blow counts. UFC 3-220-10, Eq 8-7, prints the stress without the root, which would
+    give larger angles below one atmosphere.
+
+    Raises
+    ------
+    OutsideError
+        The angle is outside `CONE_ANGLES`.
+    """
+    normalized = 1e3 * resistance_MPa / ATMOSPHERE_KPA * stress_factor(stress_kPa)
+    angle = 17.6 + 11.0 * math.log10(normalized)
+    CONE_ANGLES.check(angle, f"the friction angle by {resistance_MPa:g} MPa", " deg")
+    return angle
+
+
+def angle_by_relative_density(ratio: float) -> float:
+    """Return the friction angle [deg] by EM 1110-2-2504, Table 3-1, linear between the ends of its states.
+
+    Raises
+    ------
+    OutsideError
+        Outside `RELATIVE_DENSITIES`.
+    """
+    RELATIVE_DENSITIES.check(ratio, "the relative density")
+    ends = [LOOSEST, *((own.relative_density, own.friction_angle_deg) for own in STATES)]
+    return float(np.interp(ratio, *np.transpose(ends)))
+
+
+def densities(angle_deg: float) -> tuple[float, float]:
+    """Return the least and largest moist density [kg/m^3] of sand with a friction angle, by EM 1110-2-2504, Table 3-1.
+
+    Beyond the table the density of dense sand counts, which is less than that of very dense one.
+    """
+    state = next((own for own in STATES if angle_deg <= own.friction_angle_deg), STATES[-1])
+    return state.lightest_pcf * PCF, state.heaviest_pcf * PCF

@@ -1,0 +1,466 @@
+"""Entries that hold what a site gives: the street in place of a speed, readings in place of soil constants.
+
+Each is worked out while the file is read and stands for entries of the table from then on; what was used is kept, so
+that it can be printed, stored and reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from boulder_sweep import investigation as sand
+from boulder_sweep.approach import Approach, NoApproachError
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
+from boulder_sweep.settings.model import Bound, Field
+from boulder_sweep.settings.problems import did_you_mean, shorten
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
+
+APPROACH = "approach"
+SPEED = "speed"
+APPROACH_FIELDS = {
+    key: Field("vehicle.approach", key, name, unit, meaning, bound)
+    for key, name, unit, meaning, bound in (
+        (
+            "length",
+            "length_m",
+            "m",
+            "length of the run-up: from its beginning, or the end of its last curve, to the boulder",
+            Bound(0.0, 1e5, "a length"),
+        ),
+        ("from", "from_m_s", "m/s", "speed at the beginning of the run-up", Bound(0.0, 100.0, "up to 360 km/h")),
+        (
+            "acceleration",
+            "acceleration_m_s2",
+            "m/s^2",
+            "acceleration of the vehicle at full throttle on level ground",
+            Bound(0.0, 20.0, "tyres transmit about 1 g at most"),
+        ),
+        (
+            "curve_radius",
+            "curve_radius_m",
+            "m",
+            "radius of the curve that ends where the run-up begins",
+            Bound(1.0, 1e5, "no truck turns tighter"),
+        ),
+        (
+            "friction",
+            "friction",
+            "1",
+            "coefficient of friction of the tyres in that curve; 1 if not given, the conservative value",
+            Bound(0.05, 2.0, "0.6 is usual on a road, 1 is conservative"),
+        ),
+        (
+            "grade",
+            "grade",
+            "1",
+            "rise over run of the street in the direction of travel, negative downhill",
+            Bound(-0.5, 0.5, "no street is steeper"),
+        ),
+    )
+}
+"""Entries of a run-up by key."""
+NEEDS_ACCELERATION = (
+    "lacks acceleration: that of the vehicle at full throttle on level ground, averaged over the run-up, by its maker "
+    "or a timed run from rest (2 s / t^2); no values for classes of vehicles are built in"
+)
+
+
+def read_approach(node: Node) -> Approach:
+    """Read ``{length: 80 m, from: 0 mph, acceleration: 1.5 m/s^2, curve_radius: 25 m, friction: 0.8, grade: -4 %}``.
+
+    Raises
+    ------
+    LeafError
+        With every mistake in it.
+    """
+    values = read_block(node, APPROACH_FIELDS, "an approach")
+    given = node.entries if isinstance(node, Mapping) else {}
+    mistakes = []
+    if "length" not in given:
+        mistakes.append(Mistake(node.position, "lacks length, that of the run-up to the boulder"))
+    if "acceleration" not in given:
+        mistakes.append(Mistake(node.position, NEEDS_ACCELERATION))
+    if not {"from", "curve_radius"} & set(given):
+        mistakes.append(Mistake(node.position, "lacks from (0 mph for a start from rest) or curve_radius"))
+    if "friction" in given and "curve_radius" not in given:
+        mistakes.append(Mistake(given["friction"].position, "friction limits the speed in a curve: give curve_radius"))
+    if mistakes:
+        raise LeafError(mistakes)
+    approach = Approach(**values)
+    try:
+        speed = approach.impact_speed_m_s
+    except NoApproachError as error:
+        raise LeafError([Mistake(node.position, str(error))]) from None
+    if speed > 100.0:
+        message = f"reaches {speed:.4g} m/s; more than 100 m/s (360 km/h) is not admitted"
+        raise LeafError([Mistake(node.position, message)])
+    return approach
+
+
+def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
+    """Return the single values of a block by the names of its fields.
+
+    Raises
+    ------
+    LeafError
+        With every mistake in it: no block, an unknown key, a wrong value.
+    """
+    keys = ", ".join(known)
+    if not isinstance(node, Mapping) or node.unit is not None:
+        raise LeafError([Mistake(node.position, f"{what} must be a block of keys: {keys}")])
+    values: dict[str, float] = {}
+    mistakes: list[Mistake] = []
+    for entry in node:
+        field = known.get(entry.key)
+        if field is None:
+            hint = did_you_mean(entry.key, tuple(known))
+            mistakes.append(Mistake(entry.position, f"'{shorten(entry.key)}' is not a key of {what} ({keys}){hint}"))
+            continue
+        try:
+            values[field.name] = read_single(entry.value, field)
+        except LeafError as error:
+            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
+    if mistakes:
+        raise LeafError(mistakes)
+    return values
+
+
+def approach_data(approach: Approach) -> dict[str, Any]:
+    """Return what is kept of a run-up as plain data: what was given, and the speeds that follow."""
+    given = {name: value for name, value in asdict(approach).items() if value is not None}
+    if approach.curve_radius_m is None:
+        del given["friction"]
+    else:
+        given["curve_speed_m_s"] = approach.curve_speed_m_s
+    return {**given, "impact_speed_m_s": approach.impact_speed_m_s}
+
+
+def approach_words(data: dict[str, Any]) -> str:
+    """Return in one line how a speed follows from a run-up, by what `approach_data` returned."""
+    start, curve = data.get("from_m_s", math.inf), data.get("curve_speed_m_s", math.inf)
+    first = "from rest" if start == 0.0 else f"from {_speed(min(start, curve))}"
+    if curve < start:
+        first += f", the most in a curve of {data['curve_radius_m']:.4g} m (sqrt({data['friction']:g} g r))"
+    street = "" if data["grade"] == 0.0 else f", grade {100.0 * data['grade']:+g} %"
+    run = f"over {data['length_m']:.4g} m with {data['acceleration_m_s2']:.4g} m/s^2{street}"
+    return f"{_speed(data['impact_speed_m_s'])} is the most that reaches the boulder: {first}, {run}"
+
+
+SOIL_KEYS = ("friction_angle", "density", "subgrade_reaction")
+"""What readings stand for, as far as a file does not give it."""
+DEPTH = ("depth", "depth_m", "m", "depth of the reading below the ground", Bound(0.1, 30.0, "a depth"))
+READING_FIELDS = {
+    method: {key: Field(f"soil.{method}", key, name, unit, meaning, bound) for key, name, unit, meaning, bound in rows}
+    for method, rows in (
+        (
+            "spt",
+            (
+                ("n", "n", "1", "blows for the last 300 mm (1 ft), as logged", Bound(1.0, 200.0, "a blow count")),
+                (
+                    *("energy_ratio", "energy_ratio", "1", "energy of the hammer that reaches the rods"),
+                    Bound(0.3, 1.0, "60 % is usual"),
+                ),
+                DEPTH,
+                (
+                    *("n1_60", "n1_60", "1", "in place of the three: blow count corrected for energy and stress"),
+                    Bound(1.0, 200.0, "a blow count"),
+                ),
+            ),
+        ),
+        (
+            "cpt",
+            (("q_c", "q_c_MPa", "MPa", "resistance of the cone", Bound(0.01, 150.0, "a cone resistance")), DEPTH),
+        ),
+    )
+}
+"""Entries of a reading by kind of test and key."""
+RELATIVE_DENSITY = Field(
+    *("soil", "relative_density", "relative_density", "1", "relative density of the sand"),
+    Bound(0.0, 1.0, "a share, 0.65 or 65 %"),
+)
+METHODS = (*READING_FIELDS, RELATIVE_DENSITY.key)
+SOURCES = {
+    "spt": "Hatanaka and Uchida 1996",
+    "cpt": "Kulhawy and Mayne 1990",
+    RELATIVE_DENSITY.key: "EM 1110-2-2504, Table 3-1",
+}
+_SD_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
+CORRELATION = 0.99
+"""Of friction angle and subgrade reaction where the second follows from the first; 1 is not admitted."""
+
+
+def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[dict[str, float]]:
+    """Return the readings of a test as plain data, each with the friction angle that follows.
+
+    Parameters
+    ----------
+    node : Node
+        ``{n: 28, energy_ratio: 60 %, depth: 1.5 m}``, ``{n1_60: 30}``, ``{q_c: 14 MPa, depth: 1.5 m}``, a list of
+        such, or a relative density.
+    method : str
+        One of `METHODS`.
+    density_kg_m3 : float or None
+        Density of the soil for the stress at a reading; None where the file does not give it.
+
+    Raises
+    ------
+    LeafError
+        With every mistake; a reading outside of what its correlation holds for is one.
+    """
+    if method == RELATIVE_DENSITY.key:
+        ratio = read_single(node, RELATIVE_DENSITY)
+        return [{method: ratio, "friction_angle_deg": _inside(node, lambda: sand.angle_by_relative_density(ratio))}]
+    items = node.items if isinstance(node, Sequence) and node.unit is None else [node]
+    if not items:
+        raise LeafError([Mistake(node.position, "the list is empty; give at least one reading")])
+    found, mistakes = [], []
+    for item in items:
+        try:
+            found.append(_reading(item, method, density_kg_m3))
+        except LeafError as error:
+            mistakes += error.mistakes
+    if mistakes:
+        raise LeafError(mistakes)
+    return found
+
+
+def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, float]:
+    """Return one reading of a penetration test."""
+    values = read_block(node, READING_FIELDS[method], "a reading")
+    position, raw = node.position, {"n", "energy_ratio", "depth_m"}
+    if method == "spt":
+        if "n1_60" in values and raw & set(values):
+            raise LeafError([Mistake(position, "give n, energy_ratio and depth, or n1_60, not both")])
+        if "n1_60" not in values and not raw <= set(values):
+            message = "a reading is n, the blows as logged, with energy_ratio and depth, or n1_60, which is corrected"
+            raise LeafError([Mistake(position, message)])
+    elif len(values) < 2:
+        raise LeafError([Mistake(position, "a reading of a cone has q_c and depth")])
+    if "depth_m" in values:
+        stress = sand.vertical_stress(values["depth_m"], density_kg_m3)
+        values |= {"stress_kPa": stress, "stress_factor": sand.stress_factor(stress)}
+        if method == "spt":
+            values["rod_factor"] = sand.rod_factor(values["depth_m"])
+            values["n1_60"] = sand.normalized_blow_count(values["n"], values["energy_ratio"], values["depth_m"], stress)
+    if method == "spt":
+        angle = _inside(node, lambda: sand.angle_by_blow_count(values["n1_60"]))
+    else:
+        angle = _inside(node, lambda: sand.angle_by_cone(values["q_c_MPa"], values["stress_kPa"]))
+    return {**values, "friction_angle_deg": angle}
+
+
+def _inside(node: Node, of_correlation: Callable[[], float]) -> float:
+    """Return what a correlation gives, or say that it does not hold here."""
+    try:
+        return of_correlation()
+    except sand.OutsideError as error:
+        raise LeafError([Mistake(node.position, f"{error}; give soil.friction_angle as measured")]) from None
+
+
+def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: float | None) -> dict[str, Any]:
+    """Return the soil constants by readings as plain data: the readings, and what is taken of them.
+
+    Of several readings the weakest counts.
+
+    Raises
+    ------
+    LeafError
+        With every mistake.
+    """
+    from boulder_sweep.settings.notes import API_ANGLES, api_curve
+
+    readings = readings_of(node, method, density_kg_m3)
+    angle, sd = min(own["friction_angle_deg"] for own in readings), _SD_DEG[method]
+    data: dict[str, Any] = {"method": method, "source": SOURCES[method], "readings": readings}
+    if "friction_angle" in lacking:
+        data |= {"friction_angle_deg": angle, "friction_angle_sd_deg": sd}
+    if "density" in lacking:
+        data["density_low_kg_m3"], data["density_high_kg_m3"] = sand.densities(angle)
+    if "subgrade_reaction" in lacking:
+        if angle < API_ANGLES[0]:
+            message = f"the API curve begins at {API_ANGLES[0]:g} deg, and these readings give {angle:.4g} deg"
+            raise LeafError([Mistake(node.position, f"{message}; give soil.subgrade_reaction as measured")])
+        # The curve as it is; what the angle may be off by is carried along it, at the slope of its logarithm.
+        curve = api_curve(np.array([angle, *API_ANGLES]))
+        spread = sd * math.log(curve[2] / curve[1]) / float(API_ANGLES[1] - API_ANGLES[0])
+        data |= {"subgrade_reaction_MN_m3": float(curve[0]), "subgrade_reaction_cov": math.sqrt(math.expm1(spread**2))}
+    return data
+
+
+def soil_words(data: dict[str, Any]) -> str:
+    """Return in one line what is taken of readings, by what `soil_of` returned."""
+    weakest = min(data["readings"], key=lambda own: own["friction_angle_deg"])
+    count = len(data["readings"])
+    of = f", the weakest of {count} readings" if count > 1 else ""
+    parts = []
+    if "friction_angle_deg" in data:
+        angle, sd = data["friction_angle_deg"], data["friction_angle_sd_deg"]
+        parts.append(
+            f"friction angle {angle:.4g} deg, sd {sd:g} deg, by {_reading_words(weakest)}{of} ({data['source']})"
+        )
+    if "density_low_kg_m3" in data:
+        ends = f"{data['density_low_kg_m3']:.0f} to {data['density_high_kg_m3']:.0f} kg/m^3"
+        parts.append(f"density {ends}, uniform (EM 1110-2-2504, Table 3-1)")
+    if "subgrade_reaction_MN_m3" in data:
+        beta, cov = data["subgrade_reaction_MN_m3"], data["subgrade_reaction_cov"]
+        parts.append(f"subgrade reaction {beta:.3g} MN/m^3, cov {100.0 * cov:.0f} %, which follows the angle (API)")
+    return "; ".join(parts) or "every constant is given beside these readings, and counts"
+
+
+def _reading_words(reading: dict[str, float]) -> str:
+    if "q_c_MPa" in reading:
+        return f"q_c {reading['q_c_MPa']:g} MPa at {reading['depth_m']:.4g} m, C_N {reading['stress_factor']:.3g}"
+    if "relative_density" in reading:
+        return f"relative density {100.0 * reading['relative_density']:g} %"
+    corrected = f"(N1)60 {reading['n1_60']:.4g}"
+    if "n" not in reading:
+        return corrected
+    energy = f"{100.0 * reading['energy_ratio']:g} %"
+    factors = f"C_N {reading['stress_factor']:.3g}, rods {reading['rod_factor']:g}"
+    return f"N {reading['n']:g} ({energy}) at {reading['depth_m']:.4g} m, {corrected} with {factors}"
+
+
+def unfold_soils(root: Mapping, listed: Collection[str]) -> tuple[list[Mistake], list[dict[str, Any]]]:
+    """Replace the readings of every soil by distributions of the constants that it does not give.
+
+    Parameters
+    ----------
+    root : Mapping
+        The tree of the file, changed in place.
+    listed : collection of str
+        Keys of the soil that a table of designs gives.
+
+    Returns
+    -------
+    mistakes : list of Mistake
+        What is wrong with them.
+    data : list of dict
+        What `soil_of` keeps of each, under the name of its soil where it is a named one.
+    """
+    mistakes: list[Mistake] = []
+    data: list[dict[str, Any]] = []
+    for soil in blocks_of(root, "soil"):
+        given = [key for key in METHODS if key in soil.entries]
+        if not given:
+            continue
+        entry = soil.entries[given[0]]
+        lacking = [key for key in SOIL_KEYS if key not in soil.entries and key not in listed]
+        found: dict[str, Any] = {}
+        try:
+            if len(given) > 1:
+                raise LeafError([Mistake(soil.entries[given[1]].position, f"give one of {', '.join(given)}")])
+            if "water_table" in soil.entries and "subgrade_reaction" in lacking:
+                message = "the API curve is that of dry sand; with a water table give soil.subgrade_reaction"
+                raise LeafError([Mistake(entry.position, message)])
+            found = soil_of(entry.value, given[0], lacking, _plain_density(soil))
+        except LeafError as error:
+            mistakes += error.mistakes
+        name = soil.get("name")
+        if found:
+            data.append(({"name": name.text.strip()} if isinstance(name, Scalar) else {}) | found)
+        for key in given[1:]:
+            del soil.entries[key]
+        replace_entry(soil, given[0], _soil_entries(entry, found))
+    return mistakes, data
+
+
+def _plain_density(soil: Mapping) -> float | None:
+    """Return the density of a soil where it is one plain value."""
+    node = soil.get("density")
+    try:
+        return read_single(node, BY_NAME["soil_density_kg_m3"]) if isinstance(node, Scalar) else None
+    except LeafError:
+        return None  # reported where it stands
+
+
+def _soil_entries(entry: Entry, data: dict[str, Any]) -> list[Entry]:
+    """Return the distributions that readings stand for."""
+    forms: dict[str, dict[str, str]] = {}
+    if "friction_angle_deg" in data:
+        mean, sd = data["friction_angle_deg"], data["friction_angle_sd_deg"]
+        forms["friction_angle"] = {"mean": f"{mean!r} deg", "sd": f"{sd!r} deg"}
+    if "density_low_kg_m3" in data:
+        ends = {end: f"{data[f'density_{end}_kg_m3']!r} kg/m^3" for end in ("low", "high")}
+        forms["density"] = {"distribution": "uniform", **ends}
+    if "subgrade_reaction_MN_m3" in data:
+        mean, cov = data["subgrade_reaction_MN_m3"], data["subgrade_reaction_cov"]
+        forms["subgrade_reaction"] = {"distribution": "lognormal", "mean": f"{mean!r} MN/m^3", "cov": f"{cov!r}"}
+    at = entry.value.position
+    return [
+        Entry(
+            key, entry.position, Mapping(at, {word: Entry(word, at, Scalar(at, text)) for word, text in form.items()})
+        )
+        for key, form in forms.items()
+    ]
+
+
+def derived_words(derived: dict[str, Any]) -> list[str]:
+    """Return how inputs were worked out, a line each, by `boulder_sweep.settings.Sweep.derived`."""
+    lines = []
+    for key, path, words in (("soil", "soil", soil_words), (APPROACH, "vehicle.speed", approach_words)):
+        for data in derived.get(key, []):
+            of_set = f" ({data['name']})" if "name" in data else ""
+            lines.append(f"{path}{of_set}: {words(data)}")
+    return lines
+
+
+def _speed(speed: float) -> str:
+    return f"{speed:.4g} m/s ({speed / 0.44704:.3g} mph)"
+
+
+def unfold_approaches(root: Mapping) -> tuple[list[Mistake], list[dict[str, Any]]]:
+    """Replace the approach of every vehicle by its speed.
+
+    Parameters
+    ----------
+    root : Mapping
+        The tree of the file, changed in place.
+
+    Returns
+    -------
+    mistakes : list of Mistake
+        What is wrong with them.
+    data : list of dict
+        What `approach_data` keeps of each, under the name of its vehicle where it is a named one.
+    """
+    mistakes: list[Mistake] = []
+    data: list[dict[str, Any]] = []
+    for vehicle in blocks_of(root, "vehicle"):
+        entry = vehicle.entries.get(APPROACH)
+        if entry is None:
+            continue
+        try:
+            approach = read_approach(entry.value)
+        except LeafError as error:
+            mistakes += error.mistakes
+            del vehicle.entries[APPROACH]
+            continue
+        if SPEED in vehicle.entries:
+            mistakes.append(Mistake(entry.position, f"give {SPEED} or {APPROACH}, not both"))
+        name = vehicle.get("name")
+        data.append(({"name": name.text.strip()} if isinstance(name, Scalar) else {}) | approach_data(approach))
+        speed = Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s")
+        replace_entry(vehicle, APPROACH, [Entry(SPEED, entry.position, speed)])
+    return mistakes, data
+
+
+def blocks_of(root: Mapping, section: str) -> Iterator[Mapping]:
+    """Yield the block of a section, or each of its named sets."""
+    node = root.get(section)
+    for one in node.items if isinstance(node, Sequence) else [node]:
+        if isinstance(one, Mapping):
+            yield one
+
+
+def replace_entry(block: Mapping, key: str, new: list[Entry]) -> None:
+    """Put entries in the place of one."""
+    entries: dict[str, Entry] = {}
+    for entry in block:
+        entries |= {one.key: one for one in new} if entry.key == key else {entry.key: entry}
+    block.entries = entries

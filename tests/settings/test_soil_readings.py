@@ -1,0 +1,178 @@
+"""Readings in place of soil constants: what the file says, what is taken, what wins, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from boulder_sweep import at_values
+from boulder_sweep import investigation as sand
+from boulder_sweep.settings import load
+from boulder_sweep.settings.distributions import SetDistributions
+from boulder_sweep.settings.notes import api_curve
+from boulder_sweep.settings.site_data import CORRELATION, derived_words
+
+CONSTANTS = "  density: 1859.9\n  friction_angle: 43.2\n  subgrade_reaction: 95\n"
+ANGLE, DENSITY, REACTION = "friction_angle_deg", "soil_density_kg_m3", "subgrade_reaction_MN_m3"
+RAW = "spt: {n: 24, energy_ratio: 60 %, depth: 1.5 m}"
+
+
+@pytest.fixture
+def soil(load_it, minimal):
+    """Load the minimal file with other entries of the soil."""
+    return lambda text, *overrides: load_it(minimal.replace(CONSTANTS, f"  {text}\n"), *overrides)
+
+
+def angle_of(n, depth=1.5, density=None):
+    return sand.angle_by_blow_count(sand.normalized_blow_count(n, 0.6, depth, sand.vertical_stress(depth, density)))
+
+
+def test_a_blow_count_gives_three_uncertain_constants(soil):
+    sweep = soil(RAW)
+    angle = angle_of(24)
+    assert sweep.constants[ANGLE] == angle
+    assert sweep.distributions[ANGLE].to_dict() == {"kind": "normal", "sd": 3.0, "low": 1.0, "high": 60.0}
+    spread = sweep.distributions[DENSITY]
+    assert (spread.kind, spread.low, spread.high) == ("uniform", *sand.densities(angle))
+    assert sweep.constants[REACTION] == pytest.approx(float(api_curve([angle])[0]), rel=1e-12)
+    assert sweep.distributions[REACTION].kind == "lognormal"
+    assert sweep.correlation == CORRELATION
+
+
+def test_what_the_angle_may_be_off_by_is_carried_along_the_curve(soil):
+    """One standard deviation of the angle is one of the logarithm of the subgrade reaction."""
+    spread = soil(RAW).distributions[REACTION]
+    curve = api_curve([36.0, 39.0])
+    assert math.sqrt(math.log1p(spread.cov**2)) == pytest.approx(math.log(curve[1] / curve[0]), rel=1e-9)
+
+
+def test_other_commands_take_the_unfavourable_quantile(soil):
+    taken = at_values(soil(RAW))
+    assert taken.taken_at == dict.fromkeys((ANGLE, DENSITY, REACTION), "p5 low")
+    assert taken.constants[ANGLE] == pytest.approx(angle_of(24) - 1.6449 * 3.0, abs=1e-3)
+    assert taken.derived["soil"]
+
+
+def test_cones_and_relative_density(soil):
+    cone = soil("cpt: {q_c: 9 MPa, depth: 1.5 m}")
+    assert cone.constants[ANGLE] == sand.angle_by_cone(9.0, sand.vertical_stress(1.5, None))
+    assert cone.distributions[ANGLE].sd == 2.8
+    dense = soil("relative_density: 65 %")
+    assert dense.constants[ANGLE] == pytest.approx(36.0)
+    assert dense.distributions[ANGLE].sd == 2.0
+
+
+def test_us_units(soil):
+    metric, us = soil("cpt: {q_c: 9 MPa, depth: 1.5 m}"), soil("cpt: {q_c: 93.984 tsf, depth: 4.9212598 ft}")
+    assert us.constants[ANGLE] == pytest.approx(metric.constants[ANGLE], abs=1e-4)
+
+
+def test_the_weakest_of_several_readings_counts(soil):
+    three = "spt: [{n: 30, energy_ratio: 0.6, depth: 0.7}, {n: 17, energy_ratio: 0.6, depth: 1.5}, {n1_60: 30}]"
+    sweep = soil(three)
+    assert sweep.constants[ANGLE] == angle_of(17)
+    (data,) = sweep.resolved()["derived"]["soil"]
+    assert len(data["readings"]) == 3
+    assert data["readings"][1]["n1_60"] == pytest.approx(17 * 0.75 * 1.7)
+    assert "the weakest of 3 readings" in derived_words(sweep.derived)[0]
+
+
+def test_corrected_counts_are_taken_as_they_are(soil):
+    assert soil("spt: {n1_60: 25}").constants[ANGLE] == sand.angle_by_blow_count(25.0)
+
+
+def test_what_is_measured_wins(soil):
+    sweep = soil(f"{RAW}\n  friction_angle: 35 deg\n  density: 1800 kg/m^3")
+    assert (sweep.constants[ANGLE], sweep.constants[DENSITY]) == (35.0, 1800.0)
+    assert list(sweep.distributions) == [REACTION]
+    assert sweep.correlation == 0.0
+    assert soil(RAW, "soil.friction_angle=35 deg").constants[ANGLE] == 35.0
+    every = soil(f"{RAW}\n{CONSTANTS}")
+    assert every.distributions == {}
+    assert "every constant is given" in derived_words(every.derived)[0]
+
+
+def test_a_measured_density_is_that_of_the_stress(soil):
+    sweep = soil("spt: {n: 24, energy_ratio: 60 %, depth: 5 m}\n  density: 1700 kg/m^3")
+    assert sweep.constants[ANGLE] == angle_of(24, 5.0, 1700.0) > angle_of(24, 5.0)
+
+
+def test_a_given_correlation_stays(soil):
+    assert soil(f"{RAW}\n  correlation: 0.5").correlation == 0.5
+
+
+def test_what_was_used_is_said_and_kept(soil):
+    sweep = soil(RAW)
+    (words,) = derived_words(sweep.derived)
+    assert words == (
+        "soil: friction angle 41.71 deg, sd 3 deg, by N 24 (60 %) at 1.5 m, (N1)60 30.6 with C_N 1.7, rods 0.75 "
+        "(Hatanaka and Uchida 1996); density 1762 to 2243 kg/m^3, uniform (EM 1110-2-2504, Table 3-1); subgrade "
+        "reaction 87.1 MN/m^3, cov 58 %, which follows the angle (API)"
+    )
+    (data,) = sweep.resolved()["derived"]["soil"]
+    assert data["friction_angle_deg"] == sweep.constants[ANGLE]
+    assert data["readings"][0]["stress_factor"] == 1.7
+
+
+def test_named_soils_have_readings_of_their_own(load_it, minimal):
+    soils = "soil: [{name: a, spt: {n1_60: 20}}, {name: b, relative_density: 60 %}, {name: c, density: 1800, "
+    soils += "friction_angle: 38, subgrade_reaction: 40}]\n"
+    sweep = load_it(minimal.replace(f"soil:\n{CONSTANTS}", soils))
+    assert sweep.block(0, 3).columns[ANGLE].to_numpy().tolist() == pytest.approx([37.55, 35.0, 38.0], abs=0.01)
+    spread = sweep.distributions[ANGLE]
+    assert isinstance(spread, SetDistributions)
+    assert [own and own.sd for own in spread.each] == [3.0, 2.0, None]
+    assert [data["name"] for data in sweep.derived["soil"]] == ["a", "b"]
+
+
+def test_beside_a_table_its_columns_win(load_it, minimal, tmp_path):
+    (tmp_path / "soils.csv").write_text(f"{ANGLE},{REACTION}\n36,40\n38,50\n")
+    text = minimal.replace(CONSTANTS, f"  {RAW}\n")
+    (tmp_path / "grid.yaml").write_text(f"table: soils.csv\n{text}")
+    sweep = load(tmp_path / "grid.yaml")
+    assert sweep.block(0, 2).columns[ANGLE].to_numpy().tolist() == [36.0, 38.0]
+    assert list(sweep.distributions) == [DENSITY]
+
+
+@pytest.mark.parametrize(
+    ("entry", "position", "words"),
+    [
+        (
+            "spt: {n: 3, energy_ratio: 60 %, depth: 1.5 m}",
+            "9:8",
+            "holds from 4.55 to 39; give soil.friction_angle",
+        ),
+        ("spt: {n: 60, energy_ratio: 60 %, depth: 1.5 m}", "9:8", "(N1)60 is 76.5"),
+        ("spt: [{n1_60: 30}, {n1_60: 45}]", "9:22", "(N1)60 is 45"),
+        (
+            "spt: {n: 20, depth: 1.5 m}",
+            "9:8",
+            "with energy_ratio and depth, or n1_60",
+        ),
+        ("spt: {n: 20, n1_60: 30}", "9:8", "not both"),
+        ("spt: {n: 20, energy: 60 %, depth: 1 m}", "9:16", "'energy' is not a key of a reading"),
+        ("spt: 20", "9:8", "a reading must be a block of keys: n, energy_ratio, depth, n1_60"),
+        ("spt: []", "9:8", "the list is empty"),
+        ("cpt: {q_c: 14 MPa}", "9:8", "a reading of a cone has q_c and depth"),
+        ("cpt: {q_c: 14 m, depth: 1 m}", "9:14", "a pressure is needed (MPa, kPa or tsf)"),
+        ("cpt: {q_c: 0.7 MPa, depth: 1 m}", "9:8", "holds from 30 to 46 deg"),
+        ("relative_density: 95 %", "9:21", "the correlation holds from 0.15 to 0.85"),
+        ("relative_density: 30 %", "9:21", "the API curve begins at 30 deg"),
+        ("relative_density: 60 %\n  spt: {n1_60: 20}", "9:3", "give one of spt, relative_density"),
+        (f"{RAW}\n  water_table: 1 m", "9:3", "with a water table give soil.subgrade_reaction"),
+    ],
+)
+def test_mistakes(problems_of, minimal, entry, position, words):
+    (problem,) = problems_of(minimal.replace(CONSTANTS, f"  {entry}\n"))
+    assert problem.key == "soil"
+    assert words in problem.message
+    assert f"{problem.line}:{problem.column}" == position
+
+
+def test_the_example_leads_from_a_borehole_to_an_answer():
+    sweep = load(Path(__file__).parents[2] / "configs" / "borehole.yaml")
+    assert set(sweep.derived) == {"soil", "approach"}
+    assert set(sweep.distributions) == {ANGLE, DENSITY, REACTION}
+    assert sweep.constants["impact_speed_m_s"] == pytest.approx(math.sqrt(2 * 1.1 * 80))
