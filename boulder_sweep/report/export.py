@@ -89,7 +89,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         The units are unknown.
     """
     check_system(units)
-    target, finished = Path(file), result_of(location_of(out), ReportError)
+    target, finished = Path(file), result_of(location_of(out), ReportError, histories=True)
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
