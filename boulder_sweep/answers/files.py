@@ -78,7 +78,7 @@ class AnswerFile:
         names = set(self.table.column_names)
         self.kind = next((kind for kind, marks in MARKS.items() if names >= set(marks)), "")
         if not self.kind and not histories:
-            what = f"neither the folder of a run nor a file that -o of {OF_ANSWERS} wrote"
+            what = "a time history" if "time_s" in names else f"no file that -o of {OF_ANSWERS} wrote"
             raise refusal(f"{path} is {what}; `sweep export` takes it")
         if self.kind and not names >= {spec.name for spec in COLUMNS} - LATER:
             raise refusal(f"{path} is damaged; write it again with `sweep {self.kind}`")
