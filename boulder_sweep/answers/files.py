@@ -42,6 +42,8 @@ MARKS = {
 """Columns by which the answers of a command are known."""
 LATER = {"time_to_limit_error_s"}
 """Columns that came after the first such files; one that lacks another column is damaged."""
+OF_ONE_FILE = {"repeat", "commit", "cpu"}
+"""Entries of the metadata by which equal files differ."""
 OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
@@ -61,6 +63,8 @@ class AnswerFile:
     ----------
     rows, rows_done, identity, judged_by, columns, lacking
         As of `FinishedRows`.
+    question : dict
+        What was asked; empty where the command asks nothing more.
     kind : str
         The command that wrote it, a key of `MARKS`; empty for a time history.
 
@@ -74,7 +78,13 @@ class AnswerFile:
         from boulder_sweep.answers.tables import read_parquet
 
         self.path = path
-        self.table, self.identity, self.judged_by = read_parquet(path, refusal)
+        self.table, found, self.judged_by = read_parquet(path, refusal)
+        self._refusal = refusal
+        try:
+            self.question: dict[str, Any] = json.loads(found.pop("question", "{}"))
+        except ValueError as problem:
+            raise refusal(f"{path} is damaged; write it again ({problem})") from problem
+        self.identity = {key: value for key, value in found.items() if key not in OF_ONE_FILE}
         names = set(self.table.column_names)
         self.kind = next((kind for kind, marks in MARKS.items() if names >= set(marks)), "")
         if not self.kind and not histories:
@@ -110,21 +120,29 @@ class AnswerFile:
     @property
     def asked(self) -> int:
         """Number of rows that the command wrote: of the designs, or of combinations of the inputs not asked for."""
-        found = self.answers()
+        found = self.answers() if self.kind == NEED else None
         if not isinstance(found, Need):
             return int(self.identity["settings"]["n_designs"])
         name = found.key.name
         return Open(found.sweep, (*SIDES, DEPTH) if name == BOULDER_MASS else (name,)).count
 
-    @property
-    def question(self) -> dict[str, Any]:
-        """What was asked; empty where the command asks nothing more."""
-        found: dict[str, Any] = json.loads(self.identity.get("question", "{}"))
-        return found
-
     def answers(self) -> Need | Reserves | Uncertainty:
-        """Return the answers as the command had them."""
-        sweep = asked_sweep(self.identity, self.table)
+        """Return the answers as the command had them.
+
+        Raises
+        ------
+        BoulderSweepError
+            Another version wrote them, with other settings.
+        """
+        try:
+            return self._answers(asked_sweep(self.identity, self.table))
+        except (LookupError, TypeError, ValueError) as unfamiliar:
+            raise self._refusal(
+                f"{self.path} was written by another version, whose settings are not those of this one ({unfamiliar}); "
+                "run it again"
+            ) from unfamiliar
+
+    def _answers(self, sweep: Sweep) -> Need | Reserves | Uncertainty:
         if self.kind == CAPACITY:
             from boulder_sweep.answers.reserves import Reserves
 
@@ -166,6 +184,22 @@ def result_of(
     if isinstance(place, RemotePath) or not place.is_file() or (place.resolve().parent / MANIFEST_NAME).exists():
         return FinishedRows(place)
     return AnswerFile(place, refusal, histories=histories)
+
+
+def answered(table: pa.Table) -> pa.Table:
+    """Return answers with what was found of each as its verdict: that it passes, or why nothing does."""
+    import pyarrow.compute as pc
+
+    passes = table["passes_at"].is_valid()
+    words = {
+        "verdict": pc.if_else(passes, "pass", "fail"),
+        "reason": pc.if_else(passes, "", table["found"].cast("string")),
+        "robustness": pc.if_else(passes, table["robustness"].cast("string"), None),
+    }
+    for name, column in words.items():
+        place = table.column_names.index(name)
+        table = table.set_column(place, table.field(name), column.dictionary_encode().cast(table.field(name).type))
+    return table
 
 
 def kind_of(result: FinishedRows | AnswerFile) -> str:

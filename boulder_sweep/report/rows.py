@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.files import CAPACITY, NEED, UNCERTAINTY, AnswerFile, kind_of, result_of
+from boulder_sweep.answers.files import CAPACITY, NEED, UNCERTAINTY, AnswerFile, answered, kind_of, result_of
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.impact.explanation import one_design
@@ -281,7 +281,7 @@ def read_rows(folder: Location) -> Rows:
         _check_whole(finished, folder)
         if finished.kind == NEED:  # a list of the designs at the answers
             order, given = "table", _inputs_of(finished.table, given)
-            finished.table = _answered(finished.table)
+            finished.table = answered(finished.table)
     sets = {} if order == "table" else dict(_sets(settings))
     # Very long axes and the columns of a list are only in the table.
     if order == "table":
@@ -337,22 +337,6 @@ def _inputs_of(table: pa.Table, given: dict[str, Any]) -> dict[str, Any]:
             values = table[name].unique().to_pylist()
             found[name] = values if len(values) > 1 else values[0]
     return found
-
-
-def _answered(table: pa.Table) -> pa.Table:
-    """Return answers with what was found of each as its verdict: that it passes, or why nothing does."""
-    import pyarrow.compute as pc
-
-    passes = table["passes_at"].is_valid()
-    words = {
-        "verdict": pc.if_else(passes, "pass", "fail"),
-        "reason": pc.if_else(passes, "", table["found"].cast("string")),
-        "robustness": pc.if_else(passes, table["robustness"].cast("string"), None),
-    }
-    for name, column in words.items():
-        place = table.column_names.index(name)
-        table = table.set_column(place, table.field(name), column.dictionary_encode().cast(table.field(name).type))
-    return table
 
 
 def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:
