@@ -82,7 +82,7 @@ def _governing(rows: Rows, need: Need, answers: np.ndarray) -> tuple[Sentence, N
     held = np.bincount(boulders, weights=found)
     whole = held == np.bincount(boulders)
     candidates = found & (held == held.max())[boulders]
-    mass = np.broadcast_to(rows.mass(), answers.shape)
+    mass = need.arrow[BOULDER_MASS].to_numpy()
     if need.key.name != BOULDER_MASS:  # which differs from soil to soil
         lightest = int(np.argmin(np.where(candidates, mass, np.inf)))
         candidates &= boulders == boulders[lightest]
@@ -132,7 +132,7 @@ def capacity_sentences(row: dict[str, Any]) -> list[Sentence]:
     for name, (column, unit) in asked.items():
         value = row[column]
         parts += ["; " if parts else "", f"{name} "]
-        parts += ["at none that was tried"] if value is None else [Quantity(value, unit)]
+        parts += ["none of those tried"] if value is None else [Quantity(value, unit)]
     return [("All else unchanged, the worst at which it passes: ", *parts, ".")]
 
 
