@@ -1,18 +1,50 @@
-"""What ``-o`` of a command wrote: the folder of a run, or a file of answers, read in one way."""
+"""What ``-o`` of a command wrote, read in one way: the folder of a run, or a file of answers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from boulder_sweep.answers.keys import key_of
+from boulder_sweep.answers.lightest import DEPTH, SIDES
+from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.trials import Open
+from boulder_sweep.columns import BOULDER_MASS, COLUMNS
 from boulder_sweep.errors import BoulderSweepError
-from boulder_sweep.locations import Location
+from boulder_sweep.impact.explanation import model_of
+from boulder_sweep.judge.evaluation import known_control
+from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.settings import Sweep
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.model import Criterion, completed
+from boulder_sweep.settings.sweep import Axis, DesignList
 from boulder_sweep.store.manifest import MANIFEST_NAME
 from boulder_sweep.store.reader import FinishedRows
+from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+    from boulder_sweep.answers.reserves import Reserves
+    from boulder_sweep.answers.uncertainty import Uncertainty
+
+NEED, CAPACITY, UNCERTAINTY, RUN = "need", "capacity", "uncertainty", "run"
+"""Commands that write results."""
+MARKS = {
+    NEED: ("fails_at", "passes_at", "found"),
+    CAPACITY: ("withstands_speed_m_s", "withstands_mass_kg", "withstands_friction_angle_deg"),
+    UNCERTAINTY: ("p_pass", "p_pass_low", "p_pass_high", "p_pass_driver"),
+}
+"""Columns by which the answers of a command are known."""
+LATER = {"time_to_limit_error_s"}
+"""Columns that came after the first such files; one that lacks another column is damaged."""
+OF_ONE_FILE = {"repeat", "commit", "cpu"}
+"""Entries of the metadata by which equal files differ."""
+OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
 class AnswerFile:
@@ -24,11 +56,17 @@ class AnswerFile:
         The file.
     refusal
         The error to raise.
+    histories
+        Whether the file may be a time history.
 
     Attributes
     ----------
-    rows, rows_done, identity, judged_by
+    rows, rows_done, identity, judged_by, columns, lacking
         As of `FinishedRows`.
+    question : dict
+        What was asked; empty where the command asks nothing more.
+    kind : str
+        The command that wrote it, a key of `MARKS`; empty for a time history.
 
     Raises
     ------
@@ -36,18 +74,104 @@ class AnswerFile:
         It cannot be read, is damaged, or no command wrote it.
     """
 
-    def __init__(self, path: Path, refusal: type[BoulderSweepError]) -> None:
+    def __init__(self, path: Path, refusal: type[BoulderSweepError], *, histories: bool = False) -> None:
         from boulder_sweep.answers.tables import read_parquet
 
-        self._table, self.identity, self.judged_by = read_parquet(path, (), "sweep", refusal)
-        self.rows = self.rows_done = len(self._table)
+        self.path = path
+        self.table, found, self.judged_by = read_parquet(path, refusal)
+        self._refusal = refusal
+        try:
+            self.question: dict[str, Any] = json.loads(found.pop("question", "{}"))
+        except ValueError as problem:
+            raise refusal(f"{path} is damaged; write it again ({problem})") from problem
+        self.identity = {key: value for key, value in found.items() if key not in OF_ONE_FILE}
+        names = set(self.table.column_names)
+        self.kind = next((kind for kind, marks in MARKS.items() if names >= set(marks)), "")
+        if not self.kind and not histories:
+            what = "a time history" if "time_s" in names else f"no file that -o of {OF_ANSWERS} wrote"
+            raise refusal(f"{path} is {what}; `sweep export` takes it")
+        if self.kind and not names >= {spec.name for spec in COLUMNS} - LATER:
+            raise refusal(f"{path} is damaged; write it again with `sweep {self.kind}`")
+        known = [spec.name for spec in COLUMNS] if self.kind else []
+        self.columns = tuple(dict.fromkeys((*known, *self.table.column_names)))
+        self.lacking = frozenset(self.columns) - frozenset(self.table.column_names)
+        self.rows = self.rows_done = len(self.table)
 
-    def tables(self) -> Iterator[pa.Table]:
-        """Yield all rows at once."""
-        yield self._table
+    def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
+        """Yield all rows, or some of their columns, at once."""
+        from boulder_sweep.store.schema import with_columns
+
+        yield self.table if columns is None else with_columns(self.table, columns)
+
+    def row(self, number: int) -> pa.Table:
+        """Return one row.
+
+        Raises
+        ------
+        IndexError
+            There is no such row.
+        """
+        from boulder_sweep.store.schema import with_columns
+
+        if not 0 <= number < self.rows:
+            raise IndexError(f"the file has {counted(self.rows, 'design')}, numbered from 0; there is no {number}")
+        return with_columns(self.table.slice(number, 1), self.columns)
+
+    @property
+    def asked(self) -> int:
+        """Number of rows that the command wrote: of the designs, or of combinations of the inputs not asked for."""
+        found = self.answers() if self.kind == NEED else None
+        if not isinstance(found, Need):
+            return int(self.identity["settings"]["n_designs"])
+        name = found.key.name
+        return Open(found.sweep, (*SIDES, DEPTH) if name == BOULDER_MASS else (name,)).count
+
+    def answers(self) -> Need | Reserves | Uncertainty:
+        """Return the answers as the command had them.
+
+        Raises
+        ------
+        BoulderSweepError
+            Another version wrote them, with other settings.
+        """
+        try:
+            return self._answers(asked_sweep(self.identity, self.table))
+        except (LookupError, TypeError, ValueError) as unfamiliar:
+            raise self._refusal(
+                f"{self.path} was written by another version, whose settings are not those of this one ({unfamiliar}); "
+                "run it again"
+            ) from unfamiliar
+
+    def _answers(self, sweep: Sweep) -> Need | Reserves | Uncertainty:
+        if self.kind == CAPACITY:
+            from boulder_sweep.answers.reserves import Reserves
+
+            return Reserves(sweep, self.table)
+        if self.kind == UNCERTAINTY:
+            return self._chances(sweep)
+        asked = self.question
+        sense, _, name = asked["asked"].partition("_")
+        word = BY_NAME[name].key if name == BOULDER_MASS else name
+        key = key_of(word, most=sense == "most", tolerance=asked["tolerance"])
+        return Need(sweep, self.table, key, asked["margin"], 0, asked.get("probability"))
+
+    def _chances(self, sweep: Sweep) -> Uncertainty:
+        """Return probabilities with the indices and samples that lie beside them."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        from boulder_sweep.answers.uncertainty import Uncertainty
+
+        found = {}
+        for name in ("indices", "samples"):
+            file = self.path.with_suffix(f".{name}.parquet")
+            found[name] = pq.read_table(file) if file.exists() else pa.table({"design_id": pa.array([], pa.int64())})
+        return Uncertainty(sweep, self.table, found["indices"], found["samples"], self.question["seed"])
 
 
-def result_of(place: Location, refusal: type[BoulderSweepError]) -> FinishedRows | AnswerFile:
+def result_of(
+    place: Location, refusal: type[BoulderSweepError], *, histories: bool = False
+) -> FinishedRows | AnswerFile:
     """Return the rows of what a command wrote: a folder, or a file beside none.
 
     Raises
@@ -57,7 +181,85 @@ def result_of(place: Location, refusal: type[BoulderSweepError]) -> FinishedRows
     BoulderSweepError
         As of `AnswerFile`.
     """
-    if not isinstance(place, Path) or not place.is_file() or place.suffix.lower() != ".parquet":
+    if isinstance(place, RemotePath) or not place.is_file() or (place.resolve().parent / MANIFEST_NAME).exists():
         return FinishedRows(place)
-    in_a_run = (place.resolve().parent / MANIFEST_NAME).exists()
-    return FinishedRows(place) if in_a_run else AnswerFile(place, refusal)
+    return AnswerFile(place, refusal, histories=histories)
+
+
+def answered(table: pa.Table) -> pa.Table:
+    """Return answers with what was found of each as its verdict: that it passes, or why nothing does."""
+    import pyarrow.compute as pc
+
+    passes = table["passes_at"].is_valid()
+    words = {
+        "verdict": pc.if_else(passes, "pass", "fail"),
+        "reason": pc.if_else(passes, "", table["found"].cast("string")),
+        "robustness": pc.if_else(passes, table["robustness"].cast("string"), None),
+    }
+    for name, column in words.items():
+        place = table.column_names.index(name)
+        table = table.set_column(place, table.field(name), column.dictionary_encode().cast(table.field(name).type))
+    return table
+
+
+def kind_of(result: FinishedRows | AnswerFile) -> str:
+    """Return the command that wrote a result."""
+    return result.kind if isinstance(result, AnswerFile) else RUN
+
+
+def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
+    """Return the sweep that was asked about, as far as answers are shown by it: not its distributions.
+
+    Parameters
+    ----------
+    identity
+        Of the file, see `boulder_sweep.store.provenance.identity`.
+    table
+        The answers, which hold the values of axes and lists that are too long for the settings.
+    """
+    settings = completed(identity["settings"])
+    given, order, labels = settings["inputs"], settings["order"], settings.get("labels", {})
+    constants = {name: value for name, value in given.items() if isinstance(value, int | float)}
+    varying = {name: _values(name, value, table) for name, value in given.items() if isinstance(value, list | dict)}
+    axes: tuple[Axis, ...] = ()
+    listed = None
+    if order == "table":
+        words = {name: _label(table, name) for name in labels if name in table.column_names}
+        listed = DesignList("", varying, words)
+    else:
+        axes = tuple(_axis(name, labels, varying, order) for name in order)
+    return Sweep(
+        name=settings["name"],
+        path=None,
+        axes=axes,
+        constants=constants,
+        table=listed,
+        criterion=Criterion(**settings["criterion"]),
+        model=model_of(settings, known_control(identity["control"])),
+    )
+
+
+def _axis(name: str, labels: Mapping[str, list[str]], varying: Mapping[str, np.ndarray], order: Sequence[str]) -> Axis:
+    """Return an axis: values of one input, or named sets of those that are on no axis of their own."""
+    if name not in labels:
+        return Axis(name, varying[name])
+    own = {key: values for key, values in varying.items() if key not in order and BY_NAME[key].section == name}
+    return Axis(name, np.arange(float(len(labels[name]))), own, tuple(labels[name]))
+
+
+def _values(name: str, given: Any, table: pa.Table) -> np.ndarray:
+    """Return the values of an input that varies; of a very long axis or list those in the table."""
+    if isinstance(given, list):
+        return np.array(given, dtype=float)
+    if name in table.column_names:
+        return np.array(table[name].unique().to_pylist(), dtype=float)
+    return np.linspace(given["first"], given["last"], given["count"])
+
+
+def _label(table: pa.Table, name: str) -> Any:
+    from boulder_sweep.designs import Label
+
+    column = table[name].combine_chunks()
+    words = tuple(column.unique().to_pylist())
+    places = {word: place for place, word in enumerate(words)}
+    return Label(np.array([places[word] for word in column.to_pylist()], dtype=np.int32), words)

@@ -244,8 +244,8 @@ def need(
             done.answered(len(table))
     from boulder_sweep.answers.tables import joined_tables
 
-    table = joined_tables(tables, _metadata(asked[0], least_margin))
     chance = None if probability is None else share(probability, "--probability")
+    table = joined_tables(tables, _metadata(asked[0], least_margin, chance, robust))
     return Need(sweep, table, key, least_margin, simulated, chance)
 
 
@@ -328,12 +328,18 @@ def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: in
     return table, sum(answer.simulated for answer in answers)
 
 
-def _metadata(asked: Question | LightestQuestion, least_margin: float) -> dict[bytes, bytes]:
+def _metadata(
+    asked: Question | LightestQuestion, least_margin: float, probability: float | None, robust: bool
+) -> dict[bytes, bytes]:
     """Return the metadata of a file of answers."""
     from boulder_sweep.store.provenance import file_metadata, identity
 
     own = asked.judges.final
     accuracy = asked.judges.accuracy.to_dict()
     found = identity(asked.sweep.resolved(), own.readings._asdict(), own.control._asdict(), accuracy)
-    question = {"asked": asked.key.answer, "tolerance": asked.key.tolerance, "margin": least_margin}
+    question: dict[str, Any] = {"asked": asked.key.answer, "tolerance": asked.key.tolerance, "margin": least_margin}
+    if probability is not None:
+        question["probability"] = probability
+    if robust:
+        question["robust"] = True
     return file_metadata(found | {"question": question}, "boulder_sweep.need")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
@@ -276,19 +276,13 @@ def write_parquet(table: pa.Table, path: str | Location) -> Location:
     return target
 
 
-def read_parquet(
-    path: str | Path, columns: Iterable[str], command: str, refusal: type[BoulderSweepError]
-) -> tuple[pa.Table, dict[str, Any], str]:
+def read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
     """Read a file that `write_parquet` wrote, and warn where other rules than those of this version judged it.
 
     Parameters
     ----------
     path
         The file.
-    columns
-        Names of columns that it must have.
-    command
-        The command that writes such files.
     refusal
         The error to raise.
 
@@ -304,7 +298,7 @@ def read_parquet(
     Raises
     ------
     BoulderSweepError
-        It cannot be read, is damaged, or another command wrote it.
+        It cannot be read, is damaged, or no command wrote it.
     """
     if advice := settings_file(path):
         raise refusal(advice)
@@ -313,12 +307,11 @@ def read_parquet(
         table.validate(full=True)
         kinds = {field.name: field.type for field in table.schema}
         found = identity_in(table.schema.metadata)
-        if not found.keys() >= _IDENTITY or not kinds.keys() >= set(columns):
-            advice = "; `sweep export` takes it" if found.keys() >= _IDENTITY else ""
-            raise refusal(f"{path} is neither the folder of a run nor a file that `{command}` wrote{advice}")
+        if not found.keys() >= _IDENTITY:
+            raise refusal(f"{path} is neither the folder of a run nor a file that `sweep` wrote")
         odd = [name for name, kind in kinds.items() if name in BY_NAME and not _is_of(BY_NAME[name].type, kind)]
         if odd or settings_sha256(found["settings"]) != found["settings_sha256"]:
-            raise refusal(f"{path} is damaged; write it again with `{command}`")
+            raise refusal(f"{path} is damaged; write it again")
     except BoulderSweepError:
         raise
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, RecursionError) as problem:

@@ -36,9 +36,10 @@ LEAST = {"mass_kg": ("lightest boulder", "kg"), "depth_m": ("shallowest depth", 
 def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> int:
     """Compare the results in BEFORE and AFTER design by design, matched by the inputs they share.
 
-    Of an input of which they share no value, as of two soils, the values are paired in order. Shows what differs in
-    settings and versions, how many verdicts changed and how, and the least mass and depth that pass. Lists the
-    designs whose rotation changed most.
+    They are folders of runs, or files that -o of `sweep need`, `capacity` or `uncertainty` wrote, whose answers are
+    compared as well. Of an input of which they share no value, as of two soils, the values are paired in order. Shows
+    what differs in settings and versions, how many verdicts changed and how, and the least mass and depth that pass.
+    Lists the designs that changed most.
     """
     from boulder_sweep.report.comparison import compare as match
     from boulder_sweep.settings.shown_units import shown_unit
@@ -61,6 +62,8 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
         shown, size = shown_unit(unit, units)
         values = ["none passes" if value is None else f"{value / size:,.5g} {shown}" for value in pair]
         show(f"{words} that passes: {values[0]} before, {values[1]} after")
+    for name in comparison.answers:
+        show(*_answer_lines(name, comparison, listed, units))
     for row in comparison.flipped.head(listed).to_dict("records"):
         show(*_design_lines(row, comparison, units))
     return 0
@@ -79,9 +82,35 @@ def _count_lines(before: str, after: str, comparison: Comparison, units: str) ->
         shown = [f"{one / size:.6g} -> {other / size:.6g}" for one, other in pairs[:MOST_PAIRS]]
         more = f" and {len(pairs) - MOST_PAIRS} more" if len(pairs) > MOST_PAIRS else ""
         lines += wrap(f"differs  {name_of(name)}: {', '.join(shown)} {unit_of(name, units)}".rstrip() + more)
-    lines += wrap(f"{turned['passes_lost']:,} of {turned['passes']:,} passes in {before} do not pass in {after}")
+    passes, less = ("answers", "have none") if comparison.kind == "need" else ("passes", "do not pass")
+    lines += wrap(f"{turned['passes_lost']:,} of {turned['passes']:,} {passes} in {before} {less} in {after}")
     lines += wrap(f"{turned['passes_gained']:,} of {matched - turned['passes']:,} others do")
     return [*lines, f"{counted(len(comparison.flipped), 'verdict')} changed"]
+
+
+def _answer_lines(name: str, comparison: Comparison, listed: int, units: str) -> list[str]:
+    """Return how an answer changed in all, and the designs in which it changed most."""
+    from boulder_sweep.cli.console import wrap
+    from boulder_sweep.settings.shown_units import shown_as
+    from boulder_sweep.views.wording import value_text
+
+    shown = shown_as(name, comparison.answers[name], "", units)
+    counts = comparison.to_dict()["answers"][name]
+    words = [f"{counts[sense]:,} {sense}" for sense in ("larger", "smaller", "equal")]
+    ends = [f"{counts[end] / shown.size:+.4g}" for end in ("least_change", "largest_change")]
+    change = f" (by {ends[0]} to {ends[1]})" if ends[0] != "+0" or ends[1] != "+0" else ""
+    lines = wrap(f"{shown.name}: {', '.join(words)} after{change}")
+    for row in comparison.matched.loc[comparison.moved(name).index[:listed]].to_dict("records"):
+        values = " -> ".join(f"{row[f'{name}_{when}'] / shown.size:.5g}" for when in WHEN)
+        ids = " -> ".join(str(row[f"design_id_{when}"]) for when in WHEN)
+        inputs = [
+            value_text(own, row[own], units)
+            if own in row
+            else " -> ".join(value_text(own, row[f"{own}_{when}"], units) for when in WHEN)
+            for own in comparison.varying
+        ]
+        lines += [f"  design {ids}: {values}", *(f"    {line}" for line in wrap(", ".join(inputs), 76))]
+    return lines
 
 
 def _design_lines(row: dict[str, Any], comparison: Comparison, units: str) -> list[str]:

@@ -7,7 +7,7 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -25,12 +25,16 @@ from boulder_sweep.cli.output import say, show
 from boulder_sweep.locations import beside, location_of
 from boulder_sweep.text import counted
 
+if TYPE_CHECKING:
+    from boulder_sweep.answers.files import AnswerFile
+
 PLOT_EXAMPLES = """\b
 Examples:
   sweep plot m30-sizing.sweep
   sweep plot m30-sizing.sweep -o map.png --at width=1.8
   sweep plot m30-sizing.sweep --units us
   sweep plot m30-sizing.sweep --across width
+  sweep plot depths.parquet
 """
 COLUMN = "COLUMN"
 
@@ -52,7 +56,8 @@ COLUMN = "COLUMN"
 def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes: Any) -> int:
     """Draw a map of the verdicts in OUT: embedment across, height up, one map for each soil.
 
-    OUT is the folder of a run, perhaps in progress, of which finished designs are drawn.
+    OUT is the folder of a run, perhaps in progress, of which finished designs are drawn. Of a file that -o of
+    `sweep need`, `capacity` or `uncertainty` wrote, a chart of the answers is drawn.
     COLUMN is an input as in the file (boulder.width or width) or as in the table (boulder_width_m), or soil or vehicle
     where these have names.
     """
@@ -62,16 +67,18 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
         if name in given:
             raise click.UsageError(f"--at {name} is given twice; give each column one value")
         given[name] = text
+    from boulder_sweep.answers.files import AnswerFile, result_of
     from boulder_sweep.errors import PictureError
-    from boulder_sweep.store.reader import FinishedRows
     from boulder_sweep.views.figures import checked_kind, require_matplotlib
     from boulder_sweep.views.slices import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
     from boulder_sweep.views.wording import terms_line
 
     require_matplotlib()
-    finished = FinishedRows(location_of(out))
-    target = checked_kind(picture or beside(location_of(out), ".png"))
+    finished = result_of(location_of(out), PictureError)
+    target = checked_kind(picture or beside(location_of(out.removesuffix(".parquet")), ".png"))
+    if isinstance(finished, AnswerFile):
+        return _plot_answers(finished, target, units, [*filter(None, axes.values()), *given])
     if finished.rows_done == 0:
         raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
     settings = finished.identity["settings"]
@@ -88,6 +95,25 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     if finished.rows_done < finished.rows:
         say(f"note: the run is not finished; {shown.total:,} designs are drawn")
     show(f"{target}: {shown.count:,} of {shown.total:,} designs")
+    return 0
+
+
+def _plot_answers(file: AnswerFile, target: Path, units: str, asked: Sequence[str]) -> int:
+    """Draw a file of answers as its command does; which inputs are across and up follows from what varies."""
+    from boulder_sweep.answers.files import NEED, UNCERTAINTY
+    from boulder_sweep.drawing import draw
+
+    if asked:
+        options = "--across, --up, --columns, --rows and --at"
+        raise click.UsageError(f"{options} choose a part of the result of a run; a chart of answers takes none")
+    answers = file.answers()
+    if file.kind == NEED:
+        draw("design_chart", "draw_design_chart", answers, target, units=units)
+    elif file.kind == UNCERTAINTY and file.rows == 1:
+        draw("chances", "draw_uncertainty", answers, target, units=units)
+    else:
+        draw("design_chart", "draw_answers", answers, target, units=units)
+    show(f"{target}: {counted(file.rows, 'answer')}")
     return 0
 
 
@@ -131,7 +157,7 @@ Examples:
   sweep report m30-sizing.sweep
   sweep report m30-sizing.sweep --design 4711 --design 104960 -o site.html
   sweep report m30-sizing.sweep --units us
-  sweep report chances.parquet
+  sweep report depths.parquet
   sweep report m30-sizing.sweep --project "Main Street" -o report.pdf
 """
 
@@ -155,7 +181,8 @@ Examples:
 def report(out: str, page: str | None, designs: tuple[int, ...], units: str, **heading: str | None) -> int:
     """Write the result in OUT as one HTML file: the answer, the map, and the simulator, which runs in the page.
 
-    OUT is the folder of a run, or a file of `sweep uncertainty -o`, whose probabilities of passing then stand first.
+    OUT is the folder of a run, or a file that -o of `sweep need`, `capacity` or `uncertainty` wrote: the answers then
+    stand first.
 
     The file needs no network and no server: it opens from disk in any browser, and whoever gets it can change a
     design and see the impact simulated anew. With -o F.pdf the page is printed by a Chromium or Chrome on this machine.

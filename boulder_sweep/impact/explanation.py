@@ -163,31 +163,35 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
 
 def one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
     """Return a sweep of the one design, with the model and the step its row was computed with."""
-    model = settings["model"]
-    readings, ground = ReadingChoice(**model["readings"]), Ground.of_dict(model.get("ground", {}))
     return Sweep(
         name=settings["name"],
         path=None,
         axes=(),
         constants={name: float(value) for name, value in inputs.items() if value is not None},
         criterion=Criterion(**settings["criterion"]),
-        model=Model(
-            readings,
-            control.elements,
-            model["calibrated_crush_m"],
-            model["resistance"],
-            unloading=UNLOADINGS[control.unloading],
-            second_opinion=tuple(model.get("second_opinion", ())),
-            foot=model["foot"],
-            profile=Shape.of_list(model.get("profile", [])).points,
-            rock_assumed=model.get("rock_assumed", False),
-            **ground.fields(),
-        ),
+        model=model_of(settings, control),
         solver=SolverSettings(
             accuracy=None,
             step_s=step_s,
             horizon_s=control.horizon,
         ),
+    )
+
+
+def model_of(settings: dict[str, Any], control: Control) -> Model:
+    """Return the model of a table by its settings."""
+    model = settings["model"]
+    return Model(
+        ReadingChoice(**model["readings"]),
+        control.elements,
+        model["calibrated_crush_m"],
+        model["resistance"],
+        unloading=UNLOADINGS[control.unloading],
+        second_opinion=tuple(model.get("second_opinion", ())),
+        foot=model["foot"],
+        profile=Shape.of_list(model.get("profile", [])).points,
+        rock_assumed=model.get("rock_assumed", False),
+        **Ground.of_dict(model.get("ground", {})).fields(),
     )
 
 

@@ -4,39 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from boulder_sweep.answers.files import CAPACITY, NEED, AnswerFile
+from boulder_sweep.answers.need import Need
 from boulder_sweep.columns import GRADES, TO_BUILD
 from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS, meaning_of
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
+from boulder_sweep.report.asked import capacity_sentences, need_sentences
 from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
+from boulder_sweep.report.sentences import Named, Quantity, Sentence, listed, share, verb
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import REASON_WORDS
 
 SAFE = 0.95
 """Probability of passing from which on a design is called safe here."""
-
-
-class Quantity(NamedTuple):
-    """A number in a sentence, in a unit of the table; the page shows it in the reader's."""
-
-    value: float
-    unit: str
-
-
-Sentence = tuple[str | Quantity, ...]
-
-
-@dataclass(frozen=True)
-class Named:
-    """A design worth naming."""
-
-    title: str
-    number: int
-    """Its row."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +45,18 @@ def answer_of(rows: Rows) -> Answer:
     counts, total = rows.counts(), len(rows.codes)
     passing = rows.having("pass")
     n = int(passing.sum())
+    if rows.kind == NEED:
+        return _of_answers(rows, n)
     uncertain = _uncertain(rows)
     if total == 1:
         return _of_one(rows, uncertain)
     means = ", at the means of their uncertain inputs" if uncertain else ""
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
-    sentences.append((f"{n:,} of {total:,} designs {_verb(n, 'pass', 'passes')} ({_share(n, total)}){means}.",))
+    sentences.append((f"{n:,} of {total:,} designs {verb(n, 'pass', 'passes')} ({share(n, total)}){means}.",))
     if n and rows.grades:
         sentences.append(_grades(rows, n))
     if NOT_YET in counts:
-        left = f"{counted(counts[NOT_YET], 'design')} {_verb(counts[NOT_YET], 'are', 'is')}"
+        left = f"{counted(counts[NOT_YET], 'design')} {verb(counts[NOT_YET], 'are', 'is')}"
         sentences.append((f"The run is not finished: {left} not computed yet.",))
     others = [
         f"{count:,} {_in_words(name, count)}"
@@ -78,15 +65,7 @@ def answer_of(rows: Rows) -> Answer:
     ]
     if others:
         sentences.append((f"Of the others, {'; '.join(others)}.",))
-    flagged = n - rows.flags.get("", 0) if rows.flags else 0
-    if flagged:
-        commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
-        most = "; ".join(f"{count:,} with {_meaning(name)}" for count, name in commonest[:3])
-        lie = _verb(flagged, "lie", "lies")
-        often = ", most often:" if len(commonest) > 3 else ":"
-        sentences.append((f"{flagged:,} of those that pass {lie} outside what the model was tested on{often} {most}.",))
-    elif n and not rows.flags:
-        sentences.append(("The table does not say which of those that pass lie outside what the model was tested on.",))
+    sentences += _flagged(rows, n)
     if n == 0:
         none = "No design passes at the means." if uncertain else "No design passes."
         return Answer((*sentences, (none,)), tuple(own for _, own in uncertain if own))
@@ -110,14 +89,41 @@ def answer_of(rows: Rows) -> Answer:
     return Answer(tuple(sentences), tuple(named.values()))
 
 
+def _of_answers(rows: Rows, n: int) -> Answer:
+    """Describe the answers of `sweep need`."""
+    assert isinstance(rows.finished, AnswerFile)
+    need = rows.finished.answers()
+    assert isinstance(need, Need)
+    sentences, named = need_sentences(rows, need)
+    if n == 1:
+        sentences += _of_row(rows, rows.row(named[0].number))
+    elif n:
+        sentences += [_grades(rows, n), *_flagged(rows, n)]
+    return Answer(tuple(sentences), tuple(named))
+
+
+def _flagged(rows: Rows, n: int) -> list[Sentence]:
+    """Say how many of the n passes lie outside what the model was tested on."""
+    flagged = n - rows.flags.get("", 0) if rows.flags else 0
+    if flagged:
+        commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
+        most = "; ".join(f"{count:,} with {_meaning(name)}" for count, name in commonest[:3])
+        lie = verb(flagged, "lie", "lies")
+        often = ", most often:" if len(commonest) > 3 else ":"
+        return [(f"{flagged:,} of those that pass {lie} outside what the model was tested on{often} {most}.",)]
+    if n and not rows.flags:
+        return [("The table does not say which of those that pass lie outside what the model was tested on.",)]
+    return []
+
+
 def _grades(rows: Rows, n: int) -> Sentence:
     """Say how many of the passes are robust."""
     robust, sensitive, left = (rows.grades.get(grade, 0) for grade in GRADES)
     if left == n:
         return ("No second opinion was asked for; whether a pass stands under another form of the model is open.",)
     parts = ((robust, f"robust ({IN_WORDS})"), (sensitive, f"sensitive ({SENSITIVE_IN_WORDS})"), (left, "open"))
-    told = _listed(tuple(f"{count:,} {_verb(count, 'are', 'is')} {words}" for count, words in parts if count))
-    return (f"Of the {n:,} that {_verb(n, 'pass', 'passes')}, {told}.",)
+    told = listed(tuple(f"{count:,} {verb(count, 'are', 'is')} {words}" for count, words in parts if count))
+    return (f"Of the {n:,} that {verb(n, 'pass', 'passes')}, {told}.",)
 
 
 def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
@@ -133,7 +139,7 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
         return [((f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}.",), Named("The design", 0))]
     safe = chances >= SAFE
     n = int(safe.sum())
-    first = f"{n:,} of {len(chances):,} designs {_verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"
+    first = f"{n:,} of {len(chances):,} designs {verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"
     if not safe.any():
         best = int(chances.argmax())
         largest = f"{first}; the largest is {chances[best]:.1%} (design {best:,})."
@@ -164,6 +170,15 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
     what = (Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep.", *_to_build(rows, 0))
     sentences.append((f"The design {verdict}: ", *what))
+    if rows.kind == CAPACITY:
+        sentences += capacity_sentences(row)
+    sentences += _of_row(rows, row)
+    return Answer(tuple(sentences), (Named("The design", 0),))
+
+
+def _of_row(rows: Rows, row: dict[str, Any]) -> list[Sentence]:
+    """Say how firm the verdict of a design is, and where it lies outside what the model was tested on."""
+    sentences: list[Sentence] = []
     grade = rows.grade(row)
     meaning = meaning_of({**row, "robustness": grade})
     if meaning is not None:
@@ -171,7 +186,7 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     flags = [flag for flag in (row["validity"] or "").split(SEPARATOR) if flag]
     if flags:
         sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))
-    return Answer(tuple(sentences), (Named("The design", 0),))
+    return sentences
 
 
 def _to_build(rows: Rows, number: int) -> Sentence:
@@ -194,11 +209,6 @@ def _meaning(flag: str) -> str:
     return BY_FLAG[flag].meaning if flag in BY_FLAG else flag
 
 
-def _verb(count: int, many: str, one: str) -> str:
-    """The form of a verb that goes with a number."""
-    return one if count == 1 else many
-
-
 VERBS = {
     "pass": ("pass", "passes"),
     "fail": ("fail", "fails"),
@@ -211,13 +221,8 @@ VERBS = {
 def _in_words(name: str, count: int) -> str:
     """Verdict and reason of so many designs for a sentence."""
     verdict, _, reason = name.partition(": ")
-    verb = _verb(count, *VERBS[verdict])
-    return f"{verb} ({REASON_WORDS.get(reason, reason)})" if reason and verdict != "pass" else verb
-
-
-def _share(n: int, total: int) -> str:
-    """Share of a total in per cent; never rounded to 0 % or 100 % unless exact."""
-    return f"{n / total if n in (0, total) else min(max(n / total, 0.001), 0.999):.1%}"
+    does = verb(count, *VERBS[verdict])
+    return f"{does} ({REASON_WORDS.get(reason, reason)})" if reason and verdict != "pass" else does
 
 
 class Withstood(NamedTuple):
@@ -254,7 +259,7 @@ def _where(rows: Rows, kinds: tuple[str, ...]) -> str:
     if not rows.axes:
         return "in every row of the list that has it"
     words = [CONDITIONS[kind] for kind in kinds]
-    return f"{_listed(words)} of the sweep"
+    return f"{listed(words)} of the sweep"
 
 
 def _worst(rows: Rows, kinds: tuple[str, ...]) -> str:
@@ -264,7 +269,7 @@ def _worst(rows: Rows, kinds: tuple[str, ...]) -> str:
     if not rows.axes:
         return " in the row that is worst for it"
     if len(kinds) > 1:
-        return f" in the combination of {_listed(kinds)} that is worst for it"
+        return f" in the combination of {listed(kinds)} that is worst for it"
     before = {"soil": "in", "vehicle": "against", "speed": "at"}[kinds[0]]
     return f" {before} the {kinds[0]} that is worst for it"
 
@@ -283,10 +288,6 @@ def _beyond(rows: Rows, siblings: np.ndarray, kinds: tuple[str, ...]) -> Sentenc
         low, high = (end if isinstance(end, str) else Quantity(end, unit) for end in rows.ends(name, siblings))
         said += [low] if low == high else [low, " to ", high]
     return tuple(said)
-
-
-def _listed(words: tuple[str, ...] | list[str]) -> str:
-    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
 def _least(rows: Rows, withstood: Withstood, what: str) -> tuple[Sentence, Named]:

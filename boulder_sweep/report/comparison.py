@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from boulder_sweep.answers.files import MARKS, NEED, RUN, UNCERTAINTY, AnswerFile, answered, result_of
+from boulder_sweep.answers.need import Need
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import Location, RemotePath, location_of
@@ -46,6 +48,10 @@ class Comparison:
         By whose rules each of the two was judged; empty where by those of this version.
     least : dict
         ``mass_kg`` and ``depth_m``: the least of a design that passes, before and after; None where none does.
+    kind : str
+        The command that wrote both results.
+    answers : dict of str to str
+        Columns of answers, each with its unit; none for the results of runs.
     """
 
     matched: pd.DataFrame
@@ -56,6 +62,8 @@ class Comparison:
     changed: tuple[str, ...]
     judged_by: tuple[str, str]
     least: dict[str, tuple[float | None, float | None]]
+    kind: str = RUN
+    answers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def flipped(self) -> pd.DataFrame:
@@ -69,6 +77,12 @@ class Comparison:
         before, after = (self.matched[f"verdict_{when}"] == "pass" for when in ("before", "after"))
         counts = {"passes": before, "passes_lost": before & ~after, "passes_gained": after & ~before}
         return {name: int(mask.sum()) for name, mask in counts.items()}
+
+    def moved(self, name: str) -> pd.Series:
+        """Return by how much an answer changed in the designs where it did, largest change first."""
+        change = (self.matched[f"{name}_after"] - self.matched[f"{name}_before"]).dropna()
+        change = change[change != 0.0]
+        return change.loc[change.abs().sort_values(ascending=False, kind="stable").index]
 
     def values(self, name: str) -> list[tuple[float, float]]:
         """Return the pairs of values of an input that differs, before and after, in order."""
@@ -95,9 +109,18 @@ class Comparison:
             "flipped": len(self.flipped),
             "flips": self.flips(),
             "least": {name: list(pair) for name, pair in self.least.items()},
+            **({"answers": {name: self._moves(name) for name in self.answers}} if self.answers else {}),
             "changed": list(self.changed),
             "judged_by": list(self.judged_by),
         }
+
+    def _moves(self, name: str) -> dict[str, Any]:
+        """Return how many values of an answer are larger, smaller and equal after, and the ends of the change."""
+        both = int((self.matched[f"{name}_before"].notna() & self.matched[f"{name}_after"].notna()).sum())
+        change = self.moved(name)
+        counts = {"larger": int((change > 0).sum()), "smaller": int((change < 0).sum()), "equal": both - len(change)}
+        ends = (float(change.min()), float(change.max())) if len(change) else (0.0, 0.0)
+        return {**counts, "least_change": ends[0], "largest_change": ends[1], "unit": self.answers[name]}
 
 
 def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> Comparison:
@@ -106,8 +129,9 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     Parameters
     ----------
     before, after
-        Folders that a sweep wrote. Designs are matched by their inputs, whatever their order. An input of which the
-        two have no value in common is left out of that, and its values are matched in order, the least with the least.
+        Folders that a sweep wrote, or two files of answers of one command. Designs are matched by their inputs,
+        whatever their order. An input of which the two have no value in common is left out of that, and its values are
+        matched in order, the least with the least.
 
     Returns
     -------
@@ -117,15 +141,23 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     Raises
     ------
     ReportError
-        No design of one has a counterpart in the other.
+        No design of one has a counterpart in the other, or two commands wrote them.
     StoreError
         There is no result in a folder, or it is damaged.
     """
     places = [location_of(folder) for folder in (before, after)]
-    one, other = (FinishedRows(place) for place in places)
-    tables = [_table(place) for place in places]
+    one, other = (result_of(place, ReportError) for place in places)
+    asked = [_asked(result) for result in (one, other)]
+    if asked[0][:2] != asked[1][:2]:
+        said = [
+            f"{name} is of `sweep {own.command}` ({', '.join(own.answers) or 'verdicts'})"
+            for name, own in zip((before, after), asked, strict=True)
+        ]
+        raise ReportError(f"{' and '.join(said)}: compare two results of one command and question")
+    answers, searched = asked[0].answers, {*asked[0].searched, *asked[1].searched}
+    tables = [_table(place, result, answers) for place, result in zip(places, (one, other), strict=True)]
     follow = _following(one.identity["settings"]["inputs"], other.identity["settings"]["inputs"])
-    names = [name for name in (*INPUT_COLUMNS, RATIO) if name not in follow]
+    names = [name for name in (*INPUT_COLUMNS, RATIO) if name not in (*follow, *searched)]
     differ = [name for name in names if not set(tables[0][_key(name)]) & set(tables[1][_key(name)])]
     as_many = _values_in_order(tables, differ)
     same = [name for name in names if name not in differ]
@@ -145,18 +177,50 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
         varying=tuple(name for name in names if any(len(set(table[_key(name)])) > 1 for table in tables)),
         only_before=len(tables[0]) - len(matched),
         only_after=len(tables[1]) - len(matched),
-        changed=tuple(differences(one.identity, other.identity)),
+        changed=tuple(differences(_whole_identity(one), _whole_identity(other))),
         judged_by=(one.judged_by, other.judged_by),
         least={
             "mass_kg": (_least(passing[0].mass_kg), _least(passing[1].mass_kg)),
             "depth_m": (_least(passing[0].embedment_depth_m), _least(passing[1].embedment_depth_m)),
         },
+        kind=asked[0].command,
+        answers=answers,
     )
 
 
-def _table(folder: Location) -> pd.DataFrame:
+def _whole_identity(result: FinishedRows | AnswerFile) -> dict[str, Any]:
+    """Return what decided the rows of a result, and what was asked."""
+    return result.identity | ({"question": result.question} if isinstance(result, AnswerFile) else {})
+
+
+class Asked(NamedTuple):
+    """What a result answers: the command, the columns of its answers with their units, the inputs searched for."""
+
+    command: str
+    answers: dict[str, str]
+    searched: tuple[str, ...]
+
+
+def _asked(result: FinishedRows | AnswerFile) -> Asked:
+    """Return what a result answers."""
+    if not isinstance(result, AnswerFile):
+        return Asked(RUN, {}, ())
+    if result.kind == NEED:
+        need = result.answers()
+        assert isinstance(need, Need)
+        return Asked(NEED, {need.key.answer: need.key.field.unit}, (need.key.name, *need.derived))
+    names = MARKS[result.kind][: 1 if result.kind == UNCERTAINTY else None]
+    units = {name: (result.table.schema.field(name).metadata or {}).get(b"unit", b"") for name in names}
+    return Asked(result.kind, {name: unit.decode() for name, unit in units.items()}, ())
+
+
+def _table(place: Location, result: FinishedRows | AnswerFile, answers: Iterable[str]) -> pd.DataFrame:
     """Read a result with the keys for matching."""
-    table = read(folder, ["design_id", *INPUT_COLUMNS, *OUTCOMES, "solidity"])
+    columns = ["design_id", *INPUT_COLUMNS, *OUTCOMES, "solidity", *answers]
+    if isinstance(result, AnswerFile):
+        table = (answered(result.table) if result.kind == NEED else result.table).select(columns).to_pandas()
+    else:
+        table = read(place, columns)
     for name in ("verdict", "reason"):
         table[name] = table[name].astype(str)
     table["mass_kg"] = table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")

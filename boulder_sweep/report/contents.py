@@ -29,6 +29,7 @@ from boulder_sweep.judge.validity import (
 )
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, RULES, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
+from boulder_sweep.report.asked import map_of
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, parts_of
 from boulder_sweep.report.rows import MOST_ELEMENTS, SIZES, Rows, Thinned, label_of
@@ -152,6 +153,7 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
         listed = {name: column for name, column in rows.inputs.items() if column.shape == rows.codes.shape}
         values = {name: column[kept.places[0]].tolist() for name, column in listed.items()}
     return {
+        **map_of(rows),
         "names": rows.names,
         "grid": bool(rows.axes),
         "mapped": any(len(set(along)) > 1 for along in values.values()),

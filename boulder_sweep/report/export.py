@@ -58,6 +58,8 @@ NUMBER_FORMATS = {
 """How a spreadsheet shows numbers, by unit; the cells keep all digits."""
 ERROR_FORMAT = "0.0E+00"
 """Of estimated errors, which are small."""
+MOST_CHARACTERS = 60
+"""Widest column of words."""
 ABOUT_WIDTHS = (44, 12, 90)
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
@@ -92,7 +94,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         The units are unknown.
     """
     check_system(units)
-    target, finished = Path(file), result_of(location_of(out), ReportError)
+    target, finished = Path(file), result_of(location_of(out), ReportError, histories=True)
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
@@ -228,17 +230,25 @@ def _sheet(target: BinaryIO, finished: Result, units: str) -> int:
     with _workbook(target) as book:
         designs = book.create_sheet("designs")
         designs.freeze_panes = "B2"
+        designs.print_title_rows, designs.print_title_cols = "1:1", "A:A"
+        designs.page_setup.orientation = "landscape"
         for columns, table in _tables(finished, units):
             if rows == 0:
-                _set_widths(designs, [max(len(column.name) + 4, 10) for column in columns])
-                designs.append([_bold(designs, text) for text in _cells(column.name for column in columns)])
-                styled = [_styled(designs, column) for column in columns]
+                words = [_longest(column) for column in table.columns]
+                _set_widths(
+                    designs, [max(len(one.name) + 4, 10, wide + 3) for one, wide in zip(columns, words, strict=True)]
+                )
+                names = _cells(column.name for column in columns)
+                designs.append([_head(designs, text, bool(wide)) for text, wide in zip(names, words, strict=True)])
+                styled = [_styled(designs, column, bool(wide)) for column, wide in zip(columns, words, strict=True)]
             for values in zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True):
                 designs.append([_filled(cell, value) for cell, value in zip(styled, values, strict=True)])
             rows += len(table)
         if rows:
             designs.auto_filter.ref = f"A1:{_letter(len(columns))}{rows + 1}"
         sheet = book.create_sheet("about")
+        sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
+        sheet.sheet_properties.pageSetUpPr.fitToPage = True
         _set_widths(sheet, ABOUT_WIDTHS)
         for line in about(finished, columns, units):
             sheet.append(_cells(line))
@@ -257,29 +267,44 @@ def _letter(place: int) -> str:
     return str(get_column_letter(place))
 
 
-def _bold(sheet: Any, text: str) -> Any:
-    """Return the cell of a header."""
+def _longest(column: pa.ChunkedArray) -> int:
+    """Return the most characters of the words of a column, within reason; 0 for numbers."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    if not (pa.types.is_dictionary(column.type) or pa.types.is_string(column.type)):
+        return 0
+    longest = pc.max(pc.utf8_length(column.cast("string"))).as_py() or 1
+    return min(int(longest), MOST_CHARACTERS)
+
+
+def _head(sheet: Any, text: str, of_words: bool) -> Any:
+    """Return the cell of a header, which stands as the cells below it."""
     from openpyxl.cell import WriteOnlyCell
-    from openpyxl.styles import Font
+    from openpyxl.styles import Alignment, Font
 
     cell = WriteOnlyCell(sheet, text)
-    cell.font = Font(bold=True)
+    cell.font = Font(name="Calibri", size=11, bold=True)
+    cell.alignment = Alignment(horizontal="left", indent=1) if of_words else Alignment(horizontal="right")
     return cell
 
 
-def _styled(sheet: Any, column: Shown) -> Any:
+def _styled(sheet: Any, column: Shown, of_words: bool) -> Any:
     """Return the cell of a column that is filled for every row: rows are written one by one."""
     from openpyxl.cell import WriteOnlyCell
+    from openpyxl.styles import Alignment
 
     cell = WriteOnlyCell(sheet)
+    if of_words:
+        cell.alignment = Alignment(horizontal="left", indent=1)  # apart from a number at the right end of its cell
     if column.unit in NUMBER_FORMATS and column.stored != DESIGN_ID.name:
         cell.number_format = ERROR_FORMAT if "_error_" in column.name else NUMBER_FORMATS[column.unit]
     return cell
 
 
 def _filled(cell: Any, value: Any) -> Any:
-    """Return a styled cell with a value; text and nothing need no style."""
-    if value is None or isinstance(value, str):
+    """Return a styled cell with a value; nothing needs no style."""
+    if value is None:
         return value
     cell.value = value
     return cell

@@ -21,8 +21,9 @@ from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
 if TYPE_CHECKING:
-    from boulder_sweep.report.answers import Sentence
+    from boulder_sweep.report.asked import Table
     from boulder_sweep.report.rows import Rows, Thinned
+    from boulder_sweep.report.sentences import Sentence
 
 ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = (
@@ -52,6 +53,7 @@ def assembled(
     readings: Readings,
     start: Mapping[str, float],
     sentences: Sequence[Sentence] = (),
+    answers: Table | None = None,
     rows: Rows | None = None,
     kept: Thinned | None = None,
     chosen: Sequence[Mapping[str, Any]] = (),
@@ -74,6 +76,8 @@ def assembled(
         The design with which the simulator starts, by the input columns of the table.
     sentences
         The answer in words.
+    answers
+        The answers one by one, of a file of them.
     rows, kept
         Rows of a result, and those kept in the page; None for a single design.
     chosen
@@ -126,6 +130,7 @@ def assembled(
     return environment.get_template("page.html").render(
         title=title,
         sentences=sentences,
+        answers=answers,
         panels=panels,
         inputs=data["inputs"],
         main=MAIN,

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.columns import BOULDER_MASS, COLUMNS, INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.answers.files import CAPACITY, NEED, UNCERTAINTY, AnswerFile, answered, kind_of, result_of
+from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.impact.explanation import one_design
 from boulder_sweep.judge.evaluation import evaluation_of, known_control
@@ -30,55 +30,6 @@ from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-LATER = {"time_to_limit_error_s"}
-"""Columns that came after the first such files; one that lacks another column is damaged."""
-CHANCES = ("p_pass", "p_pass_low", "p_pass_high", "p_pass_driver")
-
-
-class ChanceFile:
-    """The rows of such a file, read as those of a run are (`boulder_sweep.store.reader.FinishedRows`).
-
-    Parameters
-    ----------
-    path
-        The file.
-
-    Raises
-    ------
-    ReportError
-        It cannot be read, or another command wrote it.
-    """
-
-    def __init__(self, path: str | Path) -> None:
-        from boulder_sweep.answers.tables import read_parquet
-
-        needed = ({spec.name for spec in COLUMNS} - LATER) | {*CHANCES}
-        self._table, self.identity, self.judged_by = read_parquet(path, needed, "sweep uncertainty", ReportError)
-        self.columns = tuple(dict.fromkeys((*(spec.name for spec in COLUMNS), *self._table.column_names)))
-        self.lacking = frozenset(self.columns) - frozenset(self._table.column_names)
-        self.rows = self.rows_done = len(self._table)
-
-    def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
-        """Yield all rows, or some of their columns, at once."""
-        from boulder_sweep.store.schema import with_columns
-
-        yield with_columns(self._table, self.columns if columns is None else columns)
-
-    def row(self, number: int) -> pa.Table:
-        """Return one row.
-
-        Raises
-        ------
-        IndexError
-            There is no such row.
-        """
-        if not 0 <= number < self.rows:
-            raise IndexError(f"the file has {counted(self.rows, 'design')}, numbered from 0; there is no {number}")
-        from boulder_sweep.store.schema import with_columns
-
-        return with_columns(self._table.slice(number, 1), self.columns)
-
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
@@ -128,7 +79,7 @@ class Rows:
     ----------
     folder : Location
         Where they are.
-    finished : FinishedRows or ChanceFile
+    finished : FinishedRows or AnswerFile
         Those that were there when they were read.
     names : tuple of str
         What a code stands for: verdict and reason, ``fail: overturns``, or the grade of a pass of which second opinions
@@ -150,7 +101,7 @@ class Rows:
     """
 
     folder: Location
-    finished: FinishedRows | ChanceFile
+    finished: FinishedRows | AnswerFile
     names: tuple[str, ...]
     codes: np.ndarray
     flags: dict[str, int]
@@ -168,6 +119,11 @@ class Rows:
     def settings(self) -> dict[str, Any]:
         """The resolved settings of the sweep."""
         return self.finished.identity["settings"]
+
+    @property
+    def kind(self) -> str:
+        """The command that wrote the result."""
+        return kind_of(self.finished)
 
     def having(self, verdict: str) -> np.ndarray:
         """Whether rows have a verdict, in the shape of the grid."""
@@ -237,7 +193,7 @@ class Rows:
         if self.axes:
             places = tuple(list(self.axes).index(name) for name in over)
             return np.broadcast_to(holds.all(axis=places, keepdims=True), self.shape)
-        boulders = self._boulders(over)
+        boulders = self.boulders(over)
         found = np.ones(boulders.max() + 1, bool)
         np.logical_and.at(found, boulders, holds)
         return found[boulders]
@@ -246,7 +202,7 @@ class Rows:
         """Return the rows, in ascending order, that differ from one in nothing but some conditions."""
         over = [name for name in self.varying() if condition_of(name) in kinds]
         if not self.axes:
-            boulders = self._boulders(over)
+            boulders = self.boulders(over)
             return np.flatnonzero(boulders == boulders[number])
         here = np.unravel_index(number, self.shape)
         lines = [
@@ -255,7 +211,7 @@ class Rows:
         ]
         return np.sort(np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), self.shape).ravel())
 
-    def _boulders(self, over: Sequence[str]) -> np.ndarray:
+    def boulders(self, over: Sequence[str]) -> np.ndarray:
         """Return a number for every design of a list, the same for those that differ in nothing but some columns."""
         boulders = np.zeros(len(self.codes), np.int64)
         for name in self.varying():
@@ -286,8 +242,11 @@ class Rows:
         IndexError
             The table does not have this row (yet).
         """
-        found = self.finished.row(number) if isinstance(self.finished, ChanceFile) else read_row(self.folder, number)
-        return found.to_pylist()[0]
+        found = self.finished.row(number) if isinstance(self.finished, AnswerFile) else read_row(self.folder, number)
+        row: dict[str, Any] = found.to_pylist()[0]
+        if BOULDER_MASS in row and BOULDER_MASS not in self.settings["inputs"]:
+            del row[BOULDER_MASS]  # answers tell it whether it was given or not
+        return row
 
     def grade(self, row: dict[str, Any]) -> str | None:
         """Return the robustness of a row; where the table left it open, second opinions are asked now.
@@ -309,7 +268,7 @@ class Rows:
 
     def chances(self) -> np.ndarray | None:
         """Return the probability of passing of every design, shape (rows,); None for the result of a run."""
-        if not isinstance(self.finished, ChanceFile):
+        if self.kind != UNCERTAINTY:
             return None
         return next(self.finished.tables(["p_pass"])).column("p_pass").to_numpy()
 
@@ -322,13 +281,16 @@ def read_rows(folder: Location) -> Rows:
     StoreError
         There is no result in the folder, or it is damaged.
     ReportError
-        The file is not one of `sweep uncertainty`, or rows of it are missing or in another order.
+        The file is not one of answers, or rows of it are missing or in another order.
     """
-    finished = ChanceFile(folder) if isinstance(folder, Path) and folder.is_file() else FinishedRows(folder)
+    finished = result_of(folder, ReportError)
     settings = finished.identity["settings"]
-    if isinstance(finished, ChanceFile):
-        _check_whole(finished, folder)
     order, given = settings["order"], settings["inputs"]
+    if isinstance(finished, AnswerFile):
+        _check_whole(finished, folder)
+        if finished.kind == NEED:  # a list of the designs at the answers
+            order, given = "table", _inputs_of(finished.table, given)
+            finished.table = answered(finished.table)
     sets = {} if order == "table" else dict(_sets(settings))
     # Very long axes and the columns of a list are only in the table.
     if order == "table":
@@ -341,7 +303,7 @@ def read_rows(folder: Location) -> Rows:
     names: list[str] = []
     flags: Counter[str] = Counter()
     grades: Counter[str] = Counter()
-    asked = bool(settings["model"].get("second_opinion"))
+    asked = bool(settings["model"].get("second_opinion")) or kind_of(finished) in (NEED, CAPACITY)
     for table in finished.tables(["design_id", "verdict", "reason", "validity", "robustness", *stored]):
         if "validity" not in finished.lacking:
             flags.update(_of_passes(table, "validity"))
@@ -365,14 +327,25 @@ def read_rows(folder: Location) -> Rows:
     return Rows(folder, finished, (*names, NOT_YET), codes, told, dict(grades), axes, sets, inputs)
 
 
-def _check_whole(file: ChanceFile, path: Location) -> None:
+def _check_whole(file: AnswerFile, path: Location) -> None:
     """Refuse a file from which rows were taken, or whose rows were put in another order."""
-    asked, ids = file.identity["settings"]["n_designs"], next(file.tables(["design_id"])).column("design_id").to_numpy()
+    asked, ids = file.asked, next(file.tables(["design_id"])).column("design_id").to_numpy()
     if len(ids) != asked or not np.array_equal(ids, np.arange(asked)):
         raise ReportError(
             f"{path} does not hold the rows of its {counted(asked, 'design')} in their order; "
-            "write it again with `sweep uncertainty`"
+            f"write it again with `sweep {file.kind}`"
         )
+
+
+def _inputs_of(table: pa.Table, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the inputs of answers as those of a list of designs; what follows from others is left out."""
+    found: dict[str, Any] = {}
+    for name in (name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in table.column_names):
+        optional = name in OPTIONAL_COLUMNS and name not in given
+        if not (optional or isinstance(given.get(name), str)):
+            values = table[name].unique().to_pylist()
+            found[name] = values if len(values) > 1 else values[0]
+    return found
 
 
 def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:

@@ -15,9 +15,11 @@ from boulder_sweep.judge.evaluation import control_of, known_control, readings_o
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
-from boulder_sweep.report.answers import Named, answer_of
+from boulder_sweep.report.answers import answer_of
+from boulder_sweep.report.asked import answers_table
 from boulder_sweep.report.printing import print_page
 from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
+from boulder_sweep.report.sentences import Named
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3, SolverSettings, completed
@@ -102,6 +104,7 @@ def write_report(
             readings=readings,
             start=chosen[0]["inputs"],
             sentences=answer.sentences,
+            answers=answers_table(rows),
             rows=rows,
             kept=kept,
             chosen=chosen,

@@ -349,7 +349,7 @@ def _no_result(folder: Location) -> str:
     if advice := settings_file(folder):
         return advice
     around = folder.resolve().parent
-    advice = "; `sweep export` takes a file of answers, `sweep report` one of `sweep uncertainty`"
+    advice = "; `sweep report`, `plot`, `export` and `compare` take a file of answers"
     if (around / MANIFEST_NAME).exists():
         advice = f": name the folder it lies in, {around}"
     elif folder.suffix.lower() != ".parquet":

@@ -1,10 +1,14 @@
-"""Design chart: the least that passes over the size of the boulder, a curve for each soil, a band between readings."""
+"""Charts of answers over the size of the boulder, a curve for each soil.
+
+Of `need` the least that passes, with a band between readings; of `capacity` what designs withstand; of `uncertainty`
+the probability of passing.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,17 +16,20 @@ from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.views.figures import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, caption, figure, headline
-from boulder_sweep.views.wording import RATIO, label, name_of, size_of, sized, value_text
+from boulder_sweep.views.wording import RATIO, label, name_of, size_of, sized, terms_line, value_text
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
     from boulder_sweep.answers.need import Need
+    from boulder_sweep.answers.reserves import Reserves
+    from boulder_sweep.answers.uncertainty import Uncertainty
+    from boulder_sweep.settings import Sweep
 
 ACROSS = (
     *("boulder_height_m", "boulder_width_m", "boulder_length_m", "impact_speed_m_s", "vehicle_mass_kg"),
-    *("friction_angle_deg", "subgrade_reaction_MN_m3"),
+    *(RATIO, "embedment_depth_m", "friction_angle_deg", "subgrade_reaction_MN_m3"),
 )
 CURVES = ("friction_angle_deg", "subgrade_reaction_MN_m3", "boulder_width_m", "impact_speed_m_s")
 """What is across and what tells curves apart: the first of each that varies."""
@@ -30,6 +37,13 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 """Of as many curves as can be told apart with their bands."""
 SET_COLOURS = (*COLOURS, SKY, AMBER, BLACK)
 """Of the curves of named soils or vehicles; with more curves the dashes differ."""
+ANSWERS = {
+    "withstands_speed_m_s": ("largest impact speed", "m/s"),
+    "withstands_mass_kg": ("largest mass of the truck", "kg"),
+    "withstands_friction_angle_deg": ("smallest friction angle", "deg"),
+    "p_pass": ("probability of passing", "1"),
+}
+"""Columns of answers that are drawn, each with its words and unit."""
 DASHES = ("-", "--", "-.", (0, (1, 1)))
 
 
@@ -50,10 +64,82 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
     PictureError
         Nothing varies, or there is no answer to draw, or the picture cannot be written.
     """
-    frame = need.frame
-    sets = {axis.name: axis.labels for axis in need.sweep.axes if axis.labels}
-    open_ = [name for name in need.sweep.plan.columns if name not in (need.key.name, *need.derived)]
-    if RATIO in need.sweep.plan.given and RATIO not in need.derived:  # the table holds depths
+    frame, sets, across, over, held = _shown(need.sweep, need.frame, (need.key.name, *need.derived))
+    if frame[need.key.answer].isna().all():
+        raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
+    with figure(path, 7.2, 4.8) as fig:
+        axes = fig.subplots()
+        for words, rows, style in _styled(frame, over, sets, units):
+            _curve(axes, need, rows.sort_values(across), across, style, words, units)
+        axes.set_xlabel(label(across, units))
+        axes.set_ylabel(_answer_label(need, units))
+        axes.legend(loc="best")
+        headline(fig, f"{need.sweep.name}: {_title(need)}")
+        caption(fig, _caption(need, held, units))
+
+
+def draw_answers(found: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
+    """Draw the answers for several designs: what each withstands, or its probability of passing with the interval.
+
+    Parameters
+    ----------
+    found
+        The answers.
+    path
+        Picture to write.
+    units
+        ``si`` or ``us``.
+
+    Raises
+    ------
+    PictureError
+        Nothing varies, or the picture cannot be written.
+    """
+    names = {name: spec for name, spec in ANSWERS.items() if name in found.arrow.column_names}
+    given, listed = found.sweep.plan.given, found.sweep.table is not None
+    derived = [name for name in ("embedment_depth_m", "impact_height_m") if name not in given]
+    what = "what designs withstand" if len(names) > 1 else "probability of passing"
+    # The designs of a list stand side by side.
+    shown = Shown(found.frame, {}, "design_id", None, {}) if listed else _shown(found.sweep, found.frame, derived)
+    frame, sets, across, over, held = shown
+    with figure(path, 3.4 * len(names) + 1.6 * (len(names) == 1), 4.0) as fig:
+        panels = fig.subplots(1, len(names), squeeze=False)[0]
+        for axes, (name, (words, unit)) in zip(panels, names.items(), strict=True):
+            printed, size = sized(unit, units)
+            for curve, rows, (colour, dashes) in _styled(frame, over, sets, units):
+                rows = rows.sort_values(across)
+                x = rows[across].to_numpy(dtype=float) / size_of(across, units)
+                line = {"color": colour, "linestyle": "" if listed else dashes, "markersize": 4}
+                axes.plot(x, rows[name].to_numpy(dtype=float) / size, marker="o", label=curve or None, **line)
+                if f"{name}_low" in rows:
+                    axes.fill_between(x, rows[f"{name}_low"], rows[f"{name}_high"], color=colour, alpha=0.15, lw=0)
+            if listed:
+                axes.xaxis.get_major_locator().set_params(integer=True)
+            axes.set_xlabel("design" if listed else label(across, units))
+            axes.set_ylabel(f"{words} [{printed}]" if printed else words)
+        if over is not None:
+            panels[0].legend(loc="best")
+        headline(fig, f"{found.sweep.name}: {what}")
+        parts = [one if isinstance(one, str) else value_text(name, one, units) for name, one in held.items()]
+        none = "no point: passes at no value tried" if len(names) > 1 else "band: interval of the probability"
+        caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(found.sweep.resolved())}")
+
+
+class Shown(NamedTuple):
+    """What a chart shows: its rows, named sets, what is across, what tells curves apart, and what is held."""
+
+    frame: pd.DataFrame
+    sets: dict[str, tuple[str, ...]]
+    across: str
+    over: str | None
+    held: dict[str, float | str]
+
+
+def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> Shown:
+    """Choose what a chart shows."""
+    sets = {axis.name: axis.labels for axis in sweep.axes if axis.labels}
+    open_ = [name for name in sweep.plan.columns if name not in searched]
+    if RATIO in sweep.plan.given and RATIO not in searched:  # the table holds depths
         frame = frame.assign(**{RATIO: (frame["embedment_depth_m"] / frame["boulder_height_m"]).round(9)})
         open_.append(RATIO)
     varying = [name for name in open_ if BY_NAME[name].section not in sets and len(frame[name].unique()) > 1]
@@ -71,18 +157,16 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
             levels = np.unique(frame[name].astype(float))
             held[name] = levels[len(levels) // 2]
             frame = frame[frame[name].astype(float) == held[name]]
-    if frame[need.key.answer].isna().all():
-        raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
-    with figure(path, 7.2, 4.8) as fig:
-        axes = fig.subplots()
-        for index, (words, rows) in enumerate(_curves(frame, over, sets, units)):
-            colour, dashes = SET_COLOURS[index % len(SET_COLOURS)], DASHES[index // len(SET_COLOURS) % len(DASHES)]
-            _curve(axes, need, rows.sort_values(across), across, (colour, dashes), words, units)
-        axes.set_xlabel(label(across, units))
-        axes.set_ylabel(_answer_label(need, units))
-        axes.legend(loc="best")
-        headline(fig, f"{need.sweep.name}: {_title(need)}")
-        caption(fig, _caption(need, held, units))
+    return Shown(frame, sets, across, over, held)
+
+
+def _styled(
+    frame: pd.DataFrame, over: str | None, sets: Mapping[str, Sequence[str]], units: str
+) -> Iterator[tuple[str, pd.DataFrame, tuple[str, Any]]]:
+    """Yield the words, the rows, and colour and dashes of each curve."""
+    for index, (words, rows) in enumerate(_curves(frame, over, sets, units)):
+        dashes = DASHES[index // len(SET_COLOURS) % len(DASHES)]
+        yield words, rows, (SET_COLOURS[index % len(SET_COLOURS)], dashes)
 
 
 def _curves(

@@ -133,16 +133,19 @@ def test_a_settings_file_in_place_of_a_result(sweep, grid, words):
 
 def test_a_file_of_answers_in_place_of_a_result(sweep, possible_grid):
     assert sweep("need", possible_grid, "-q", "-o", "depths.parquet", "--tolerance", "1 cm")[0] == 0
-    for words in (["status"], ["plot"], ["explain", "0"]):
+    for words in (["status"], ["explain", "0"]):
         code, out, err = sweep(words[0], "depths.parquet", *words[1:])
         assert (code, out) == (2, "")
         assert err == (
-            "error: depths.parquet is a file; the result of a run is a folder; `sweep export` takes a file of answers, "
-            "`sweep report` one of `sweep uncertainty`\n"
+            "error: depths.parquet is a file; the result of a run is a folder; `sweep report`, `plot`, `export` and "
+            "`compare` take a file of answers\n"
         )
-    code, _, err = sweep("report", "depths.parquet")
-    assert code == 2
-    assert err == (
-        "error: depths.parquet is neither the folder of a run nor a file that `sweep uncertainty` wrote; `sweep "
-        "export` takes it\n"
-    )
+
+
+def test_a_time_history_is_exported_only(sweep, possible_grid):
+    assert sweep("simulate", possible_grid, "-q", "--trajectory", "history.parquet")[0] == 0
+    for words in (["report"], ["plot"], ["compare", "history.parquet"]):
+        code, out, err = sweep(words[0], "history.parquet", *words[1:])
+        assert (code, out) == (2, "")
+        assert err == "error: history.parquet is a time history; `sweep export` takes it\n"
+    assert sweep("export", "history.parquet", "-o", "history.csv")[0] == 0

@@ -11,10 +11,11 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
+from boulder_sweep.answers.files import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import Quantity, answer_of
-from boulder_sweep.report.rows import ChanceFile, read_rows
+from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import sha256_of
 from tests.answers.designs import DEFAULTS, SITE, site
@@ -88,9 +89,9 @@ def test_no_design_may_be_safe(tmp_path: Path) -> None:
 
 
 def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
-    boulder_sweep.need(site(height="3.4 m")).write(tmp_path / "need.parquet")
-    with pytest.raises(ReportError, match="nor a file that `sweep uncertainty` wrote"):
-        write_report(tmp_path / "need.parquet", tmp_path / "page.html")
+    boulder_sweep.simulate(site(height="3.4 m", friction="40 deg")).to_parquet(tmp_path / "history.parquet")
+    with pytest.raises(ReportError, match="is a time history; `sweep export` takes it"):
+        write_report(tmp_path / "history.parquet", tmp_path / "page.html")
     (tmp_path / "text.parquet").write_text("text")
     with pytest.raises(ReportError, match="cannot be read as a Parquet file"):
         write_report(tmp_path / "text.parquet", tmp_path / "page.html")
@@ -99,7 +100,7 @@ def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
     one = tmp_path / "one.parquet"
     pq.write_table(pq.read_table(chances).slice(0, 1), one)
     with pytest.raises(IndexError, match="the file has 1 design, numbered from 0; there is no 9"):
-        ChanceFile(one).row(9)
+        AnswerFile(one, ReportError).row(9)
 
 
 def test_a_file_with_a_flipped_bit_is_refused_or_read_right(chances: Path, tmp_path: Path) -> None:

@@ -12,13 +12,15 @@
  * @property {Record<string, string>} labels
  * @property {Record<string, string>} units
  * @property {Record<string, {names: string[], inputs: Record<string, number[]>}>} sets axes of named soils or vehicles
+ * @property {string[]} first the axes of the map at first; empty for the usual ones
+ * @property {string} asked of answers, the input that they are values of; empty for others
  * @property {string} codes
  */
 
 /**
  * One rectangle of a map; `names` are those of all designs that lie there, `name` is that of the worst, which is picked.
  * @typedef {{x: number, y: number, name: string, margin?: number | null, pick: () => Record<string, number>,
- *   names?: string[]}} Cell
+ *   names?: string[], answer?: string}} Cell
  */
 
 /** Where the rectangles of a strip lie, which has one input only. */
@@ -107,7 +109,7 @@ function colourOf(name, colours) {
 
 /** @param {Cell} cell @returns {string} its verdict, and whether other designs lie there */
 function wordsOf(cell) {
-  const words = cell.name.replaceAll("_", " ");
+  const words = `${cell.name.replaceAll("_", " ")}${cell.answer ?? ""}`;
   return (cell.names?.length ?? 1) > 1 ? `${words} (the worst of ${cell.names?.length} designs here)` : words;
 }
 

@@ -229,6 +229,11 @@ class Page {
     const { across, up } = /** @type {Axes} */ (this.axes.sweep);
     for (const control of byId("held").children) control.hidden = [across, up].includes(control.dataset.name);
     const cells = tableCells(rows, this.codes, across, up, this.held);
+    if (rows.asked !== "" && ![across, up].includes(rows.asked)) {
+      for (const cell of cells.filter((one) => isPass(one.name))) {
+        cell.answer = `, ${rows.labels[rows.asked]} ${this.units.text(cell.pick()[rows.asked], rows.units[rows.asked])}`;
+      }
+    }
     this.cells = { ...this.cells, sweep: cells };
     const labels = { x: rows.labels[across], y: up === "" ? "" : rows.labels[up] };
     const units = { x: rows.units[across], y: up === "" ? "" : rows.units[up] };
@@ -449,8 +454,9 @@ class Page {
     const numbers = varying.filter((name) => !(name in rows.sets));
     const names = numbers.length > 1 ? numbers : varying;
     const options = /** @type {[string, string][]} */ (names.map((name) => [name, rows.labels[name]]));
-    const first = names.find((name) => name.startsWith("embedment")) ?? names[0];
-    const second = names.find((name) => name === "boulder_height_m" && name !== first) ?? names.find((name) => name !== first) ?? "";
+    const first = rows.first[0] ?? names.find((name) => name.startsWith("embedment")) ?? names[0];
+    const usual = names.find((name) => name === "boulder_height_m" && name !== first) ?? names.find((name) => name !== first);
+    const second = rows.first[1] ?? usual ?? "";
     this.axes.sweep.offer(options, first, second);
   }
 }

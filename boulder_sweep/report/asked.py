@@ -1,0 +1,215 @@
+"""What a file of answers says: the question and its governing answer in sentences, and the answers as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from boulder_sweep.answers.files import CAPACITY, NEED, UNCERTAINTY, AnswerFile
+from boulder_sweep.answers.lightest import SIDES
+from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.search import BLOCKED, NEVER, WORDS
+from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS
+from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, Rows, condition_of, label_of
+from boulder_sweep.report.sentences import Named, Quantity, Sentence, listed, share, verb
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.text import counted
+
+MOST_LINES = 200
+"""Most answers in the table of the page."""
+NOTHING = {
+    WORDS[NEVER]: "not pass anywhere in the searched range",
+    WORDS[BLOCKED]: "not pass up to where the truck would pass or ride over the boulder; another boulder is needed",
+}
+"""What is said where there is no answer."""
+
+
+class Table(NamedTuple):
+    """Answers as the page lists them."""
+
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str | Quantity, ...], ...]
+    left_out: str
+    """Which answers it leaves out; empty if none."""
+
+
+def key_words(need: Need) -> str:
+    """Return what was asked for in words: ``least embedment depth``."""
+    name = "boulder mass" if need.key.name == BOULDER_MASS else label_of(need.key.name)
+    return f"{'largest' if need.key.most else 'least'} {name}"
+
+
+def need_sentences(rows: Rows, need: Need) -> tuple[list[Sentence], list[Named]]:
+    """Return the question with how many rows have an answer, why others have none, and the governing answer."""
+    answers = need.arrow[need.key.answer].to_numpy()
+    found, total = ~np.isnan(answers), len(answers)
+    n = int(found.sum())
+    sentences: list[Sentence] = []
+    if total > 1:
+        asked = f"The {key_words(need)} that passes{_terms(need, rows)}"
+        sentences.append((f"{asked}: {n:,} of {total:,} combinations have one ({share(n, total)}).",))
+    for word, count in need.counts().items():
+        if word in NOTHING:
+            who = f"{counted(count, 'combination')}" if total > 1 else "The boulder"
+            sentences.append((f"{who} {verb(count, 'do', 'does')} {NOTHING[word]}.",))
+    if not n:
+        return sentences, [Named("The last value tried", 0)]
+    sentence, named = _governing(rows, need, answers)
+    return [sentence, *sentences] if total == 1 else [sentences[0], sentence, *sentences[1:]], [named]
+
+
+def _terms(need: Need, rows: Rows) -> str:
+    """Say what an answer must have besides passing."""
+    asked = rows.finished.question if isinstance(rows.finished, AnswerFile) else {}
+    words = [f"a margin of {need.least_margin:.0%} or more"] if need.least_margin else []
+    words += [f"a probability of {100 * need.probability:.10g} % or more"] if need.probability is not None else []
+    robust = " and is robust" if asked.get("robust") else ""
+    return f"{robust}{' with ' if words else ''}{listed(words) if words else ''}"
+
+
+def _governing(rows: Rows, need: Need, answers: np.ndarray) -> tuple[Sentence, Named]:
+    """Find the boulder to recommend, and its answer where that is worst.
+
+    The lightest boulder with an answer under every condition of the file, or of those with an answer under most.
+    """
+    open_ = {need.key.name, *need.derived}
+    varying = [name for name in rows.varying() if name not in open_]
+    kinds = tuple(kind for kind in CONDITIONS if kind in {condition_of(name) for name in varying})
+    boulders = rows.boulders([*open_, *(name for name in varying if condition_of(name))])
+    found = ~np.isnan(answers)
+    held = np.bincount(boulders, weights=found)
+    whole = held == np.bincount(boulders)
+    candidates = found & (held == held.max())[boulders]
+    mass = need.arrow[BOULDER_MASS].to_numpy()
+    if need.key.name != BOULDER_MASS:  # which differs from soil to soil
+        lightest = int(np.argmin(np.where(candidates, mass, np.inf)))
+        candidates &= boulders == boulders[lightest]
+    worst = np.where(candidates, answers if need.key.most else -answers, np.inf)
+    number = int(np.argmin(worst))
+    several = int(candidates.sum()) > 1
+    under = listed([CONDITIONS[kind] for kind in kinds]) if kinds else ""
+    if under and not whole[boulders[number]]:
+        under = f"in {int(held.max()):,} of its {int(np.bincount(boulders)[boulders[number]]):,} combinations"
+    row = rows.row(number)
+    sizes: list[str | Quantity] = []
+    if need.key.name != BOULDER_MASS:
+        sizes += [Quantity(float(mass[number]), "kg"), " of rock, "]
+    if need.key.name != DEPTH:
+        sizes += [Quantity(row[DEPTH], "m"), " deep, "]
+    more = [f"margin {row['margin']:.1%}"] if row["margin"] is not None and need.probability is None else []
+    more += [f"P(pass) = {row['p_pass']:.1%}"] if "p_pass" in row else []
+    more += [row["robustness"]] if row["robustness"] in ("robust", "sensitive") else []
+    what = f"{key_words(need)} "
+    unit = need.key.field.unit
+    asked = Quantity(float(answers[number]), unit)
+    where = " where that is worst for it" if several else ""
+    if len(answers) == 1:
+        lead = f"The {key_words(need)} that passes{_terms(need, rows)}: "
+        sentence: Sentence = (lead, asked, ", ", *sizes[:-1], f"{_ended(sizes)} ({', '.join(more)}).")
+        return sentence, Named("The answer", number)
+    who = "Lightest boulder with an answer" if need.key.name != BOULDER_MASS else "Governing answer"
+    title = f"{who} {under}".rstrip()
+    sentence = (f"{title}: ", *sizes, what, asked, f"{where} (design {number:,}{''.join(f', {one}' for one in more)}).")
+    return sentence, Named(title, number)
+
+
+def _ended(sizes: Sequence[str | Quantity]) -> str:
+    """Return the last words of a list of sizes without the comma behind them."""
+    last = sizes[-1] if sizes else ""
+    return str(last).rstrip(", ") if isinstance(last, str) else ""
+
+
+def capacity_sentences(row: dict[str, Any]) -> list[Sentence]:
+    """Return what a single design withstands."""
+    asked = {
+        "speed": ("withstands_speed_m_s", "m/s"),
+        "mass of the truck": ("withstands_mass_kg", "kg"),
+        "friction angle": ("withstands_friction_angle_deg", "deg"),
+    }
+    parts: list[str | Quantity] = []
+    for name, (column, unit) in asked.items():
+        value = row[column]
+        parts += ["; " if parts else "", f"{name} "]
+        parts += ["none of those tried"] if value is None else [Quantity(value, unit)]
+    return [("All else unchanged, the worst at which it passes: ", *parts, ".")]
+
+
+def answers_table(rows: Rows) -> Table | None:
+    """Return the answers as a table; None for the result of a run, and where the sentences say it all."""
+    file = rows.finished
+    if not isinstance(file, AnswerFile) or len(rows.codes) == 1:
+        return None
+    answers = file.answers()
+    table = file.table
+    labels = [name for name in answers.sweep.plan.labels if name in table.column_names]
+    open_ = {answers.key.name, *answers.derived} if isinstance(answers, Need) else set()
+    columns: list[tuple[str, str, str]] = [(name, name, "") for name in labels]
+    if answers.sweep.table is not None:
+        columns.append(("design", "design_id", ""))
+    else:
+        varying = {DEPTH if name == RATIO else name for name in rows.varying()}
+        inputs = [name for name in INPUT_COLUMNS if name in varying and name not in open_]
+        columns += [(label_of(name), name, BY_NAME[name].unit) for name in inputs]
+    columns += _own_columns(file.kind, answers)
+    kept = table.slice(0, MOST_LINES).to_pylist()
+    more = len(table) > MOST_LINES
+    left = f"the first {MOST_LINES:,} of {len(table):,} answers; `sweep export` writes them all" if more else ""
+    lines = tuple(tuple(_cell(row, name, unit, open_) for _, name, unit in columns) for row in kept)
+    return Table(tuple(head for head, _, _ in columns), lines, left)
+
+
+def map_of(rows: Rows) -> dict[str, Any]:
+    """Return what the map of answers adds to that of a list: the axes it starts with, and the input asked for."""
+    if rows.kind != NEED:
+        return {"first": [], "asked": ""}
+    assert isinstance(rows.finished, AnswerFile)
+    need = rows.finished.answers()
+    assert isinstance(need, Need)
+    others = [name for name in rows.varying() if name not in (need.key.name, *need.derived)]
+    asked = need.key.name if need.key.name in rows.varying() else ""
+    return {"first": [*others, *([asked] if asked else [])][:2], "asked": asked}
+
+
+def _own_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
+    """Return head, column and unit of what a command answers."""
+    if kind == NEED:
+        key = answers.key
+        sizes = SIDES if key.name == BOULDER_MASS else ()
+        columns = [(key_words(answers), key.answer, key.field.unit), *((label_of(one), one, "m") for one in sizes)]
+        columns += [("embedment depth", DEPTH, "m")] if key.name != DEPTH else []
+        columns += [("mass", BOULDER_MASS, "kg")] if key.name != BOULDER_MASS else []
+        chance = "p_pass" in answers.arrow.column_names
+        columns += [("P(pass)", "p_pass", "%")] if chance else [("margin", "margin", "%")]
+        return [*columns, ("second opinion", "robustness", "")]
+    own = {
+        CAPACITY: [
+            ("verdict", "verdict", ""),
+            ("second opinion", "robustness", ""),
+            ("withstands speed", "withstands_speed_m_s", "m/s"),
+            ("mass of truck", "withstands_mass_kg", "kg"),
+            ("friction angle", "withstands_friction_angle_deg", "deg"),
+            ("class, simulated", "simulated_class", ""),
+        ],
+        UNCERTAINTY: [
+            ("verdict at the means", "verdict", ""),
+            ("P(pass)", "p_pass", "%"),
+            ("from", "p_pass_low", "%"),
+            ("to", "p_pass_high", "%"),
+            ("decided by", "p_pass_driver", ""),
+        ],
+    }
+    return own[kind]
+
+
+def _cell(row: dict[str, Any], name: str, unit: str, searched: set[str]) -> str | Quantity:
+    """Return one cell; of a row without an answer, why there is none in place of it."""
+    value, none = row[name], "passes_at" in row and row["passes_at"] is None
+    if none and name.startswith(("least_", "most_")):
+        return str(row["found"]).replace("_", " ")
+    if value is None or (none and name in (*searched, "margin", "p_pass", "robustness")):
+        return "–"
+    if unit == "%":
+        return f"{value:.1%}"
+    return Quantity(float(value), unit) if unit else str(value)

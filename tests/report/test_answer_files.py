@@ -1,0 +1,269 @@
+"""Files that -o of `need`, `capacity` and `uncertainty` wrote, read back, reported, drawn and compared."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import boulder_sweep
+from boulder_sweep.answers.files import AnswerFile
+from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.errors import ReportError
+from boulder_sweep.report import write_report
+from boulder_sweep.report.answers import answer_of
+from boulder_sweep.report.asked import answers_table
+from boulder_sweep.report.comparison import compare
+from boulder_sweep.report.rows import read_rows
+from boulder_sweep.report.sentences import Quantity
+from boulder_sweep.settings import load_text
+from tests.answers.designs import site
+from tests.conftest import Command
+from tests.report.conftest import SETS
+
+RATIOS = "embedment_ratio: {from: 0.5, to: 0.8, count: 4}"
+UNCERTAIN = {"friction": "{mean: [36, 40] deg, cov: 5 %}", "site": "embedment_depth: 2.2 m"}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """One file of each question."""
+    folder = tmp_path_factory.mktemp("answers")
+    found: dict[str, Any] = {
+        "depth": need(site(), margin="10 %"),
+        "depth of a ratio": need(site(site=RATIOS), robust=True),
+        "mass": need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
+        "speed": need(site(height="[3.0, 3.4] m"), most="speed"),
+        "chance": need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
+        "sets": need(load_text(SETS, folder / "sets.yaml"), margin=0.1),
+        "capacity": reserves(site(height="[3.0, 3.4] m")),
+        "uncertainty": boulder_sweep.uncertainty(site(**UNCERTAIN, height="[3.0, 3.4] m"), half_width=0.2),
+        "one": need(site(height="3.4 m", friction="40 deg")),
+        "nothing": need(site(height="2.0 m", friction="36 deg")),
+    }
+    for name, answers in found.items():
+        answers.write(folder / f"{name}.parquet")
+    return {name: folder / f"{name}.parquet" for name in found}
+
+
+NEEDS = ("depth", "depth of a ratio", "mass", "speed", "chance", "sets", "one", "nothing")
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_a_need_is_read_back_as_it_was(files: dict[str, Path], name: str) -> None:
+    file = AnswerFile(files[name], ReportError)
+    found = file.answers()
+    assert isinstance(found, Need)
+    assert file.asked == len(found) == file.rows
+    asked = json.loads(found.arrow.schema.metadata[b"boulder_sweep.question"])
+    assert (found.key.answer, found.key.tolerance, found.least_margin) == tuple(
+        asked[key] for key in ("asked", "tolerance", "margin")
+    )
+    assert found.probability == (0.9 if name == "chance" else None)
+    assert file.question.get("robust", False) == (name == "depth of a ratio")
+    settings = file.identity["settings"]
+    given = found.sweep.resolved()
+    assert {key: given[key] for key in ("name", "order", "inputs", "criterion", "model")} == {
+        key: settings[key] for key in ("name", "order", "inputs", "criterion", "model")
+    }
+
+
+def test_axes_too_long_for_the_settings_are_read_from_the_table(tmp_path: Path) -> None:
+    many = ", ".join(f"{30 + place / 100:g}" for place in range(1001))
+    found = need(site(height="3.4 m", friction=f"[{many}] deg"), tolerance="1 cm")
+    found.write(tmp_path / "many.parquet")
+    rows = read_rows(tmp_path / "many.parquet")
+    assert rows.shape == (1001,)
+    np.testing.assert_array_equal(rows.inputs["friction_angle_deg"], found.sweep.axes[0].values)
+
+
+@pytest.mark.parametrize("name", ["depth", "speed", "mass"])
+def test_the_governing_answer_is_named(files: dict[str, Path], name: str) -> None:
+    answers = AnswerFile(files[name], ReportError).answers()
+    assert isinstance(answers, Need)
+    frame = answers.frame.reset_index(drop=True)
+    key, most = answers.key.answer, answers.key.most
+    everywhere = frame.groupby("boulder_height_m")[key].apply(lambda own: own.notna().all())
+    if name == "mass":
+        row = frame[key].idxmax()
+    else:
+        height = min(everywhere.index[everywhere])
+        own = frame[frame.boulder_height_m == height][key]
+        row = own.idxmin() if most else own.idxmax()
+    answer = answer_of(read_rows(files[name]))
+    assert answer.named[0].number == row
+    governing = answer.sentences[1]
+    assert frame[key][row] in [part.value for part in governing if isinstance(part, Quantity)]
+    words = "".join(str(part) for part in governing if isinstance(part, str))
+    assert f"(design {row}, " in words
+    found = int(frame[key].notna().sum())
+    assert f"{found} of {len(frame)} combinations have one" in str(answer.sentences[0][0])
+
+
+def test_what_has_no_answer_says_why(files: dict[str, Path]) -> None:
+    said = [str(sentence[0]) for sentence in answer_of(read_rows(files["nothing"])).sentences]
+    assert said == [
+        "The boulder does not pass up to where the truck would pass or ride over the boulder; "
+        "another boulder is needed."
+    ]
+    rows = read_rows(files["depth"])
+    found = answers_table(rows)
+    assert found is not None
+    table = pq.read_table(files["depth"]).to_pylist()
+    column = found.heads.index("least embedment depth")
+    assert {row[column] for row in found.rows if isinstance(row[column], str)} == {
+        row["found"].replace("_", " ") for row in table if row["passes_at"] is None
+    }
+    assert rows.counts() == {
+        name: sum(_name(row) == name for row in table) for name in dict.fromkeys(map(_name, table))
+    }
+
+
+def _name(row: dict[str, Any]) -> str:
+    return f"fail: {row['found']}" if row["passes_at"] is None else f"pass: {row['robustness']}"
+
+
+def test_the_table_has_every_answer_with_its_inputs(files: dict[str, Path]) -> None:
+    for name, file in files.items():
+        found, table = answers_table(read_rows(file)), pq.read_table(file)
+        if len(table) == 1:
+            assert found is None
+            continue
+        assert found is not None
+        assert len(found.rows) == len(table)
+        assert all(len(row) == len(found.heads) for row in found.rows)
+        if name == "sets":
+            assert [row[found.heads.index("soil")] for row in found.rows] == table["soil"].to_pylist()
+        if name == "capacity":
+            speeds = [row[found.heads.index("withstands speed")] for row in found.rows]
+            assert [part.value for part in speeds if isinstance(part, Quantity)] == [
+                value for value in table["withstands_speed_m_s"].to_pylist() if value is not None
+            ]
+
+
+RARELY_OPENED = ("sets", "mass", "speed", "chance", "uncertainty", "nothing")
+
+
+@pytest.mark.parametrize(
+    "name", ["depth", "capacity", *(pytest.param(one, marks=pytest.mark.nightly) for one in RARELY_OPENED)]
+)
+def test_the_page_opens_without_a_complaint(files: dict[str, Path], name: str, tmp_path: Path, opened: Any) -> None:
+    page = opened(write_report(files[name], tmp_path / "page.html"))
+    table = pq.read_table(files[name]).to_pylist()
+    assert page.complaints == []
+    assert not page.is_visible("#failure")
+    if len(table) > 1:
+        assert page.locator(".answers tbody tr").count() == len(table)
+        assert re.match(rf"\d+ of the {len(table)} designs shown pass", page.inner_text("#sweep-words"))
+    chosen = page.evaluate("page.data.chosen[0]")
+    row = table[chosen["number"]]
+    for column in ("embedment_depth_m", "boulder_height_m", "friction_angle_deg", "impact_speed_m_s"):
+        assert chosen["inputs"][column] == row[column]
+    assert page.inner_text("#chosen0-verdict")[2:].startswith(row["verdict"])
+    page.select_option("#units", "us")
+    assert page.complaints == []
+
+
+def test_the_map_of_a_need_says_the_answers(files: dict[str, Path], tmp_path: Path, opened: Any) -> None:
+    page = opened(write_report(files["depth"], tmp_path / "page.html"))
+    table = pq.read_table(files["depth"]).to_pylist()
+    assert [page.input_value(f"#{one}") for one in ("across", "up")] == ["boulder_height_m", "friction_angle_deg"]
+    cells = page.evaluate("page.cells.sweep.map((cell) => ({ x: cell.x, y: cell.y, words: wordsOf(cell) }))")
+    for row in table:
+        (cell,) = [one for one in cells if (one["x"], one["y"]) == (row["boulder_height_m"], row["friction_angle_deg"])]
+        if row["passes_at"] is None:
+            assert cell["words"] == f"fail: {row['found'].replace('_', ' ')}"
+        else:
+            depth = float(re.search(r"embedment depth ([\d.]+)", cell["words"])[1])
+            assert depth == pytest.approx(row["least_embedment_depth_m"], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["depth", "sets", "speed", "chance", "capacity", "uncertainty"])
+def test_a_chart_is_drawn(files: dict[str, Path], name: str, tmp_path: Path, sweep: Command) -> None:
+    code, out, err = sweep("plot", files[name], "-o", tmp_path / "chart.png", "--units", "us")
+    assert (code, err) == (0, "")
+    rows = len(pq.read_table(files[name]))
+    assert out == f"{tmp_path / 'chart.png'}: {rows} answers\n"
+    assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
+    code, _, err = sweep("plot", files[name], "--across", "width")
+    assert code == 2
+    assert "a chart of answers takes none" in err
+
+
+def test_one_design_of_uncertainty_is_drawn_with_its_samples(tmp_path: Path, sweep: Command) -> None:
+    one = site(height="3.2 m", friction="{mean: 40 deg, cov: 5 %}")
+    boulder_sweep.uncertainty(one, half_width=0.1).write(tmp_path / "one.parquet")
+    assert sweep("plot", tmp_path / "one.parquet") == (0, f"{tmp_path / 'one.png'}: 1 answer\n", "")
+    (tmp_path / "one.samples.parquet").unlink()
+    code, _, err = sweep("plot", tmp_path / "one.parquet")
+    assert code == 2
+    assert "no samples of design 0 are kept" in err
+
+
+def test_two_needs_are_paired_by_their_inputs(files: dict[str, Path], tmp_path: Path) -> None:
+    weaker = need(site(friction="[34, 38] deg"), margin="10 %")
+    weaker.write(tmp_path / "weaker.parquet")
+    found = compare(files["depth"], tmp_path / "weaker.parquet")
+    before, after = (pq.read_table(file).to_pandas() for file in (files["depth"], tmp_path / "weaker.parquet"))
+    assert (len(found.matched), found.differ, found.kind) == (len(before), ("friction_angle_deg",), "need")
+    assert found.answers == {"least_embedment_depth_m": "m"}
+    change = (after.least_embedment_depth_m - before.least_embedment_depth_m).dropna()
+    moves = found.to_dict()["answers"]["least_embedment_depth_m"]
+    assert (moves["larger"], moves["smaller"]) == ((change > 0).sum(), (change < 0).sum())
+    assert moves["largest_change"] == change.max() > 0
+    lost = int((before.passes_at.notna() & after.passes_at.isna()).sum())
+    assert found.turned()["passes_lost"] == lost
+    assert any("friction_angle_deg" in line for line in found.changed)
+
+
+def test_an_answer_file_does_not_differ_from_itself(files: dict[str, Path]) -> None:
+    for name, file in files.items():
+        found = compare(file, file)
+        assert len(found.matched) == len(pq.read_table(file)), name
+        assert found.changed == ()
+        for moves in found.to_dict()["answers"].values():
+            assert (moves["larger"], moves["smaller"]) == (0, 0)
+
+
+def test_the_command_says_what_changed(files: dict[str, Path], tmp_path: Path, sweep: Command) -> None:
+    reserves(site(height="[3.0, 3.4] m").__class__(**_slower())).write(tmp_path / "slower.parquet")
+    code, out, _ = sweep("compare", files["capacity"], tmp_path / "slower.parquet", "--units", "us", "--show", "1")
+    assert code == 0
+    assert "differs  impact speed: 30 -> 25 mph" in out
+    assert "withstands_mass_lb: 4 larger, 0 smaller, 0 equal after (by +" in out
+    code, out, _ = sweep("compare", files["depth"], files["depth"])
+    assert code == 0
+    assert "least_embedment_depth_m: 0 larger, 0 smaller, " in out
+
+
+def _slower() -> dict[str, Any]:
+    """Return the parts of the same sweep at a lower speed."""
+    own = vars(site(height="[3.0, 3.4] m")).copy()
+    own.pop("plan", None)
+    return own | {"constants": own["constants"] | {"impact_speed_m_s": 11.176}}
+
+
+@pytest.mark.parametrize("other", ["mass", "capacity", "uncertainty"])
+def test_answers_to_two_questions_are_not_compared(files: dict[str, Path], other: str) -> None:
+    with pytest.raises(ReportError, match="compare two results of one command and question"):
+        compare(files["depth"], files[other])
+
+
+def test_a_file_with_other_columns_or_rows_is_refused(files: dict[str, Path], tmp_path: Path) -> None:
+    table, other = pq.read_table(files["depth"]), tmp_path / "other.parquet"
+    pq.write_table(table.slice(1), other)
+    with pytest.raises(ReportError, match="does not hold the rows of its 6 designs in their order"):
+        write_report(other, tmp_path / "page.html")
+    pq.write_table(table.drop_columns(["margin"]), other)
+    with pytest.raises(ReportError, match="is damaged; write it again with `sweep need`"):
+        write_report(other, tmp_path / "page.html")
+    pq.write_table(pa.table({"a": [1]}), other)
+    with pytest.raises(ReportError, match="neither the folder of a run nor a file that `sweep` wrote"):
+        write_report(other, tmp_path / "page.html")
