@@ -10,7 +10,19 @@ from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.statements import statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
-from docs.studies import against_tests, answers, energy, forms, free_region, moves, scale, soil, stones, unloading
+from docs.studies import (
+    against_tests,
+    answers,
+    energy,
+    forms,
+    free_region,
+    gallery,
+    moves,
+    scale,
+    soil,
+    stones,
+    unloading,
+)
 from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
@@ -296,5 +308,11 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "published-spreads": answers.published_spreads,
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
+    "gallery-embassy-street": lambda root: gallery.words_of(root, "embassy_street"),
+    "gallery-wet-backfill": lambda root: gallery.words_of(root, "wet_backfill"),
+    "gallery-clayey-terrace": lambda root: gallery.words_of(root, "clayey_terrace"),
+    "gallery-embankment": lambda root: gallery.words_of(root, "embankment"),
+    "gallery-quarry-stone": lambda root: gallery.words_of(root, "quarry_stone"),
+    "gallery-uncertain-site": lambda root: gallery.words_of(root, "uncertain_site"),
 }
 """Function of every block by its name."""
