@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docs.site.notebooks import as_markdown
-from docs.site.reference import command_page, kernel_page, python_page
+from docs.site.reference import command_help, kernel_page, python_page
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -26,6 +26,8 @@ RENAMED = {"README.md": "quick_start.md"}
 """Location in the site of files that would be in the way of others at their own."""
 TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
 """Pages from outside the folder of the documentation."""
+COMMAND_LINE = "command_line.md"
+"""The page below which the help of every command stands."""
 SHIM = "assets/iframe-worker.js"
 """For the search on pages opened from disk; `mkdocs.yml` names it in place of one that the theme would fetch."""
 _LINK = re.compile(r"(?P<before>\]\(|\bsrc=\")(?!\w+:|#)(?P<target>[^)\s\"#]+)(?P<anchor>#[^)\s\"]*)?")
@@ -41,7 +43,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files.append(File.generated(config, SHIM, abs_src_path=str(Path(__file__).with_name("iframe-worker.js"))))
     for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
         files.append(File.generated(config, f"notebooks/{notebook.stem}.md", content=as_markdown(notebook)))
-    for name, page in (("commands", command_page), ("python", python_page), ("kernels", kernel_page)):
+    for name, page in (("python", python_page), ("kernels", kernel_page)):
         files.append(File.generated(config, f"reference/{name}.md", content=page()))
     return files
 
@@ -52,6 +54,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) 
     source = next((name for name in taken() if in_site(name) == here), None)
     if here.startswith("reference/"):
         return markdown
+    if here == COMMAND_LINE:
+        markdown = f"{markdown}\n{command_help()}"
     if source is None:
         source = here if here.startswith("notebooks/") else f"docs/{here}"
     pieces = _CODE.split(markdown)

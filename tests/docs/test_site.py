@@ -14,7 +14,7 @@ import pytest
 
 from docs.site.hooks import relinked
 from docs.site.notebooks import as_markdown
-from docs.site.reference import command_page
+from docs.site.reference import command_help
 
 ROOT = Path(__file__).parents[2]
 
@@ -70,7 +70,7 @@ def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
     words = {
         "quick_start.html": "Which boulder, buried how deep",
         "benchmarks/index.html": "numbalsoda",
-        "reference/commands.html": "sweep fit-vehicle",
+        "command_line.html": "sweep fit-vehicle",
         "reference/python.html": "boulder_sweep.runner.sweeper.run",
         "reference/kernels.html": "boulder_kernels.soil.closed_form",
         "notebooks/m30_sizing.html": "configs/m30_sizing.yaml",
@@ -138,6 +138,6 @@ def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
 def test_every_command_has_its_reference() -> None:
     from boulder_sweep.cli.main import cli
 
-    page = command_page()
+    page = command_help()
     names = {command.name for command in cli.commands.values()}  # a command may have another name, too
     assert all(f"## sweep {name}\n" in page for name in names)
