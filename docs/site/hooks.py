@@ -26,10 +26,13 @@ RENAMED = {"README.md": "quick_start.md"}
 """Location in the site of files that would be in the way of others at their own."""
 TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
 """Pages from outside the folder of the documentation."""
+HOME = "README.md"
+"""The landing page, over the whole width."""
 COMMAND_LINE = "command_line.md"
 """The page below which the help of every command stands."""
-SHIM = "assets/iframe-worker.js"
-"""For the search on pages opened from disk; `mkdocs.yml` names it in place of one that the theme would fetch."""
+ASSETS = ("iframe-worker.js", "tables.css")
+"""Files of this folder that `mkdocs.yml` names; the first is for the search on pages opened from disk, in place of one
+that the theme would fetch."""
 _LINK = re.compile(r"(?P<before>\]\(|\bsrc=\")(?!\w+:|#)(?P<target>[^)\s\"#]+)(?P<anchor>#[^)\s\"]*)?")
 _CODE = re.compile(r"(```.*?```|`[^`\n]*`)", re.DOTALL)
 
@@ -40,7 +43,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
     for name in taken():
         files.append(File.generated(config, in_site(name), abs_src_path=str(ROOT / name)))
-    files.append(File.generated(config, SHIM, abs_src_path=str(Path(__file__).with_name("iframe-worker.js"))))
+    for name in ASSETS:
+        files.append(File.generated(config, f"assets/{name}", abs_src_path=str(Path(__file__).with_name(name))))
     for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
         files.append(File.generated(config, f"notebooks/{notebook.stem}.md", content=as_markdown(notebook)))
     for name, page in (("python", python_page), ("kernels", kernel_page)):
@@ -51,6 +55,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) -> str:
     """Turn links between files of the repository into links between pages of the site."""
     here = page.file.src_uri
+    if here == HOME:
+        page.meta["hide"] = ["navigation", "toc"]
     source = next((name for name in taken() if in_site(name) == here), None)
     if here.startswith("reference/"):
         return markdown

@@ -115,6 +115,9 @@ def test_links_of_the_repository_become_links_of_the_site(text: str, source: str
     assert relinked(text, source) == expected
 
 
+FRAME = '<table border="1" class="dataframe">\n</table>'
+
+
 def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
     import nbformat
     from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
@@ -125,6 +128,7 @@ def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
         new_code_cell(
             "draw()", outputs=[new_output("display_data", {"image/png": "AAAA\n", "text/plain": "<Figure>"})]
         ),
+        new_code_cell("frame", outputs=[new_output("execute_result", {"text/html": FRAME})]),
         new_code_cell("print(3)", outputs=[new_output("stream", text="3\n")]),
     ]
     nbformat.write(new_notebook(cells=cells), tmp_path / "a.ipynb")
@@ -132,6 +136,7 @@ def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
     assert page.startswith("# Title\n\n```python\n1 + 1\n```\n\n```text\n2\n```")
     assert 'src="data:image/png;base64,AAAA"' in page
     assert page.endswith("```text\n3\n```\n")
+    assert "<table>\n</table>" in page, "as the theme styles tables"
     assert "<Figure>" not in page
 
 
