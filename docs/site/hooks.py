@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docs.site.notebooks import as_markdown
-from docs.site.reference import command_page, kernel_page, python_page
+from docs.site.reference import command_help, kernel_page, python_page
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -26,8 +26,13 @@ RENAMED = {"README.md": "quick_start.md"}
 """Location in the site of files that would be in the way of others at their own."""
 TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
 """Pages from outside the folder of the documentation."""
-SHIM = "assets/iframe-worker.js"
-"""For the search on pages opened from disk; `mkdocs.yml` names it in place of one that the theme would fetch."""
+HOME = "README.md"
+"""The landing page, over the whole width."""
+COMMAND_LINE = "command_line.md"
+"""The page below which the help of every command stands."""
+ASSETS = ("iframe-worker.js", "tables.css")
+"""Files of this folder that `mkdocs.yml` names; the first is for the search on pages opened from disk, in place of one
+that the theme would fetch."""
 _LINK = re.compile(r"(?P<before>\]\(|\bsrc=\")(?!\w+:|#)(?P<target>[^)\s\"#]+)(?P<anchor>#[^)\s\"]*)?")
 _CODE = re.compile(r"(```.*?```|`[^`\n]*`)", re.DOTALL)
 
@@ -38,10 +43,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
     for name in taken():
         files.append(File.generated(config, in_site(name), abs_src_path=str(ROOT / name)))
-    files.append(File.generated(config, SHIM, abs_src_path=str(Path(__file__).with_name("iframe-worker.js"))))
+    for name in ASSETS:
+        files.append(File.generated(config, f"assets/{name}", abs_src_path=str(Path(__file__).with_name(name))))
     for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
         files.append(File.generated(config, f"notebooks/{notebook.stem}.md", content=as_markdown(notebook)))
-    for name, page in (("commands", command_page), ("python", python_page), ("kernels", kernel_page)):
+    for name, page in (("python", python_page), ("kernels", kernel_page)):
         files.append(File.generated(config, f"reference/{name}.md", content=page()))
     return files
 
@@ -49,9 +55,13 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) -> str:
     """Turn links between files of the repository into links between pages of the site."""
     here = page.file.src_uri
+    if here == HOME:
+        page.meta["hide"] = ["navigation", "toc"]
     source = next((name for name in taken() if in_site(name) == here), None)
     if here.startswith("reference/"):
         return markdown
+    if here == COMMAND_LINE:
+        markdown = f"{markdown}\n{command_help()}"
     if source is None:
         source = here if here.startswith("notebooks/") else f"docs/{here}"
     pieces = _CODE.split(markdown)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import nbformat
+
+_TABLE = re.compile(r"<table[^>]*>")
+"""Tables with attributes of their own are neither styled by the theme nor scrolled on a narrow screen."""
 
 
 def as_markdown(notebook: Path) -> str:
@@ -28,7 +32,8 @@ def _shown(output: Any) -> str:
     if "image/png" in data:
         return f'<img alt="output" src="data:image/png;base64,{data["image/png"].strip()}">'
     if "text/html" in data:
-        return "\n".join(line.strip() for line in data["text/html"].splitlines() if line.strip())
+        shown = "\n".join(line.strip() for line in data["text/html"].splitlines() if line.strip())
+        return _TABLE.sub("<table>", shown)
     if "text/plain" in data:
         return f"```text\n{data['text/plain']}\n```"
     return ""

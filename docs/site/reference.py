@@ -9,9 +9,9 @@ import boulder_sweep
 from boulder_sweep.cli.main import cli
 
 
-def command_page() -> str:
-    """Return the help of every command."""
-    parts = ["# Commands", "What `sweep COMMAND --help` prints."]
+def command_help() -> str:
+    """Return the help of every command, a section each."""
+    parts = []
     with click.Context(cli, info_name="sweep", terminal_width=100) as context:
         for name in cli.list_commands(context):
             command = cli.get_command(context, name)

@@ -16,6 +16,7 @@ from docs.studies import (
     energy,
     forms,
     free_region,
+    gallery,
     moves,
     scale,
     site_data,
@@ -23,7 +24,7 @@ from docs.studies import (
     stones,
     unloading,
 )
-from docs.studies.coverage import coverage_table, coverages, grid_table, random_table
+from docs.studies.coverage import NUMBERS, coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
 from docs.studies.knife_edge import knife_edge_words
 from docs.studies.one_face import one_face_words
@@ -122,7 +123,8 @@ def _fit(_: Path) -> str:
 
 def _coverage(root: Path) -> str:
     tables = {"random": random_table(16_384, 1), "M30 grid": grid_table(root / GRID, 8192)}
-    return coverage_table(list(coverages(tables))).markdown()
+    shown = [own for own in coverages(tables) if own.accuracy != "a number" or own.steps == NUMBERS[1]]
+    return coverage_table(shown).markdown()
 
 
 def _knife_edge(_: Path) -> str:
@@ -191,10 +193,6 @@ def _pushover(_: Path) -> str:
 
 def _moves(root: Path) -> str:
     return moves.moves_table(root).markdown()
-
-
-def _openpile(_: Path) -> str:
-    return against_tests.openpile_table().markdown()
 
 
 def _post_speeds(_: Path) -> str:
@@ -279,7 +277,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "unloading-grid": _unloading_grid,
     "unloading-elements": _unloading_elements,
     "pushover": _pushover,
-    "openpile": _openpile,
     "post-speeds": _post_speeds,
     "crush-words": _crush_words,
     "front-face": _front_face,
@@ -306,10 +303,16 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
     "published-spreads": answers.published_spreads,
-    "borehole-notes": site_data.notes_of_borehole,
-    "speed-street": site_data.speed_of_street,
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
+    "borehole-notes": site_data.notes_of_borehole,
+    "speed-street": site_data.speed_of_street,
+    "gallery-embassy-street": lambda root: gallery.words_of(root, "embassy_street"),
+    "gallery-wet-backfill": lambda root: gallery.words_of(root, "wet_backfill"),
+    "gallery-clayey-terrace": lambda root: gallery.words_of(root, "clayey_terrace"),
+    "gallery-embankment": lambda root: gallery.words_of(root, "embankment"),
+    "gallery-quarry-stone": lambda root: gallery.words_of(root, "quarry_stone"),
+    "gallery-uncertain-site": lambda root: gallery.words_of(root, "uncertain_site"),
 }
 """Function of every block by its name."""
 

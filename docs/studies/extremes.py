@@ -23,13 +23,13 @@ SPARE = 4
 
 
 def admitted_table() -> Table:
-    """Return every bound of the settings with its reason."""
-    table = Table(("entry", "least", "most", "unit", "why there is an end"))
+    """Return every bound of the settings; the reasons stand in the messages of refusals."""
+    table = Table(("entry", "least", "most", "unit"))
     for field in FIELDS:
         if field.admitted is not None:
-            low, high, reason = field.admitted
-            table.add(f"`{field.path}`", f"{low:g}", f"{high:g}", field.unit, reason)
-    table.add("soil elements", "1", f"{MAX_ELEMENTS:g}", "1", "the closed form is the limit of infinitely many")
+            low, high, _ = field.admitted
+            table.add(f"`{field.path}`", f"{low:g}", f"{high:g}", field.unit)
+    table.add("soil elements", "1", f"{MAX_ELEMENTS:g}", "1")
     return table
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from boulder_sweep import load, need, read, run, uncertainty
+from PIL import Image
+
+from boulder_sweep import load, need, read, run
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.fitting import fit_pulse
 from boulder_sweep.crash_tests.pulse import read_pulse
@@ -15,9 +17,10 @@ from boulder_sweep.settings.overrides import ALL_OPINIONS
 from boulder_sweep.views.crash_curves import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
 from boulder_sweep.views.verdict_map import draw_verdict_map
 from boulder_sweep.views.wording import terms_line
-from docs.studies.answers import SITE, UNCERTAIN
+from docs.studies.answers import SITE
 from docs.studies.contents import EVERY, GRID
 from docs.studies.example_pulse import example_pulse
+from docs.studies.gallery import draw_sites
 from docs.studies.knife_edge import draw_knife_edge
 from docs.studies.readings import readings_study
 from docs.studies.readings_plot import draw_readings
@@ -60,7 +63,6 @@ def draw_all(root: Path) -> list[Path]:
         draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, named(name))
     draw_readings(readings_study(root / GRID, EVERY), named("readings.png"))
     need(load(root / SITE), both_readings=True).plot(named("design_chart.png"))
-    uncertainty(load(root / UNCERTAIN)).plot(named("uncertainty.png"))
     draw_knife_edge(named("knife_edge.png"))
     example_stone(root).plot(named("stone.png"))
     with tempfile.TemporaryDirectory() as scratch:
@@ -71,4 +73,14 @@ def draw_all(root: Path) -> list[Path]:
         run(sweep, Path(scratch) / "grid.sweep")
         table, terms = read(Path(scratch) / "grid.sweep"), terms_line(sweep.resolved())
         draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)
+    drawn += draw_sites(root, folder)
+    for path in drawn:
+        reduce_colours(path)
     return sorted(drawn)
+
+
+def reduce_colours(path: Path) -> None:
+    """Save a picture again with a palette of 256 colours, which takes a third of the bytes."""
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(256)
+    small.save(path, optimize=True)

@@ -16,7 +16,7 @@ DEFAULTS = {
 """In words, where it is no number."""
 FORMS = {
     "readings": "`corrected`, `as_printed`, or single switches ([readings](readings.md))",
-    "soil_elements": "`closed_form`, or `{elements: 5000}` ([soil elements](convergence.md))",
+    "soil_elements": "`closed_form`, or `{elements: 5000}` ([soil elements](validation.md#soil-elements))",
     "layers": "a list of layers ([soils as they lie](soil.md#soils-as-they-lie))",
     "profile": "a list of points ([boulders that are no boxes](stones.md))",
     "second_opinion": "`none`, or a list of `broms` and `width_capped` ([second opinion](second_opinion.md))",

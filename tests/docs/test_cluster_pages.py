@@ -1,4 +1,4 @@
-"""The pages on SLURM and Kubernetes: their code runs as far as it goes without a cluster, and shows what they say."""
+"""The page on clusters: its code for SLURM and Kubernetes runs as far as it can without a cluster."""
 
 from __future__ import annotations
 
@@ -6,20 +6,23 @@ import json
 import re
 from pathlib import Path
 
-import pytest
-
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def code(page: str, language: str) -> list[str]:
-    """Return the blocks of a page in a language that are meant to be run here."""
-    text = (DOCS / page).read_text(encoding="utf-8")
+def section(title: str) -> str:
+    """Return a section of the page."""
+    return (DOCS / "clusters.md").read_text(encoding="utf-8").split(f"\n## {title}\n")[1].split("\n## ")[0]
+
+
+def code(title: str, language: str) -> list[str]:
+    """Return the blocks of a section in a language that are meant to be run here."""
+    text = section(title)
     text = re.sub(r"<!-- not run -->\n```.*?```", "", text, flags=re.DOTALL)
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
 def test_the_job_script_is_the_one_on_the_page(capsys):
-    (source,), (shown,) = code("slurm.md", "python"), code("slurm.md", "bash")
+    (source,), (shown,) = code("SLURM", "python"), code("SLURM", "bash")
     there: dict = {}
     exec(source, there)
     try:
@@ -32,7 +35,7 @@ def test_the_job_script_is_the_one_on_the_page(capsys):
 
 def test_the_manifest_has_what_the_page_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (source,) = code("kubernetes.md", "python")
+    (source,) = code("Kubernetes", "python")
     exec(source, {})
     spec = json.loads((tmp_path / "cluster.json").read_text())["spec"]
     assert spec["worker"]["replicas"] == 64
@@ -46,12 +49,11 @@ def test_the_manifest_has_what_the_page_says(tmp_path, monkeypatch):
     assert "SECRET" not in json.dumps(spec)
 
 
-@pytest.mark.parametrize("page", ["slurm.md", "kubernetes.md"])
-def test_commands_on_the_page_exist(page):
-    """Options of ``sweep run`` that the pages use."""
+def test_commands_on_the_page_exist():
+    """Options of ``sweep run`` that the page uses."""
     from boulder_sweep.cli.run import run
 
     known = {name for option in run.params for name in option.opts}
-    text = (DOCS / page).read_text(encoding="utf-8")
+    text = (DOCS / "clusters.md").read_text(encoding="utf-8")
     used = set(re.findall(r'(?<=[\s"`])--(?:backend|scheduler|resume|set|overwrite|jobs)\b', text))
     assert {"--backend", "--scheduler"} <= used <= known

@@ -14,7 +14,7 @@ import pytest
 
 from docs.site.hooks import relinked
 from docs.site.notebooks import as_markdown
-from docs.site.reference import command_page
+from docs.site.reference import command_help
 
 ROOT = Path(__file__).parents[2]
 
@@ -70,7 +70,7 @@ def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
     words = {
         "quick_start.html": "Which boulder, buried how deep",
         "benchmarks/index.html": "numbalsoda",
-        "reference/commands.html": "sweep fit-vehicle",
+        "command_line.html": "sweep fit-vehicle",
         "reference/python.html": "boulder_sweep.runner.sweeper.run",
         "reference/kernels.html": "boulder_kernels.soil.closed_form",
         "notebooks/m30_sizing.html": "configs/m30_sizing.yaml",
@@ -115,6 +115,9 @@ def test_links_of_the_repository_become_links_of_the_site(text: str, source: str
     assert relinked(text, source) == expected
 
 
+FRAME = '<table border="1" class="dataframe">\n</table>'
+
+
 def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
     import nbformat
     from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
@@ -125,6 +128,7 @@ def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
         new_code_cell(
             "draw()", outputs=[new_output("display_data", {"image/png": "AAAA\n", "text/plain": "<Figure>"})]
         ),
+        new_code_cell("frame", outputs=[new_output("execute_result", {"text/html": FRAME})]),
         new_code_cell("print(3)", outputs=[new_output("stream", text="3\n")]),
     ]
     nbformat.write(new_notebook(cells=cells), tmp_path / "a.ipynb")
@@ -132,12 +136,13 @@ def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
     assert page.startswith("# Title\n\n```python\n1 + 1\n```\n\n```text\n2\n```")
     assert 'src="data:image/png;base64,AAAA"' in page
     assert page.endswith("```text\n3\n```\n")
+    assert "<table>\n</table>" in page, "as the theme styles tables"
     assert "<Figure>" not in page
 
 
 def test_every_command_has_its_reference() -> None:
     from boulder_sweep.cli.main import cli
 
-    page = command_page()
+    page = command_help()
     names = {command.name for command in cli.commands.values()}  # a command may have another name, too
     assert all(f"## sweep {name}\n" in page for name in names)
