@@ -7,6 +7,7 @@ page's script finds figures and sources by name and sets their data.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
 from bokeh.models.annotations import BoxAnnotation, Legend
@@ -95,11 +96,11 @@ def curves(panel: str, parts: Sequence[str]) -> list[figure]:
 
 def verdict_map(panel: str) -> figure:
     """Return a map of verdicts: rectangles over two inputs, which can be chosen."""
-    ends = {end: [0.0] for end in ("left", "right", "bottom", "top")}
-    cells = ColumnDataSource({**ends, "colour": ["white"]}, name=f"{panel}-cells")
+    sides: dict[str, Any] = {side: side for side in ("left", "right", "bottom", "top")}
+    cells = ColumnDataSource({**{side: [0.0] for side in sides}, "colour": ["white"]}, name=f"{panel}-cells")
     plot = _plot(panel, "map", [("", "@verdict"), ("across", "@across{0.000a}"), ("up", "@up{0.000a}")], height=420)
     drawn = plot.quad(
-        **{end: end for end in ends},
+        **sides,
         source=cells,
         fill_color="colour",
         line_color="colour",
@@ -110,9 +111,9 @@ def verdict_map(panel: str) -> figure:
     )
     # One glyph for each pattern: Bokeh makes canvases for every rectangle where patterns differ within a glyph.
     for grade, pattern in HATCHES.items():
-        hatched = ColumnDataSource({end: [] for end in ends}, name=f"{panel}-{grade}")
+        hatched = ColumnDataSource({side: [] for side in sides}, name=f"{panel}-{grade}")
         plot.quad(
-            **{end: end for end in ends},
+            **sides,
             source=hatched,
             fill_color=None,
             line_color=None,
