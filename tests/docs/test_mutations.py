@@ -56,7 +56,9 @@ def test_a_broken_equation_turns_its_tests_red(copy: Path, mutation: Mutation) -
     assert done.code == pytest.ExitCode.TESTS_FAILED, done.output[-3000:]
 
 
-@pytest.mark.parametrize("compiled", [False, True], ids=["kernels", "others"])
+@pytest.mark.parametrize(
+    "compiled", [pytest.param(False, id="kernels", marks=pytest.mark.nightly), pytest.param(True, id="others")]
+)
 def test_what_is_sound_stays_green(copy: Path, compiled: bool) -> None:
     """Every test beside the kernels that it meets broken code with."""
     met = {number for mutation in MUTATIONS if is_of_kernels(mutation) != compiled for number in mutation.equations}
