@@ -86,7 +86,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     held = {name: _held(name, text, sets) for name, text in given.items()}
     judged = finished.judged_by
     judged = f" {judged[0].upper()}{judged[1:]}." if judged else ""
-    words = {"title": settings["name"], "terms": f"{terms_line(settings)}{judged}"}
+    words = {"title": settings["name"], "terms": f"{terms_line(settings, units)}{judged}"}
     shown = draw_verdict_map(finished_pieces(finished), target, at=held, sets=sets, units=units, **words, **axes)
     for name, value in held.items():
         taken = shown.fixed.get(name, value)

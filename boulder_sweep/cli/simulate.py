@@ -198,7 +198,7 @@ def why_lines(explanation: Explanation, units: str = "si") -> list[str]:
     lines = ["why", f"  {row['verdict']}{f': {reason}' if reason else ''}"]
     if history is None or row["max_rotation_deg"] is None:
         return lines
-    ground = ground_words(history.settings)
+    ground = ground_words(history.settings, units)
     lines += [f"  soil: {ground}"] if ground else []
     lines += impact_lines(row, history, units)
     if row.get("robustness"):

@@ -256,11 +256,17 @@ class Ground:
     @property
     def words(self) -> str:
         """What there is of it; empty where there is nothing."""
+        return self.words_in(("m", 1.0), ("kPa", 1.0))
+
+    def words_in(self, length: tuple[str, float], pressure: tuple[str, float]) -> str:
+        """Return `words` in other units, each with its size in m or kPa."""
         cohesions = [self.cohesion_kPa, *(layer.cohesion_kPa for layer in self.layers)]
+        shown = " / ".join(f"{cohesion / pressure[1]:.4g}" for cohesion in cohesions)
+        water = self.water_table_m
         parts = (
             f"{len(self.layers) + 1} layers of soil" if self.layers else "",
-            f"cohesion {' / '.join(f'{cohesion:g}' for cohesion in cohesions)} kPa" if any(cohesions) else "",
-            "" if self.water_table_m is None else f"water table {self.water_table_m:g} m down",
+            f"cohesion {shown} {pressure[0]}" if any(cohesions) else "",
+            "" if water is None else f"water table {water / length[1]:.4g} {length[0]} down",
             f"ground falling by {self.slope_deg:g}° behind the boulder" if self.slope_deg else "",
         )
         return ", ".join(part for part in parts if part)

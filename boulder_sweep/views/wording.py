@@ -128,14 +128,14 @@ def verdict_line(trajectory: Trajectory) -> str:
     return f"{name}: {', '.join(word for word in words if word)}"
 
 
-def terms_line(settings: Mapping[str, Any]) -> str:
+def terms_line(settings: Mapping[str, Any], units: str = "si") -> str:
     """Return what a pass means under the settings of a table: limits, readings, and that it is a simulation."""
     limits = settings["criterion"]
     held = f"rotation up to {limits['max_rotation_deg']:g}° and rating {limits['rating']}"
-    return f"Pass: {held} · {model_words(settings)}. {NOT_A_TEST}."
+    return f"Pass: {held} · {model_words(settings, units)}. {NOT_A_TEST}."
 
 
-def model_words(settings: Mapping[str, Any]) -> str:
+def model_words(settings: Mapping[str, Any], units: str = "si") -> str:
     """Return the readings of the paper, and the laws of the soil and its ground where they are not the paper's."""
     model = settings["model"]
     law = LAW_WORDS.get(model.get("resistance", ""), "")
@@ -144,15 +144,15 @@ def model_words(settings: Mapping[str, Any]) -> str:
         f"readings {model['preset'].replace('_', ' ')}",
         f"resistance {law}" if law else "",
         UNLOADING_WORDS[unloading] if unloading else "",
-        ground_words(settings),
+        ground_words(settings, units),
         Shape.of_list(settings["model"].get("profile", [])).words,
     )
     return ", ".join(word for word in words if word)
 
 
-def ground_words(settings: Mapping[str, Any]) -> str:
+def ground_words(settings: Mapping[str, Any], units: str = "si") -> str:
     """Return in what the soil is not a dry, level one that is the same at every depth; empty where it is one."""
-    return Ground.of_dict(settings["model"].get("ground", {})).words
+    return Ground.of_dict(settings["model"].get("ground", {})).words_in(sized("m", units), sized("kPa", units))
 
 
 def design_line(trajectory: Trajectory, units: str = "si") -> str:
@@ -167,7 +167,7 @@ def design_line(trajectory: Trajectory, units: str = "si") -> str:
             f"boulder {size} {unit} (L × W × H), {value['embedment_depth_m'] / metre:.4g} {unit} deep",
             f"soil {', '.join(soil)}",
             f"{truck}, {speed}",
-            model_words(trajectory.settings),
+            model_words(trajectory.settings, units),
         )
     )
     flags = str(trajectory.judged.row(0)["validity"] or "")
