@@ -77,7 +77,9 @@ def _caption(result: Uncertainty, row: Mapping[str, Any], uncertain: Sequence[st
     of = f"Design #{row['design_id']} of #0 to #{len(result) - 1}" if len(result) > 1 else "Design"
     least = json.loads(result.arrow.schema.metadata[b"boulder_sweep.question"])["margin"]
     margin = f" Here a pass also has a margin of at least {least:.0%}." if least else ""
-    return f"{of}: {design}. Means of the uncertain inputs: {means}.\n{terms_line(result.sweep.resolved(), units)}{margin}"
+    return (
+        f"{of}: {design}. Means of the uncertain inputs: {means}.\n{terms_line(result.sweep.resolved(), units)}{margin}"
+    )
 
 
 def _by_fifths(samples: pd.DataFrame, name: str) -> np.ndarray:
