@@ -22,6 +22,7 @@ from pathlib import Path
 from boulder_kernels import _ahead, source_hash
 from boulder_kernels._arguments import examples
 from boulder_kernels._cache import CACHE_VARIABLE, LEVELS, SHIPPED, SOURCES
+from boulder_sweep.store.files import put_file
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 SPRINGS = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
@@ -86,7 +87,7 @@ def compile_recorded(recorded: Path, target: Path) -> None:
         if library is None:
             raise RuntimeError(f"{module}.{kernel} cannot be linked by {os.environ.get('CC', 'cc')}")
         _ahead.keep(target / file.stem, code, library, kept)
-    (target / SOURCES).write_text(source_hash())
+    put_file(target, SOURCES, source_hash().encode())
 
 
 def main() -> None:

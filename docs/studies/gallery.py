@@ -67,7 +67,7 @@ def wet_backfill(file: Path, picture: Path) -> str:
     with tempfile.TemporaryDirectory() as scratch:
         run(sweep, Path(scratch) / "out.sweep")
         table = read(Path(scratch) / "out.sweep")
-    draw_verdict_map(table, picture, title=sweep.name, terms=terms_line(sweep.resolved()), units="us")
+    draw_verdict_map(table, picture, title=sweep.name, terms=terms_line(sweep.resolved(), "us"), units="us")
     shares, lowest = [], []
     for speed, rows in table.groupby("impact_speed_m_s"):
         passes = rows[rows.verdict == "pass"]
