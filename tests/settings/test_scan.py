@@ -1,4 +1,4 @@
-"""A boulder by its scan: the same as the block of settings that `sweep stone` prints, and mistakes with their places."""
+"""A boulder by its scan: as the block of settings that `sweep stone` prints, and mistakes with their places."""
 
 import hashlib
 import shutil
