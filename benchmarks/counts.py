@@ -135,7 +135,7 @@ def _of_code(names: Sequence[str]) -> Counts:
     number = numba.float64
     control = numba.typeof(bk.Control(STEP_S, HORIZON, ROTATION_LIMIT, 0, False))
     table, how = numba.typeof(np.zeros((2, 2))), (numba.typeof(bk.corrected()), control)
-    lane_arrays = numba.typeof(lanes.empty_workspace(0)), numba.typeof(lanes.empty_queue())
+    lane_arrays = numba.typeof(lanes.empty_workspace()), numba.typeof(lanes.empty_queue())
     nothing = numba.types.none
     lines = numba.types.NamedTuple([number] * len(soil.Kinematics._fields), soil.Kinematics)
     of_design = [numba.int64 if name == "elements" else number for name in bk.Constants._fields]

@@ -16,10 +16,12 @@ import boulder_kernels as bk
 from boulder_kernels import lanes
 from boulder_kernels.design import design_at
 from boulder_kernels.layered import COUNTS, TO, filled_layers, uniform_layers
+from boulder_kernels.outline import HEIGHT
+from boulder_kernels.outlined import given_beside
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics
 from boulder_kernels.table import some_rows
-from boulder_kernels.workspace import LANES, SIZE
+from boulder_kernels.workspace import LANES, SIZE, LayeredLanes, TaperedLanes
 from boulder_sweep.judge.evaluation import LONGEST_HORIZON
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.soils import with_law
@@ -57,6 +59,16 @@ def same_soil(designs: bk.DesignTable, count: int) -> np.ndarray:
         layers[:-1, TO] = design.d * np.arange(1, count) / count
         rows.append(layers)
     return filled_layers(np.stack(rows), count)
+
+
+def same_taper(designs: bk.DesignTable) -> np.ndarray:
+    """Return designs as tapered boulders whose top is as wide as their foot, as rows of a table for lanes."""
+    half = 0.5 * designs.L
+    point = np.stack([0.0 * half, designs.W, half, half], axis=1)
+    outlines = np.stack([point, point], axis=1)
+    outlines[:, 1, HEIGHT] = designs.H
+    layers = np.stack([uniform_layers(design_at(designs, row)) for row in range(len(designs.L))])
+    return given_beside(np.stack(designs), layers, outlines, 1)
 
 
 def second_opinion_us(designs: bk.DesignTable, control: bk.Control) -> float:
@@ -113,11 +125,13 @@ def measure(rounds: int = ROUNDS) -> Table:
     _, (attempts, in_use, attended) = loops.simulate_and_count(stacked, readings, control, ENDLESS)
     tables = {0: stacked} | {count: np.concatenate([stacked, same_soil(designs, count)]) for count in COUNTS}
     work: dict[str, Callable[[], object]] = {
-        str(count): partial(lanes.simulate_lanes, table, readings, control) for count, table in tables.items()
+        str(count): partial(lanes.simulate_lanes, table, readings, control, LayeredLanes if count else None, count)
+        for count, table in tables.items()
     }
-    of_layers = {name: min(seconds) for name, seconds in interleaved(work, 3).items()}
-    whole = of_layers.pop("0")
-    ratios = [f"{seconds / whole:.1f}" for seconds in of_layers.values()]
+    work["taper"] = partial(lanes.simulate_lanes, same_taper(designs), readings, control, TaperedLanes, 1)
+    of_soils = {name: min(seconds) for name, seconds in interleaved(work, 3).items()}
+    whole, taper = of_soils.pop("0"), of_soils.pop("taper")
+    ratios = [f"{seconds / whole:.1f}" for seconds in of_soils.values()]
     started = 1e9 * whole / DESIGNS - attempts / DESIGNS * (attempt_ns + look_ns)
     table = Table(
         "kernel",
@@ -150,6 +164,7 @@ def measure(rounds: int = ROUNDS) -> Table:
             f"the same in {', '.join(map(str, COUNTS[:-1]))} and {COUNTS[-1]} layers of soil",
             f"{', '.join(ratios[:-1])} and {ratios[-1]} times as long",
         ],
+        ["the same as a tapered boulder", f"{taper / whole:.2f} times as long"],
         [
             "a second opinion of a design that stands, one by one, per law",
             f"{second_opinion_us(designs, control):.0f} us",

@@ -26,7 +26,7 @@ def simulate_and_count(
     counts
         Steps attempted by all lanes; those by lanes that held a design; those that needed more than to be accepted.
     """
-    ws = empty_workspace(0)
+    ws = empty_workspace()
     return ws, _count(designs, readings, control, sweeps, ws, empty_queue(), empty_outcomes(designs.shape[1]))
 
 

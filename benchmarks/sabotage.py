@@ -47,7 +47,7 @@ _ATTEMPT = (
     '"""Advance every lane by its step, in one vectorised loop."""\n    align_stack()\n    for lane in range(LANES):\n'
 )
 _PROOF = "def barrier_energy(m: Maxima, c: Constants) -> float:\n"
-_ONCE = "        out = simulate_lanes(designs, readings, control)\n"
+_ONCE = "        out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)\n"
 _SIMULATED = "        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)\n"
 _TRIES = '        reason = ""\n        for _ in range(tries):\n'
 _COMMITTED = "committer.start()\n"

@@ -29,7 +29,7 @@ from boulder_kernels.design import G
 from boulder_kernels.layered import LayeredTable, OutlinedTable
 from boulder_sweep import elementary
 from boulder_sweep.settings.model import WATER_KG_M3, Ground
-from boulder_sweep.settings.shape import Shape
+from boulder_sweep.settings.shape import BOX, Shape
 
 
 def passive_coefficient(phi: np.ndarray) -> np.ndarray:
@@ -136,6 +136,16 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0,
         changed = table._replace(K_epsilon=table.K_epsilon * slope_factor(table.phi, slope) * submerged)
         return with_law(changed, law)
     return LayeredTable(*table, layers_of(table, law, ground, turned))
+
+
+def is_layered(law: str, ground: Ground, shape: Shape) -> bool:
+    """Return whether the soil of designs may yield at one depth after another, see `boulder_kernels.table.is_layered`.
+
+    Parameters: see `with_soil`.
+    """
+    if shape.is_box:
+        return not ground.is_proportional
+    return not ground.is_proportional or len(shape.points) > len(BOX) or law == "width_capped"
 
 
 def layers_of(table: DesignTable, law: str, ground: Ground, turned: float = 0.0) -> np.ndarray:

@@ -28,7 +28,9 @@ COMPILED = {
     "springs-design": ("impact.simulate", "SecondSpring", 20.0),
     "layers-table": ("lanes.run_lanes", "LayeredLanes", 20.0),
     "layers-design": ("impact.simulate", "SoilProfile", 30.0),
-    "outlines-table": ("table.run_rows", "OutlinedPieces", 30.0),
+    "tapers-table": ("lanes.run_lanes", "TaperedLanes", 20.0),
+    "tapers-design": ("impact.simulate", "OutlinedPieces", 30.0),
+    "outlines-table": ("lanes.run_lanes", "OutlinedLanes", 40.0),
     "outlines-design": ("impact.simulate", "OutlinedPieces", 30.0),
     "plastic-table": ("impact.simulate_motion", "Memory", 30.0),
     "plastic-design": ("impact.simulate_motion", "Memory", 30.0),
@@ -41,11 +43,13 @@ unknown."""
 def kernels_for(sweep: Sweep, of: Literal["table", "design"] = "table") -> str:
     """Return which of the kernels above a sweep needs, for tables or for one design over time."""
     from boulder_sweep.designs import SECOND_SPRING
+    from boulder_sweep.soils import is_layered
 
     if sweep.model.unloading != "elastic":
         return f"plastic-{of}"
     if not sweep.model.shape.is_box:
-        return f"outlines-{of}"
+        layered = is_layered(sweep.model.resistance, sweep.model.ground, sweep.model.shape)
+        return f"outlines-{of}" if layered else f"tapers-{of}"
     if not sweep.model.ground.is_proportional:
         return f"layers-{of}"
     if SECOND_SPRING in sweep.plan.columns:

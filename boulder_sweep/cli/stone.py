@@ -3,17 +3,34 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, json_option, quantity_of, refuse_unwritable
+from boulder_sweep.cli.options import (
+    OUTPUT,
+    at_option,
+    json_option,
+    load_sweep,
+    margin_option,
+    quantity_of,
+    quiet_option,
+    refuse_unwritable,
+    set_option,
+    take_values,
+)
 from boulder_sweep.cli.output import say, show
+from boulder_sweep.cli.progress import kernels_for, working
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
+    from boulder_sweep.answers.placing import Placing, Way
     from boulder_sweep.answers.printing import Column
+    from boulder_sweep.settings import Sweep
     from boulder_sweep.stones.standing import Standing
     from boulder_sweep.stones.weighing import ScannedStone
 
@@ -23,28 +40,52 @@ Examples:
   sweep stone rock.ply --mass '18.2 t' --up a --facing b
   sweep stone rock.stl --unit mm
   sweep stone rock.glb --plot rock.png
+  sweep stone rock.ply configs/site.yaml --mass '18.2 t' --plot rock.png
 """
 
 
 @click.command("stone", short_help="Volume, mass, foot and profile of a scanned stone.", epilog=EXAMPLES)
 @click.argument("rock", type=click.Path())
+@click.argument("site", type=click.Path(), required=False)
 @click.option("--mass", metavar="'18.2 t'", help="Mass of the whole stone [default: rock of 2650 kg/m³].")
 @click.option("--unit", default="m", metavar="UNIT", help="Unit of the scan: m, mm, cm, in or ft [m].")
 @click.option("--up", metavar="END", help="End that is up, for a block of settings: a, -a, b, -b, c, -c, x, ...")
 @click.option("--facing", metavar="END", help="End that faces the vehicle, with --up.")
-@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw the stone with each of its six ends up.")
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw the stone with each end up; with SITE the best ways.")
+@margin_option
+@at_option
+@set_option
+@quiet_option
 @json_option
 def stone(
-    rock: str, mass: str | None, unit: str, up: str | None, facing: str | None, plot: str | None, as_json: bool
+    rock: str,
+    site: str | None,
+    mass: str | None,
+    unit: str,
+    up: str | None,
+    facing: str | None,
+    plot: str | None,
+    margin: str,
+    at: str | None,
+    overrides: tuple[str, ...],
+    quiet: bool,
+    as_json: bool,
 ) -> int:
     """Weigh and measure ROCK, a scan of a stone (.ply, .stl, .obj or .glb).
 
     The scan is closed where it is open. Every way to stand gets a flat foot by the least cut, and a profile: width
     and distances of the near and the far face over the height. The ends a, b and c are those of the long, the middle
     and the short axis of the stone, a the slimmer end and -a the other; x, y and z are the axes of the scan.
+
+    With SITE, a settings file, the stone takes the place of its boulder, and for each of the 24 ways to stand the least
+    depth is found at which it passes in all soils and before all vehicles of the file.
     """
     if (up is None) != (facing is None):
         raise click.UsageError("--up and --facing belong together; give both")
+    if site is None and (overrides or at is not None or margin != "0"):
+        raise click.UsageError("--set, --at and --margin belong to a SITE")
+    if site is not None and mass is None:
+        raise click.UsageError("at a site the stone must be weighed: give --mass")
     mass_kg = None if mass is None else quantity_of("--mass", mass, "kg")
     metres = quantity_of("--unit", f"1 {unit}", "m")
     if plot is not None:
@@ -55,6 +96,8 @@ def stone(
     for caution in found.cautions:
         say(f"caution: {caution}")
     chosen = None if up is None or facing is None else found.stone.standing(up, facing)
+    if site is not None:
+        return _place(found, rock, unit, site, chosen, plot, margin, at, overrides, quiet, as_json)
     if as_json:
         show(json.dumps(found.to_dict() if chosen is None else found.to_dict((chosen,))))
     else:
@@ -63,6 +106,103 @@ def stone(
     if plot is not None:
         found.plot(plot)
     return 0
+
+
+def _place(
+    found: ScannedStone,
+    rock: str,
+    unit: str,
+    site: str,
+    chosen: Standing | None,
+    plot: str | None,
+    margin: str,
+    at: str | None,
+    overrides: tuple[str, ...],
+    quiet: bool,
+    as_json: bool,
+) -> int:
+    """Find and print the best ways to stand at a site; return the exit code."""
+    from boulder_sweep.answers.placing import boulder_block, placed
+
+    def with_boulder(block: str) -> Sweep:
+        """Return the site with a boulder; what is to be said of it is said once."""
+        nonlocal said
+        said, silent = True, quiet or said
+        return take_values(load_sweep(site, (*overrides, block), silent), at, silent)
+
+    said = True
+    first = next((own for own in (found.standings if chosen is None else (chosen,)) if own.has_foot), None)
+    if first is None:
+        raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")
+    kernels = kernels_for(with_boulder(boulder_block(found, first)))
+    said = False
+    with working(quiet, kernels, "placing", "ways") as progress:
+        standings = None if chosen is None else (chosen,)
+        result = placed(found, with_boulder, standings, margin=margin, progress=progress)
+    if as_json:
+        show(json.dumps(result.to_dict()))
+    else:
+        show(*stone_lines(found), "", *placing_lines(result, rock, unit, site))
+    if plot is not None:
+        result.plot(plot)
+    return 0
+
+
+def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]:
+    """Return the ways to stand at a site, the one of least depth first, and a block of settings for that one."""
+    from boulder_sweep.answers.printing import table_lines
+
+    passing = result.passing
+    cases = "" if result.cases == 1 else f", in the worst of {result.cases} combinations of soil and vehicle"
+    never, rounded = len(result.ways) - len(passing), result.rounded
+    rest = [
+        *([f"{counted(never, 'way')} to stand {'fails' if never == 1 else 'fail'} at every depth"] if never else []),
+        *([f"{counted(rounded, 'way')} without a flat foot, not computed"] if rounded else []),
+    ]
+    if not passing:
+        return [f"at {site} it passes at no depth{cases}", *rest]
+    rows = [{"way": way} for way in passing]
+
+    def column(head: tuple[str, str], text: Callable[[Way], str]) -> Column:
+        return head, lambda row: text(row["way"])
+
+    def depth(way: Way) -> float:
+        return way.depth_m or 0.0
+
+    columns = [
+        column(("up", ""), lambda way: way.standing.up),
+        column(("facing", ""), lambda way: way.standing.facing),
+        column(("depth", "m"), lambda way: f"{depth(way):.3f}"),
+        column(("above", "m"), lambda way: f"{way.standing.profile.height[-1] - depth(way):.2f}"),
+        column(("length", "m"), lambda way: f"{way.standing.profile.length.max():.2f}"),
+        column(("width", "m"), lambda way: f"{way.standing.profile.width.max():.2f}"),
+        column(("foot", "m"), lambda way: foot_text(way.standing)),
+        column(("cut", "m"), lambda way: f"{way.standing.cut_m:.2f}"),
+        column(("mass", "t"), lambda way: f"{result.found.density_kg_m3 * way.standing.volume / 1e3:.1f}"),
+        column(("turns", "deg"), lambda way: f"{way.row['max_rotation_deg']:.1f}"),
+    ]
+    best = passing[0]
+    words = "" if unit == "m" else f", unit: {unit}"
+    return [
+        f"at {site}, least depth{cases}:",
+        *table_lines(columns, rows, 80),
+        "up, facing: the end of the stone that is up, and the one that faces the vehicle",
+        "above: height over the ground; mass: of what is left after the cut",
+        *rest,
+        "",
+        "# the best of these, for the settings file in place of its boulder",
+        "boulder:",
+        f"  scan: {{file: {_beside(rock, site)}, up: {best.standing.up}, facing: {best.standing.facing}{words}}}",
+        f"  mass: {result.found.mass_kg / 1e3:.6g} t",
+        "site:",
+        f"  embedment_depth: {depth(best):.3f} m",
+    ]
+
+
+def _beside(rock: str, site: str) -> str:
+    """Return the name of a scan from the folder of a settings file, in quotation marks where YAML needs them."""
+    name = os.path.relpath(rock, Path(site).parent)
+    return name if re.fullmatch(r"[\w./+][\w./+-]*", name) else json.dumps(name, ensure_ascii=False)
 
 
 def stone_lines(found: ScannedStone) -> list[str]:

@@ -20,7 +20,7 @@ from boulder_kernels.modes import (
     TURNING_BACK,
     TURNING_FORWARD,
 )
-from boulder_kernels.outlined_soil import OutlinedElements, OutlinedPieces
+from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import PlasticConstants, at_sample
 from boulder_kernels.samples import evaluate_samples
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force

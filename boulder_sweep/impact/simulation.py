@@ -22,13 +22,13 @@ from boulder_kernels import (
 )
 from boulder_kernels.design import design_at
 from boulder_kernels.embedded import step_errors
-from boulder_kernels.layered import LAYERED
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.table import (
     SAFETY,
     SAFETY_PRINTED,
     estimate_errors,
     halved,
+    is_layered,
     is_paired,
     problem_at,
     simulate_impact,
@@ -132,7 +132,7 @@ def simulate(
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
     decided = evaluation.judged(designs)
-    layered = isinstance(designs.table, LAYERED)
+    layered = is_layered(designs.table)
     control = _control(evaluation.control, how, float(decided["step_s"][0]), layered=layered)
     times = _sample_times(control.horizon, sample_s)
     record = _empty_record(times)

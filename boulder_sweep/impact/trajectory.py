@@ -12,7 +12,7 @@ import numpy as np
 
 from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
 from boulder_kernels.design import Body
-from boulder_kernels.outlined_soil import body_beside, is_outlined
+from boulder_kernels.outlined import body_beside, is_outlined
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
 from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY, SPENT

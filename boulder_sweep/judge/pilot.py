@@ -15,6 +15,7 @@ from boulder_kernels.table import is_paired
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, LADDER, Accuracy, Steps, steps_of
 from boulder_sweep.judge.evaluation import control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
+from boulder_sweep.soils import is_layered
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -104,7 +105,8 @@ def accuracy_of(sweep: Sweep) -> Accuracy:
         return pilot(sweep, solver.accuracy)
     name = str(solver.accuracy)
     found = Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
-    layered = not sweep.model.ground.is_proportional
+    model = sweep.model
+    layered = is_layered(model.resistance, model.ground, model.shape)
     paired = is_paired(readings_of(sweep), control_of(sweep, found), layered=layered)
     return replace(found, paired=found.error_estimate and paired)
 

@@ -79,6 +79,7 @@ class Entries:
             self.given.add("vehicle.spring")
             self.problems.add(problem.position, "vehicle.spring", problem.message)
         self._read_site_data()
+        self._read_scan()
         for section in fields.SECTIONS:
             self._read_block(section)
         both = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
@@ -118,6 +119,26 @@ class Entries:
             self.leaves[f"boulder_{key}_m"] = Leaf(np.array([value]), False, position)
         self.settings["profile"] = shares_of(points)
 
+    def _read_scan(self) -> None:
+        """Replace a scan of the boulder by what follows from it; after a mistake, what it stands for is not missing."""
+        boulder = self.root.get("boulder")
+        if not isinstance(boulder, Mapping) or "scan" not in boulder.entries:
+            return
+        # What reads scans is needed for them only.
+        from boulder_sweep.settings.scan import unfold_scan
+
+        self.given.add("boulder.scan")
+        try:
+            self.settings["scan"] = unfold_scan(boulder, self._folder_of(boulder.entries["scan"].position))
+        except LeafError as error:
+            self.given |= {f"boulder.{key}" for key in (*SIDES, "density")}
+            for mistake in error.mistakes:
+                self.problems.add(mistake.position, "boulder.scan", mistake.message)
+
+    def _folder_of(self, position: Position) -> Path:
+        """Return where a file lies that is named at a position: beside the settings, or in the current directory."""
+        return self.path.parent if position.file == str(self.path) else Path()
+
     def _read_table(self) -> None:
         node = self.root.get("table")
         if node is None:
@@ -128,9 +149,7 @@ class Entries:
         if not isinstance(node, Scalar) or not node.text.strip():
             self.problems.add(node.position, "table", "must be the name of a .csv, .xlsx or .parquet file")
             return
-        # A name in the file is relative to the file's folder, one given by --set to the current directory.
-        folder = self.path.parent if node.position.file == str(self.path) else Path()
-        self.table = read_table(node, folder, self.problems)
+        self.table = read_table(node, self._folder_of(node.position), self.problems)
 
     def _read_block(self, section: str) -> None:
         entry = self.root.entries.get(section)

@@ -9,7 +9,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 from boulder_sweep.columns import RATINGS
-from boulder_sweep.settings.shape import ProfilePoint, Shape, tapered
+from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape, tapered
 
 PRESETS = ("as_printed", "corrected")
 
@@ -375,6 +375,13 @@ class Model:
         admitted=Bound(0.05, 20.0, "0.8 for a top of four fifths of the foot"),
         usual=Usual(0.5, 1.5, "usual boulders"),
         also=("tapering", "batter"),
+    )
+    scan: Scan | None = setting(
+        "boulder.scan",
+        "",
+        "scan of the stone, from which its profile and, with its mass, its density follow",
+        None,
+        also=("mesh", "rock", "stone"),
     )
     rock_assumed: bool = False
     """Whether the density of the rock is `ROCK_KG_M3` because the file gives the mass of the boulders only."""

@@ -104,6 +104,27 @@ class Shape:
         return f"boulder by a profile of {len(self.points)} points"
 
 
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """Where the shape of the boulder comes from.
+
+    Attributes
+    ----------
+    file, sha256 : str
+        The scan, as it is named in the settings, and the hash of its content.
+    up, facing : str
+        Ends of the stone that are up and that face the vehicle.
+    cut_m : float
+        What is cut off below for a flat foot [m].
+    """
+
+    file: str
+    sha256: str
+    up: str
+    facing: str
+    cut_m: float
+
+
 def tapered(ratio: float) -> Shape:
     """Return the shape of a boulder whose top is `ratio` times as wide and as long as its foot."""
     if ratio == 1.0:

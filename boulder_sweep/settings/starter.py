@@ -16,7 +16,7 @@ from boulder_sweep.text import printable
 def default_of(field: Field) -> float | str | None:
     """Return the default of an entry: a number in the unit of the field, a word, or None where there is none."""
     words = {"readings": Model().preset, "soil_elements": CLOSED_FORM, "correlation": 0.0, "partial_factor": 1.0}
-    words |= {"layers": None, "profile": None, "second_opinion": NO_OPINION}
+    words |= {"layers": None, "profile": None, "scan": None, "second_opinion": NO_OPINION}
     attributes = {**asdict(Criterion()), **asdict(Model()), **asdict(SolverSettings()), **words}
     return attributes.get(field.name, field.default)
 
@@ -72,6 +72,7 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
         "[{height: 0 ft, width: 6 ft, length: 5.5 ft}, {height: 10 ft, width: 4 ft, length: 3.5 ft}]",
     ),
     "boulder.taper": ("0.8",) * 2,
+    "boulder.scan": ("{file: rock.ply, up: a, facing: b}",) * 2,
     "site.embedment_ratio": ("{from: 0.45, to: 0.75, step: 0.05}",) * 2,
     "site.embedment_depth": ("2 m", "6.5 ft"),
     "site.impact_height": ("0.9 m", "3 ft"),

@@ -218,6 +218,7 @@ class Sweep:
                 "foot": self.model.foot,
                 **({"rock_assumed": True} if self.model.rock_assumed else {}),
                 **({} if self.model.shape.is_box else {"profile": self.model.shape.as_list()}),
+                **({} if self.model.scan is None else {"scan": asdict(self.model.scan)}),
                 **({} if ground.is_usual else {"ground": ground.as_dict()}),
                 **({"second_opinion": list(opinions)} if (opinions := self.model.second_opinion) else {}),
             },

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boulder_sweep.errors import PictureError
 from boulder_sweep.views.figures import BLACK, BLUE, GREY, caption, figure, headline
 from boulder_sweep.views.scene import STYLES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from boulder_sweep.answers.placing import Placing
     from boulder_sweep.stones.standing import Standing
     from boulder_sweep.stones.weighing import ScannedStone
 
@@ -55,6 +57,42 @@ def draw_stone(found: ScannedStone, path: str | Path) -> None:
         )
 
 
+def draw_placing(placing: Placing, path: str | Path) -> None:
+    """Draw the ways in which a stone passes at the least depth, in the ground.
+
+    Parameters
+    ----------
+    placing
+        The stone at its site.
+    path
+        Picture to write.
+
+    Raises
+    ------
+    PictureError
+        The picture cannot be written, or no way passes.
+    """
+    best = placing.passing[: placing.shown]
+    if not best:
+        raise PictureError("no way to stand passes at any depth, so there is nothing to draw")
+    depth_m = max(way.depth_m or 0.0 for way in best)
+    with figure(path, len(best) * PANEL_IN, PANEL_IN + 1.1) as fig:
+        panels = list(np.atleast_1d(fig.subplots(1, len(best))))
+        _same_scale(panels, [way.standing for way in best], depth_m)
+        for axes, way in zip(panels, best, strict=True):
+            own, ground_m = way.standing, way.depth_m or 0.0
+            axes.axhspan(axes.get_ylim()[0], 0.0, facecolor=STYLES["soil"].fill, edgecolor="none", zorder=0)
+            axes.axhline(0.0, color=STYLES["wedge"].line, linewidth=1.2, zorder=1)
+            draw_standing(axes, own, ground_m)
+            axes.set_title(f"{own.up} up, {own.facing} to the vehicle: {ground_m:.2f} m deep")
+        headline(fig, f"{placing.found.file}: {placing.found.mass_kg / 1e3:.3g} t")
+        caption(
+            fig,
+            "From the side, the vehicle coming from the left, each at its least depth. Dashed: what is cut off for a "
+            "flat foot; blue: the profile, whose sections are rectangles of the same area. Metres.",
+        )
+
+
 def draw_standing(axes: Axes, own: Standing, ground_m: float = 0.0) -> None:
     """Draw one stone; the ground is at this height over its foot [m]."""
     from matplotlib.patches import Polygon
@@ -71,14 +109,14 @@ def draw_standing(axes: Axes, own: Standing, ground_m: float = 0.0) -> None:
     axes.plot(own.centre[0], own.centre[1] - ground_m, "o", color=BLACK, markersize=4.0)
 
 
-def _same_scale(panels: Sequence[Axes], shown: Sequence[Standing]) -> None:
-    """Give all panels one scale, with room for the largest stone."""
+def _same_scale(panels: Sequence[Axes], shown: Sequence[Standing], ground_m: float = 0.0) -> None:
+    """Give all panels one scale, with room for the largest stone; heights count from the ground."""
     left = max(float(own.outline[:, 1].max()) for own in shown) + ROOM_M
     right = max(float(own.outline[:, 2].max()) for own in shown) + ROOM_M
     low = min(float(own.outline[:, 0].min()) for own in shown) - ROOM_M
     high = max(float(own.outline[:, 0].max()) for own in shown) + ROOM_M
     for axes in panels:
         axes.set_xlim(-left, right)
-        axes.set_ylim(low, high)
+        axes.set_ylim(low - ground_m, high)
         axes.set_aspect("equal")
         axes.tick_params(colors=GREY, labelsize=7.5)

@@ -305,6 +305,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "published-spreads": answers.published_spreads,
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
+    "stone-site": stones.site_of_example,
     "borehole-notes": site_data.notes_of_borehole,
     "speed-street": site_data.speed_of_street,
     "gallery-embassy-street": lambda root: gallery.words_of(root, "embassy_street"),

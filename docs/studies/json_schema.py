@@ -21,6 +21,7 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
 )
+from boulder_sweep.settings.scan import KEYS as SCAN_KEYS
 from boulder_sweep.settings.site_data import (
     APPROACH,
     APPROACH_FIELDS,
@@ -220,6 +221,7 @@ _FORMS: dict[str, Schema] = {
             "oneOf": [{"required": ["length"]}, {"required": ["near", "far"]}],
         },
     },
+    "scan": _object({key: {"type": "string"} for key in SCAN_KEYS}, SCAN_KEYS[:3]),
     "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
     "second_opinion": {
         "anyOf": [
@@ -277,7 +279,7 @@ def _what_is_required() -> Schema:
     density_or_mass = [BY_NAME[name].key for name in (DENSITY, BOULDER_MASS)]
     sections["boulder"] = {
         "anyOf": [{"required": [key]} for key in density_or_mass],
-        "oneOf": [{"required": ["profile"]}, {"required": list(SIDES)}],
+        "oneOf": [{"required": ["profile"]}, {"required": ["scan"]}, {"required": list(SIDES)}],
     }
     whole = {"required": list(sections), "properties": sections}
     return {"if": {"not": {"required": ["table"]}}, "then": whole}

@@ -19,6 +19,7 @@ FORMS = {
     "soil_elements": "`closed_form`, or `{elements: 5000}` ([soil elements](validation.md#soil-elements))",
     "layers": "a list of layers ([soils as they lie](soil.md#soils-as-they-lie))",
     "profile": "a list of points ([boulders that are no boxes](stones.md))",
+    "scan": "a file and a way to stand ([stones from scans](stones_from_scans.md#in-a-settings-file))",
     "second_opinion": "`none`, or a list of `broms` and `width_capped` ([second opinion](second_opinion.md))",
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }

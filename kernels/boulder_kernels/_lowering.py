@@ -18,7 +18,7 @@ from numba.np import arrayobj
 
 from .design import Constants, Design, design_in
 from .flat import WIDTH, field, partial_sums, put
-from .layered import FewLayers, GivenLayer, Layer, LayeredConstants, SoilSums
+from .layered import LayeredConstants
 from .workspace import (
     CONSTANTS,
     KNOWN,
@@ -32,7 +32,7 @@ from .workspace import (
     load_given,
     offsets_of,
     part,
-    soil_size,
+    soil_in,
     store,
     store_given,
 )
@@ -129,9 +129,15 @@ def _record(ws: Any, record: Any) -> Any:
     return types.BaseTuple.from_types([_NOT_REAL.get(kind, real) for kind in get_type_hints(record).values()], record)
 
 
+def _parts(ws: Any, part: Any) -> Any:
+    """Type of as many records as the soil of a lane has parts."""
+    return types.UniTuple(_record(ws, part), len(ws[1]))
+
+
 def _soil(ws: Any) -> Any:
     """Type of the soil of a lane."""
-    return types.NamedTuple([_record(ws, SoilSums), types.UniTuple(_record(ws, Layer), len(ws[1]))], FewLayers)
+    soil: Any = soil_in(ws)
+    return types.NamedTuple([_record(ws, soil.whole), _parts(ws, soil.part)], soil.record)
 
 
 @type_callable(load)
@@ -189,12 +195,19 @@ def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @type_callable(load_given)
 def _type_load_given(context: Any) -> Callable[..., Any]:
-    return lambda ws, lane: types.UniTuple(_record(ws, GivenLayer), len(ws[1]))
+    def result(ws: Any, lane: Any) -> Any:
+        """Return the type of the parts, or of another record and of them."""
+        soil: Any = soil_in(ws)
+        parts = _parts(ws, soil.given_part)
+        return types.Tuple([_record(ws, soil.given_whole), parts]) if soil.given_whole._fields else parts
+
+    return result
 
 
 @lower_builtin(load_given, types.Any, types.Any)
 def _lower_load_given(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return _load_numbers(context, builder, sig, args, sig.return_type, given_place(len(sig.return_type)))[0]
+    soil: Any = soil_in(sig.args[0])
+    return _load_numbers(context, builder, sig, args, sig.return_type, given_place(soil, len(sig.args[0][1])))[0]
 
 
 @type_callable(store)
@@ -227,10 +240,11 @@ def _type_store_given(context: Any) -> Callable[..., Any]:
 def _lower_store_given(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     if isinstance(sig.args[0], types.Array):
         return context.get_dummy_value()
-    layers = len(sig.args[0][1])
-    numbers = _rows_of(context, builder, sig.args[2:], args[2:], len(Design._fields), 6 * layers)
-    for i, number in enumerate(numbers):
-        place = given_place(layers) + i * LANES
+    soil: Any = soil_in(sig.args[0])
+    count = len(sig.args[0][1])
+    size = soil.given_size(count) // LANES
+    for i, number in enumerate(_rows_of(context, builder, sig.args[2:], args[2:], len(Design._fields), size)):
+        place = given_place(soil, count) + i * LANES
         builder.store(number, _pointer(context, builder, sig.args[:2], args[:2], place))
     return context.get_dummy_value()
 
@@ -248,7 +262,8 @@ def _type_copy_lane(context: Any) -> Callable[..., Any]:
 def _lower_copy_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     places = [*range(0, sig.args[3].literal_value, LANES)]
     if not isinstance(sig.args[0], types.Array):
-        places += range(SOIL, SOIL + soil_size(len(sig.args[0][1])), LANES)
+        soil: Any = soil_in(sig.args[0])
+        places += range(SOIL, SOIL + soil.size(len(sig.args[0][1])), LANES)
     for place in places:
         source, target = (
             _pointer(context, builder, (sig.args[0], sig.args[i]), (args[0], args[i]), place) for i in (1, 2)

@@ -15,7 +15,7 @@ from .design import Constants
 from .dynamics import State, acceleration, contact_displacement, contact_lever, couple_moment, spring_compression
 from .modes import Modes, Switches
 from .numerics import sine_versine
-from .outlined_soil import lift_of
+from .outlined import lift_of
 from .soil import soil_kinematics
 from .soil_laws import drag_power, soil_energy
 

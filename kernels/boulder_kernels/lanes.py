@@ -16,12 +16,11 @@ import numpy as np
 
 from ._jit import inlined, kernel
 from .after_step import RUNNING
-from .design import Design, Readings
+from .design import Readings
 from .flat import field, put
 from .impact import Control, ending_of
 from .lane_events import conclude, start_steps, work_out
 from .lane_steps import attempt_steps, start_designs, take_over_steps, write_lane
-from .layered import GivenLayer
 from .outcomes import STATUS, Status, empty_outcomes
 from .stability import MOST_STEPS, RETRY
 from .workspace import (
@@ -36,7 +35,6 @@ from .workspace import (
     STEP,
     STEP_FULL,
     WHOLE,
-    LayeredLanes,
     copy_lane,
     part,
 )
@@ -258,18 +256,20 @@ def sweep(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: C
     return q.counts[BUSY] > 0 or q.counts[PENDING] > 0
 
 
-def empty_workspace(layers: int) -> Any:
+def empty_workspace(soil: type | None = None, parts: int = 0) -> Any:
     """Return the workspace before the first design has been started, its vectors on whole lines of the fast memory.
 
     Parameters
     ----------
-    layers
-        Number of layers of soil; 0 for uniform soils.
+    soil
+        Type of the workspace, of `boulder_kernels.workspace.SOILS`; None for uniform soils.
+    parts
+        Number of parts of the soil of a design.
     """
-    ws = np.zeros((2 if layers else 1) * WHOLE + LANES)
+    ws = np.zeros((1 if soil is None else 2) * WHOLE + LANES)
     behind = ws.ctypes.data // ws.itemsize % LANES
     ws = ws[LANES - behind :]
-    return LayeredLanes(ws, (0,) * layers) if layers else ws
+    return ws if soil is None else soil(ws, (0,) * parts)
 
 
 def empty_queue() -> Queue:
@@ -298,18 +298,22 @@ def run_lanes(designs: np.ndarray, readings: Readings, control: Control, ws: Any
         pass
 
 
-def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) -> np.ndarray:
+def simulate_lanes(
+    designs: np.ndarray, readings: Readings, control: Control, soil: type | None = None, parts: int = 0
+) -> np.ndarray:
     """Simulate every design of a table in lanes, by a closed form of the soil and stopping at the limit.
 
     Parameters
     ----------
     designs
-        Designs, SI, shape (15 + 6 M, n): first the fields of `DesignTable`, then those of M layers of soil, one layer
-        after another, see `boulder_kernels.layered`; M must be one of its `COUNTS`, or 0 for uniform soils.
+        Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given of their soil, see
+        `boulder_kernels.workspace.LaneSoil`.
     readings
         Which formulas are read as printed.
     control
         Step, horizon, limit; its choice of soil and of stopping is ignored.
+    soil, parts
+        As of `empty_workspace`; the parts of `boulder_kernels.layered.COUNTS`.
 
     Returns
     -------
@@ -317,8 +321,6 @@ def simulate_lanes(designs: np.ndarray, readings: Readings, control: Control) ->
         Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
     """
     out = empty_outcomes(designs.shape[1])
-    if designs.shape[1] == 0:
-        return out
-    layers = (len(designs) - len(Design._fields)) // len(GivenLayer._fields)
-    run_lanes(filled_up(designs), readings, control, empty_workspace(layers), empty_queue(), out)
+    if designs.shape[1] > 0:
+        run_lanes(filled_up(designs), readings, control, empty_workspace(soil, parts), empty_queue(), out)
     return out

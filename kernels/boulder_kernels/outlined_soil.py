@@ -1,14 +1,11 @@
-"""The soil beside a boulder whose width varies over its height (Eqs 145 to 147).
+"""The reaction of the soil beside a boulder whose width varies over its height (Eqs 146, 147).
 
-At the ratio r = alpha/d of the depth a slice presses and brakes as one of a box, times its own width over that of the
-design. Springs and ultimate resistance are both proportional to the width, so a slice yields at the same displacement
-as beside a box, and the break points along the depth are the roots of the same quadratic equations. Where the width is
-linear between two depths, and the soil that of one layer, the integrals of force and moment are those of polynomials of
-the fourth degree between the break points: Gauss's rule of three points gives them exactly.
-
-The soil is N elements or, in their limit, such pieces. Beside the width both keep what the weight of a boulder adds
-whose centre does not lie over the middle of its foot, the moment -D cos(theta) (Eq 144): the restoring couple of a box
-has equal arms either way, and D is half of what differs.
+Springs and ultimate resistance are both proportional to the width, so a slice yields at the same displacement as beside
+a box, and the break points along the depth are the roots of the same quadratic equations. Where the width is linear
+between two depths, and the soil that of one layer, the integrals of force and moment are those of polynomials of the
+fourth degree between the break points: Gauss's rule of three points gives them exactly. Where the ultimate resistance
+is proportional to depth there are two break points for all of it, and the closed form is that of uniform soil
+(`boulder_kernels.soil`) with one more power of the depth.
 """
 
 from __future__ import annotations
@@ -19,134 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_kernel, function_of, inlined, kernel, overload
-from .design import Body, Constants, Design, G, SoilMass, body_of_box, wedge_slope
-from .layered import (
-    DENSITY,
-    FRICTION,
-    LEAST_RATIO,
-    NO_SUMS,
-    PRESSURE,
-    PRESSURE_SLOPE,
-    SUBGRADE,
-    TO,
-    Bounds,
-    Lumped,
-    SoilElements,
-    fill_elements,
-    layer_of,
-)
+from ._jit import function_of, inlined, kernel, overload
 from .layered_soil import potential_of_elements, power_of_elements, reaction_of_elements
-from .outline import HEIGHT, NODES, WEIGHTS, WIDTH, at_height, body_of_outline, on_piece, piece_at, slope_of
+from .outline import NODES, WEIGHTS
+from .outlined import FewPieces, OutlinedElements, OutlinedPieces, Piece, TaperedSoil
 from .soil import TINY, Kinematics, Potential, Reaction
-
-
-class OutlinedElements(NamedTuple):
-    """N soil elements beside a boulder with an outline."""
-
-    elements: SoilElements
-    lean: np.ndarray
-    """D over the depth of embedment [N], shape (1,)."""
-    outline: np.ndarray
-    """Outline of the boulder, see `boulder_kernels.outline`."""
-
-
-class OutlinedPieces(NamedTuple):
-    """Pieces of one soil and of linear width, from the soil line down; arrays of shape (M,) as of `SoilLayers`."""
-
-    to: np.ndarray
-    K: np.ndarray
-    P_0: np.ndarray
-    P_1: np.ndarray
-    R: np.ndarray
-    w_0: np.ndarray
-    w_1: np.ndarray
-    """Width w_0 + w_1 r over that of the design [-]."""
-    lean: np.ndarray
-    outline: np.ndarray
-    """As of `OutlinedElements`."""
-
-
-RECORDS = (OutlinedElements, OutlinedPieces)
-
-
-class Piece(NamedTuple):
-    """One piece, with the fields of `OutlinedPieces`."""
-
-    low: float
-    to: float
-    K: float
-    P_0: float
-    P_1: float
-    R: float
-    w_0: float
-    w_1: float
-
-
-@exact_kernel
-def fill_outlined_elements(design: Design, layers: np.ndarray, soil: OutlinedElements) -> Lumped:
-    """Give N elements the values of the layers and the width that they lie beside (Eq 145); see `fill_elements`."""
-    elements, outline, d = soil.elements, soil.outline, design.d
-    lumped = fill_elements(design, layers, elements)
-    mass = first = second = K_soil = R_soil = 0.0
-    N = elements.ratio.size
-    m = 0
-    for n in range(N):
-        alpha = elements.ratio[n] * d
-        while m < len(layers) - 1 and (n + 0.5) * d / N >= layers[m, TO]:
-            m += 1
-        width = at_height(outline, WIDTH, d - alpha)
-        share = width / design.W
-        elements.stiffness[n] *= share
-        elements.ultimate[n] *= share
-        elements.drag[n] *= share
-        m_n = layers[m, DENSITY] * width * (d / N) * wedge_slope(layers[m, FRICTION]) * (d - alpha)
-        mass += m_n
-        first += m_n * (d - alpha)
-        second += m_n * (d - alpha) * (d - alpha)
-        K_soil = max(K_soil, elements.stiffness[n] / elements.ratio[n] * N)
-        R_soil = max(R_soil, elements.drag[n] * N)
-    bounds = Bounds(N, K_soil, R_soil, lumped.bounds.x_yield)
-    return Lumped(SoilMass(mass, first, second), bounds, NO_SUMS)
-
-
-@exact_kernel
-def fill_outlined_pieces(design: Design, layers: np.ndarray, soil: OutlinedPieces) -> Lumped:
-    """Cut layers and outline into pieces (Eq 145), and return what follows from them; see `fill_layers`."""
-    d, outline, last = design.d, soil.outline, len(layers) - 1
-    mass = first = second = K_soil = R_soil = x_yield = 0.0
-    m, i, low = 0, piece_at(outline, min(d, outline[-1, HEIGHT])), 0.0
-    for n in range(soil.to.size):
-        layer_to = min(layers[m, TO] / d, 1.0) if m < last else 1.0
-        piece_to = (d - outline[i, HEIGHT]) / d if i > 0 else 1.0
-        to = max(min(layer_to, piece_to), low)
-        density, friction = layers[m, DENSITY], layers[m, FRICTION]
-        layer = layer_of(
-            design, low, to, density, friction, layers[m, SUBGRADE], layers[m, PRESSURE], layers[m, PRESSURE_SLOPE]
-        )
-        w_0 = on_piece(outline, i, WIDTH, d) / design.W
-        w_1 = -slope_of(outline, i, WIDTH) * d / design.W
-        soil.to[n], soil.K[n], soil.R[n] = to, layer.K, layer.R
-        soil.P_0[n], soil.P_1[n], soil.w_0[n], soil.w_1[n] = layer.P_0, layer.P_1, w_0, w_1
-        if low < to:
-            for g in range(3):
-                z = d * (1.0 - low - NODES[g] * (to - low))
-                across = density * wedge_slope(friction) * on_piece(outline, i, WIDTH, z)
-                slice_ = WEIGHTS[g] * d * (to - low) * across * z
-                mass += slice_
-                first += slice_ * z
-                second += slice_ * z * z
-            widest = max(w_0 + w_1 * low, w_0 + w_1 * to)
-            K_soil, R_soil = max(K_soil, layer.K * widest), max(R_soil, layer.R * widest)
-            at_low = (layer.P_0 / max(low, LEAST_RATIO) + layer.P_1) / layer.K
-            at_to = (layer.P_0 / max(to, LEAST_RATIO) + layer.P_1) / layer.K
-            x_yield = max(x_yield, max(at_low, at_to))
-        low = to
-        if m < last and to >= layer_to:
-            m += 1
-        if i > 0 and to >= piece_to:
-            i -= 1
-    return Lumped(SoilMass(mass, first, second), Bounds(0, K_soil, R_soil, x_yield), NO_SUMS)
 
 
 class Breaks(NamedTuple):
@@ -253,8 +127,50 @@ def piece_of(m: int, low: float, soil: OutlinedPieces) -> Piece:
     return Piece(low, soil.to[m], soil.K[m], soil.P_0[m], soil.P_1[m], soil.R[m], soil.w_0[m], soil.w_1[m])
 
 
+def through(add: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that passes what has been met on from piece to piece, and returns what has been met in all.
+
+    Parameters
+    ----------
+    add
+        Takes what has been met above a piece, the state, and the piece.
+
+    Returns
+    -------
+    callable
+        Takes what has been met before, the state, and `OutlinedPieces` or `FewPieces`. Few are written out: a loop
+        would keep the one over lanes from being vectorised.
+    """
+
+    def by_arrays(met: Any, state: Any, soil: OutlinedPieces) -> Any:
+        """Go through arrays."""
+        low = 0.0
+        for m in range(soil.to.size):
+            met = add(met, state, piece_of(m, low, soil))
+            low = soil.to[m]
+        return met
+
+    def written_out(count: int) -> Callable[..., Any]:
+        """Return the way through a known number of pieces."""
+        met = "met"
+        for m in range(count):
+            met = f"add({met}, state, soil.pieces[{m}])"
+        return function_of(f"def through(met, state, soil):\n return {met}", add=add)
+
+    def way(met: Any, state: Any, soil: Any) -> Any:
+        """Go through them."""
+        return (written_out(len(soil.pieces)) if isinstance(soil, FewPieces) else by_arrays)(met, state, soil)
+
+    def choose(met: Any, state: Any, soil: Any) -> Callable[..., Any]:
+        """Return the way for arguments of these Numba types."""
+        return written_out(len(soil[1])) if soil.instance_class is FewPieces else by_arrays
+
+    overload(way)(choose)
+    return way
+
+
 @inlined
-def leaning(reaction: Reaction, k: Kinematics, lean: np.ndarray) -> Reaction:
+def leaning(reaction: Reaction, k: Kinematics, lean: Any) -> Reaction:
     """Add the moment -D cos(theta) of the weight (Eq 144)."""
     return Reaction(reaction.F, reaction.M - lean[0] * k.lever_d)
 
@@ -277,17 +193,22 @@ def power_of_outlined_elements(k: Kinematics, soil: OutlinedElements) -> float:
     return power_of_elements(k, soil.elements)
 
 
-@kernel
-def reaction_of_pieces(k: Kinematics, soil: OutlinedPieces) -> Reaction:
+@inlined
+def add_reaction(s: Sums, k: Kinematics, piece: Piece) -> Sums:
+    """Add what a piece presses, springs and drag [N]."""
+    turn = turn_of(k.B, k.slope_v, piece)
+    s = springs_of(k.A, k.slope_x, piece, s)
+    s = drag_between(piece.low, turn, k.B, k.slope_v, piece, s)
+    return drag_between(turn, piece.to, k.B, k.slope_v, piece, s)
+
+
+pressed_by = through(add_reaction)
+
+
+@inlined
+def reaction_of_pieces(k: Kinematics, soil: Any) -> Reaction:
     """Force and moment of the soil beside an outline, integrated over the depth exactly (Eq 147)."""
-    s, low = Sums(0.0, 0.0), 0.0
-    for m in range(soil.to.size):
-        piece = piece_of(m, low, soil)
-        turn = turn_of(k.B, k.slope_v, piece)
-        s = springs_of(k.A, k.slope_x, piece, s)
-        s = drag_between(low, turn, k.B, k.slope_v, piece, s)
-        s = drag_between(turn, piece.to, k.B, k.slope_v, piece, s)
-        low = piece.to
+    s = pressed_by(Sums(0.0, 0.0), k, soil)
     return leaning(Reaction(-s.zeroth, k.lever_d * s.first + k.q * s.zeroth), k, soil.lean)
 
 
@@ -296,7 +217,7 @@ def energy_between(low: float, high: float, A: float, slope_x: float, piece: Pie
     """Add the elastic energy between two break points of a piece, exactly and by an upper bound [J] (Eq 147).
 
     A slice that yields holds P |x| - P^2/(2 K r) per unit of its width: polynomials, and P_0^2/(2 K r), whose integral
-    is a logarithm. A lower bound of that is ln(b/a) >= 2 (b - a)/(a + b).
+    is a logarithm. Bounds of that are 2 (b - a)/(a + b) <= ln(b/a) <= (b - a)/sqrt(a b).
     """
     length, middle = high - low, 0.5 * (low + high)
     yielding = abs(piece.K * middle * (A - slope_x * middle)) > piece.P_0 + piece.P_1 * middle
@@ -308,132 +229,180 @@ def energy_between(low: float, high: float, A: float, slope_x: float, piece: Pie
         plastic = P * abs(x) - share * (2.0 * piece.P_0 + piece.P_1 * r) * piece.P_1
         total += WEIGHTS[g] * length * (plastic if yielding else elastic) * (piece.w_0 + piece.w_1 * r)
     P_2 = piece.P_0 * piece.P_0 * share if yielding else 0.0
-    logarithm = math.log(max(high, TINY) / max(low, TINY))
     linear = P_2 * piece.w_1 * length
-    V += total - linear - P_2 * piece.w_0 * logarithm
+    V += total - linear - P_2 * piece.w_0 * math.log(max(high, TINY) / max(low, TINY))
     # w_0 alone may be negative; the width never is.
-    bound = 2.0 * length / max(low + high, TINY) if piece.w_0 > 0.0 else logarithm
-    return Sums(V, highest + total - linear - P_2 * piece.w_0 * bound)
+    least, most = 2.0 * length / max(low + high, TINY), length / np.sqrt(max(low * high, TINY))
+    return Sums(V, highest + total - linear - P_2 * piece.w_0 * (least if piece.w_0 > 0.0 else most))
 
 
-@kernel
-def potential_of_pieces(A: float, slope_x: float, soil: OutlinedPieces) -> Potential:
+class Stretch(NamedTuple):
+    """Displacement along the depth."""
+
+    A: float
+    slope_x: float
+
+
+class Stored(NamedTuple):
+    """What has been met on the way down: what the springs hold and press."""
+
+    V: float
+    highest: float
+    """As of `boulder_kernels.soil.Potential` [J]."""
+    pressed: Sums
+    """[N]."""
+
+
+@inlined
+def add_energy(met: Stored, x: Stretch, piece: Piece) -> Stored:
+    """Add what the springs of a piece hold and press."""
+    at = breaks_of(x.A, x.slope_x, piece)
+    V = energy_between(piece.low, at.a, x.A, x.slope_x, piece, met.V, met.highest)
+    V = energy_between(at.a, at.b, x.A, x.slope_x, piece, V.zeroth, V.first)
+    V = energy_between(at.b, at.c, x.A, x.slope_x, piece, V.zeroth, V.first)
+    V = energy_between(at.c, at.d, x.A, x.slope_x, piece, V.zeroth, V.first)
+    V = energy_between(at.d, piece.to, x.A, x.slope_x, piece, V.zeroth, V.first)
+    return Stored(V.zeroth, V.first, springs_of(x.A, x.slope_x, piece, met.pressed))
+
+
+stored_in = through(add_energy)
+
+
+@inlined
+def potential_of_pieces(A: float, slope_x: float, soil: Any) -> Potential:
     """Elastic energy of the soil beside an outline and its slopes, exactly (Eq 147)."""
-    s, V, low = Sums(0.0, 0.0), Sums(0.0, 0.0), 0.0
-    for m in range(soil.to.size):
-        piece = piece_of(m, low, soil)
-        s = springs_of(A, slope_x, piece, s)
-        at = breaks_of(A, slope_x, piece)
-        V = energy_between(low, at.a, A, slope_x, piece, V.zeroth, V.first)
-        V = energy_between(at.a, at.b, A, slope_x, piece, V.zeroth, V.first)
-        V = energy_between(at.b, at.c, A, slope_x, piece, V.zeroth, V.first)
-        V = energy_between(at.c, at.d, A, slope_x, piece, V.zeroth, V.first)
-        V = energy_between(at.d, piece.to, A, slope_x, piece, V.zeroth, V.first)
-        low = piece.to
-    return Potential(V.zeroth, s.zeroth, -s.first, V.first)
+    s = stored_in(Stored(0.0, 0.0, Sums(0.0, 0.0)), Stretch(A, slope_x), soil)
+    return Potential(s.V, s.pressed.zeroth, -s.pressed.first, s.highest)
 
 
-@kernel
-def power_of_pieces(k: Kinematics, soil: OutlinedPieces) -> float:
+@inlined
+def add_power(power: float, k: Kinematics, piece: Piece) -> float:
+    """Add the power of the drag of a piece [W]."""
+    turn = turn_of(k.B, k.slope_v, piece)
+    s = drag_between(piece.low, turn, k.B, k.slope_v, piece, Sums(0.0, 0.0))
+    s = drag_between(turn, piece.to, k.B, k.slope_v, piece, s)
+    return power + k.B * s.zeroth - k.slope_v * s.first
+
+
+braked_by = through(add_power)
+
+
+@inlined
+def power_of_pieces(k: Kinematics, soil: Any) -> float:
     """Power that the drag beside an outline takes out of the motion [W], integrated exactly."""
-    power, low = 0.0, 0.0
-    for m in range(soil.to.size):
-        piece = piece_of(m, low, soil)
-        turn = turn_of(k.B, k.slope_v, piece)
-        s = drag_between(low, turn, k.B, k.slope_v, piece, Sums(0.0, 0.0))
-        s = drag_between(turn, piece.to, k.B, k.slope_v, piece, s)
-        power += k.B * s.zeroth - k.slope_v * s.first
-        low = piece.to
+    power: float = braked_by(0.0, k, soil)
     return power
 
 
-def is_outlined(soil: Any) -> bool:
-    """Whether a record of the soil, or its Numba type, is that beside an outline."""
-    return getattr(soil, "instance_class", type(soil)) in RECORDS
+class Clipped(NamedTuple):
+    """Integrals of r^i clip(A - s r, -y, y) over the depth, i = 1, 2, 3 [m], and where the clipped line has bends."""
+
+    S_1: float
+    S_2: float
+    S_3: float
+    r_1: float
+    r_2: float
+    y: float
+    """With the sign of the slope [m]."""
 
 
-def with_outline(soil: Any, outline: np.ndarray) -> Any:
-    """Return a record of the soil, to be filled anew, beside another outline."""
-    return soil._replace(outline=outline)
-
-
-@overload(with_outline)
-def _with_outline(soil: Any, outline: Any) -> Callable[..., Any]:
-    values = ", ".join(f"soil.{name}" for name in soil.instance_class._fields[:-1])
-    return function_of(
-        f"def with_outline(soil, outline):\n return Record({values}, outline)", Record=soil.instance_class
+@inlined
+def clipped(A: float, slope_x: float, x_yield: float) -> Clipped:
+    """Integrate the displacement that presses, as `boulder_kernels.soil.closed_form` does, with one more power."""
+    s = math.copysign(max(abs(slope_x), TINY), slope_x)
+    y = math.copysign(x_yield, s)
+    inverse_s = 1.0 / s
+    below, above = y - A, y + A
+    r_1 = min(max(-below * inverse_s, 0.0), 1.0)
+    r_2 = min(max(above * inverse_s, 0.0), 1.0)
+    s = slope_x
+    a_1, a_2 = r_1 * r_1, r_2 * r_2
+    b_1, b_2 = a_1 * r_1, a_2 * r_2
+    c_1, c_2 = a_1 * a_1, a_2 * a_2
+    return Clipped(
+        0.5 * (below * a_1 + above * a_2 - y) + (1.0 / 3.0) * s * (b_1 - b_2),
+        (1.0 / 3.0) * (below * b_1 + above * b_2 - y) + 0.25 * s * (c_1 - c_2),
+        0.25 * (below * c_1 + above * c_2 - y) + 0.2 * s * (c_1 * r_1 - c_2 * r_2),
+        r_1,
+        r_2,
+        y,
     )
 
 
-def body_beside(design: Design, soil: Any) -> Body:
-    """Return the boulder beside a record of the soil: of its outline, or the box of the design."""
-    return body_of_outline(design, soil.outline) if is_outlined(soil) else body_of_box(design)
+@inlined
+def reaction_of_taper(k: Kinematics, soil: TaperedSoil) -> Reaction:
+    """Force and moment of uniform soil beside a tapered boulder: Eq 147 where there are two break points in all."""
+    piece = soil.pieces[0]
+    x = clipped(k.A, k.slope_x, piece.x_yield)
+    p = math.copysign(max(abs(k.slope_v), TINY), k.slope_v)
+    r_0 = min(max(k.B / p, 0.0), 1.0)
+    a_0 = r_0 * r_0
+    b_0 = a_0 * r_0
+    # With Z_i = 2 r_0^i - 1 the integral of r^(i - 1) is Z_i/i, whose sign changes with that of the velocity.
+    Z_1, Z_2, Z_3 = 2.0 * r_0 - 1.0, 0.5 * (2.0 * a_0 - 1.0), (1.0 / 3.0) * (2.0 * b_0 - 1.0)
+    Z_4, Z_5 = 0.25 * (2.0 * a_0 * a_0 - 1.0), 0.2 * (2.0 * b_0 * a_0 - 1.0)
+    BB, Bp, pp = k.B * k.B, 2.0 * (k.B * k.slope_v), k.slope_v * k.slope_v
+    D_0, D_1, D_2 = BB * Z_1 - Bp * Z_2 + pp * Z_3, BB * Z_2 - Bp * Z_3 + pp * Z_4, BB * Z_3 - Bp * Z_4 + pp * Z_5
+    R = math.copysign(piece.R, p)
+    pressed = piece.K * (piece.w_0 * x.S_1 + piece.w_1 * x.S_2) + R * (piece.w_0 * D_0 + piece.w_1 * D_1)
+    pressed_r = piece.K * (piece.w_0 * x.S_2 + piece.w_1 * x.S_3) + R * (piece.w_0 * D_1 + piece.w_1 * D_2)
+    return leaning(Reaction(-pressed, k.lever_d * pressed_r + k.q * pressed), k, soil.lean)
 
 
-@overload(body_beside)
-def _body_beside(design: Any, soil: Any) -> Callable[..., Body]:
-    if is_outlined(soil):
-        return lambda design, soil: body_of_outline(design, soil.outline)
-    return lambda design, soil: body_of_box(design)
+class Powers(NamedTuple):
+    """Integrals of r^(i - 1) over a part of the depth, i = 2 ... 5."""
+
+    two: float
+    three: float
+    four: float
+    five: float
 
 
-def keep_lean(body: Body, design: Design, gravity: bool, soil: Any) -> None:
-    """Keep what the weight adds beside the soil (Eq 144), where the restoring moment is the couple of the weight."""
-    if is_outlined(soil):
-        soil.lean[0] = body.m_b * G * body.lean / design.d if gravity else 0.0
+@inlined
+def powers_up_to(r: float) -> Powers:
+    """Return the integrals from the soil line down to a ratio of the depth."""
+    square = r * r
+    return Powers(0.5 * square, (1.0 / 3.0) * (square * r), 0.25 * (square * square), 0.2 * (square * square * r))
 
 
-@overload(keep_lean)
-def _keep_lean(body: Any, design: Any, gravity: Any, soil: Any) -> Callable[..., None]:
-    if not is_outlined(soil):
-        return lambda body, design, gravity, soil: None
+@inlined
+def held(A: float, s: float, y: float, first: Powers, last: Powers, shift: int) -> float:
+    """Integral of r^(1 + shift) times what springs of unit stiffness hold, whose displacement is clipped [m^2].
 
-    def keep(body: Body, design: Design, gravity: bool, soil: Any) -> None:
-        """Keep it."""
-        soil.lean[0] = body.m_b * G * body.lean / design.d if gravity else 0.0
-
-    return keep
-
-
-def _soil_in(c: Any) -> Any:
-    """Return the record of the soil of constants or of their Numba type; None of uniform soil."""
-    if hasattr(c, "instance_class"):
-        names = c.instance_class._fields
-        return c[names.index("soil")] if "soil" in names else None
-    return getattr(c, "soil", None)
-
-
-LIFT = "c.C_cos * abs(sin) + c.C_sin * versin"
-
-
-def lift_of(sin: float, versin: float, c: Constants) -> float:
-    """Return the energy of the weight, lifted by a rotation with this sine and versine [J] (Eqs 37-39, 144)."""
-    lift = c.C_cos * abs(sin) + c.C_sin * versin
-    soil = _soil_in(c)
-    return float(lift + soil.lean[0] * c.d * sin if is_outlined(soil) else lift)
+    Parameters
+    ----------
+    A, s
+        Displacement A - s r along the depth [m].
+    y
+        Displacement at which they yield, with the sign of s [m].
+    first, last
+        Integrals up to where they cease to yield, and to where they yield again.
+    shift
+        0 or 1.
+    """
+    u_1, u_2, u_3 = (first.two, first.three, first.four) if shift == 0 else (first.three, first.four, first.five)
+    v_1, v_2, v_3 = (last.two, last.three, last.four) if shift == 0 else (last.three, last.four, last.five)
+    w_1, w_2 = (0.5, 1.0 / 3.0) if shift == 0 else (1.0 / 3.0, 0.25)
+    middle = 0.5 * A * A * (v_1 - u_1) - A * s * (v_2 - u_2) + 0.5 * s * s * (v_3 - u_3)
+    before = y * (A * u_1 - s * u_2) - 0.5 * y * y * u_1
+    after = -y * (A * (w_1 - v_1) - s * (w_2 - v_2)) - 0.5 * y * y * (w_1 - v_1)
+    return before + middle + after
 
 
-@overload(lift_of)
-def _lift_of(sin: Any, versin: Any, c: Any) -> Callable[..., float]:
-    more = " + c.soil.lean[0] * c.d * sin" if is_outlined(_soil_in(c)) else ""
-    return function_of(f"def lift_of(sin, versin, c):\n return {LIFT}{more}")
+@inlined
+def potential_of_taper(A: float, slope_x: float, soil: TaperedSoil) -> Potential:
+    """Elastic energy of uniform soil beside a tapered boulder; see `boulder_kernels.soil.closed_potential`."""
+    piece = soil.pieces[0]
+    x = clipped(A, slope_x, piece.x_yield)
+    first, last = powers_up_to(x.r_1), powers_up_to(x.r_2)
+    V = piece.w_0 * held(A, slope_x, x.y, first, last, 0) + piece.w_1 * held(A, slope_x, x.y, first, last, 1)
+    pressed = piece.K * (piece.w_0 * x.S_1 + piece.w_1 * x.S_2)
+    pressed_r = piece.K * (piece.w_0 * x.S_2 + piece.w_1 * x.S_3)
+    return Potential(piece.K * V, pressed, -pressed_r, piece.K * V)
 
 
-def least_couple(c: Constants) -> float:
-    """Return the lesser of the moments of the weight about the ends of the foot [N m]; they differ by 2 D (Eq 144)."""
-    soil = _soil_in(c)
-    return float(c.C_cos - abs(soil.lean[0]) * c.d if is_outlined(soil) else c.C_cos)
-
-
-@overload(least_couple)
-def _least_couple(c: Any) -> Callable[..., float]:
-    less = " - abs(c.soil.lean[0]) * c.d" if is_outlined(_soil_in(c)) else ""
-    return function_of(f"def least_couple(c):\n return c.C_cos{less}")
-
-
-def empty_outlined(pieces: int, elements: int, outline: np.ndarray) -> OutlinedPieces | OutlinedElements:
-    """Return a soil to fill beside an outline: N elements, or where N is 0 as many pieces as given."""
-    if elements > 0:
-        return OutlinedElements(SoilElements(*np.empty((4, elements))), np.zeros(1), outline)
-    to, K, P_0, P_1, R, w_0, w_1 = np.empty((7, pieces))
-    return OutlinedPieces(to, K, P_0, P_1, R, w_0, w_1, np.zeros(1), outline)
+@inlined
+def power_of_taper(k: Kinematics, soil: TaperedSoil) -> float:
+    """Power that the drag beside a tapered boulder takes out of the motion [W]."""
+    p = soil.pieces[0]
+    return add_power(0.0, k, Piece(0.0, 1.0, p.K, 0.0, p.K * p.x_yield, p.R, p.w_0, p.w_1))

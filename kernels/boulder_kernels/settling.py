@@ -33,7 +33,7 @@ from .design import Constants, Readings
 from .dynamics import State, contact_displacement, spring_compression
 from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
 from .outcomes import Maxima
-from .outlined_soil import least_couple, lift_of
+from .outlined import least_couple, lift_of
 from .plastic import Memory, memory_of
 from .soil import Potential, soil_kinematics
 from .soil_laws import soil_potential

@@ -35,20 +35,27 @@ from .layered_soil import (
     reaction_of_elements,
     reaction_of_layers,
 )
-from .outlined_soil import (
+from .outlined import (
+    FewPieces,
     OutlinedElements,
     OutlinedPieces,
+    TaperedSoil,
     body_beside,
     empty_outlined,
     fill_outlined_elements,
     fill_outlined_pieces,
     keep_lean,
+)
+from .outlined_soil import (
     potential_of_outlined_elements,
     potential_of_pieces,
+    potential_of_taper,
     power_of_outlined_elements,
     power_of_pieces,
+    power_of_taper,
     reaction_of_outlined_elements,
     reaction_of_pieces,
+    reaction_of_taper,
 )
 from .plastic import (
     Memory,
@@ -85,6 +92,8 @@ LAWS: dict[type, SoilLaw] = {
         fill_outlined_elements,
     ),
     OutlinedPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces, fill_outlined_pieces),
+    FewPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces),
+    TaperedSoil: SoilLaw(reaction_of_taper, potential_of_taper, power_of_taper),
     Memory: SoilLaw(reaction_of_plastic_elements, potential_of_plastic_elements, power_of_plastic_elements),
 }
 """The law of each record of a soil, the last of those that constants carry."""

@@ -23,7 +23,7 @@ from .impact import (
 )
 from .lanes import simulate_lanes
 from .last_resort import simulate_last_resort
-from .layered import LAYERED, OutlinedTable, filled_layers, lanes_count
+from .layered import LAYERED, PRESSURE, OutlinedTable, filled_layers, lanes_count
 from .outcomes import (
     COARSER,
     FINER,
@@ -40,12 +40,13 @@ from .outcomes import (
     outcome_table,
     write_outcome,
 )
-from .outlined_soil import with_outline
+from .outlined import given_beside, with_outline
 from .plastic import ELASTIC, LAST, PLASTIC_WITH_GAP, SWING, empty_memory, memory_of
 from .second_spring import SecondSpring, SecondSprings
 from .settling import proof_is_possible
 from .soil_laws import SoilProfile, constants_in, empty_soil, profile_of
 from .unloading import rest_of
+from .workspace import LayeredLanes, OutlinedLanes, TaperedLanes
 
 SAFETY = 1.5
 """Factor from the difference of two solutions to the error that is reported: it makes the estimate hold for 99 % and
@@ -230,6 +231,41 @@ def step_of_solution(control: Control) -> float:
     return finer_step(control.h) if control.refined else control.h
 
 
+class Given(NamedTuple):
+    """Designs as lanes take them, arguments of `simulate_lanes`."""
+
+    designs: np.ndarray
+    soil: type | None
+    parts: int
+
+
+def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.ndarray | None) -> Given | None:
+    """Return designs as lanes take them, or None of those that they do not take.
+
+    Parameters
+    ----------
+    designs
+        Shape (15, n).
+    layers, outlines
+        Of `LayeredTable` and `OutlinedTable`.
+    """
+    if layers is None:
+        return Given(designs, None, 0)
+    if outlines is None:
+        count = lanes_count(layers.shape[1])
+        return Given(np.concatenate([designs, filled_layers(layers, count)]), LayeredLanes, count) if count else None
+    pieces = layers.shape[1] + outlines.shape[1] - 2
+    if is_taper(layers, outlines):
+        return Given(given_beside(designs, layers, outlines, 1), TaperedLanes, 1)
+    count = lanes_count(pieces)
+    return Given(given_beside(designs, layers, outlines, count), OutlinedLanes, count) if count else None
+
+
+def is_taper(layers: np.ndarray, outlines: np.ndarray) -> bool:
+    """Return whether soil and width vary as of `boulder_kernels.outlined.TaperedSoil`, arguments as before."""
+    return layers.shape[1] + outlines.shape[1] == 3 and not layers[:, :, PRESSURE].any()
+
+
 def simulate_once(
     table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
 ) -> tuple[OutcomeTable, np.ndarray]:
@@ -248,21 +284,20 @@ def simulate_once(
     designs = np.stack(table[: len(DesignTable._fields)])
     stacked = None if springs is None else np.stack(springs)
     layers: np.ndarray | None = getattr(table, "layers", None)
-    count = 0 if layers is None else lanes_count(layers.shape[1])
-    side_by_side = springs is None and control.elements == 0 and control.stop_at_limit
     outlines: np.ndarray | None = getattr(table, "outlines", None)
-    if layers is not None and count and side_by_side and outlines is None:
-        out = simulate_lanes(np.concatenate([designs, filled_layers(layers, count)]), readings, control)
-    elif layers is not None:
-        soil = empty_soil(layers.shape[1], control.elements, None if outlines is None else outlines[0])
-        out = simulate_rows(designs, layers, outlines, soil, stacked, readings, control)
-    elif control.last_resort:
+    side_by_side = springs is None and control.elements == 0 and control.stop_at_limit
+    if control.last_resort and layers is None:
         out = empty_outcomes(designs.shape[1])
         run_last_resort(designs, stacked, readings, control, no_record(), out)
-    elif side_by_side:
-        out = simulate_lanes(designs, readings, control)
+        return outcome_table(out, step_of_solution(control)), out[SECOND]
+    given = given_to_lanes(designs, layers, outlines) if side_by_side else None
+    if given is not None:
+        out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)
     else:
-        out = simulate_rows(designs, None, None, None, stacked, readings, control)
+        soil = None
+        if layers is not None:
+            soil = empty_soil(layers.shape[1], control.elements, None if outlines is None else outlines[0])
+        out = simulate_rows(designs, layers, outlines, soil, stacked, readings, control)
     return outcome_table(out, step_of_solution(control)), out[SECOND]
 
 
@@ -356,6 +391,13 @@ def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
     fine.rest_error[:] += safety * differing
 
 
+def is_layered(table: Any) -> bool:
+    """Return whether the soil of a table may yield at one depth after another, other than in uniform soil."""
+    return isinstance(table, LAYERED) and not (
+        isinstance(table, OutlinedTable) and is_taper(table.layers, table.outlines)
+    )
+
+
 def is_paired(readings: Readings, control: Control, *, layered: bool) -> bool:
     """Return whether every design is solved twice for its error, where errors are estimated.
 
@@ -439,7 +481,7 @@ def simulate_table(
     if not control.error_estimate:
         return simulate_once(table, readings, control, springs)[0]
     refined = control._replace(refined=True)
-    if not is_paired(readings, control, layered=isinstance(table, LAYERED)):
+    if not is_paired(readings, control, layered=is_layered(table)):
         return simulate_checked(table, readings, refined, springs)
     out, _ = simulate_once(table, readings, control, springs)
     fine, _ = simulate_once(table, readings, refined, springs)

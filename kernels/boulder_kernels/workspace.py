@@ -19,7 +19,7 @@ import numpy as np
 
 from ._jit import function_of, overload
 from .dense_output import Track
-from .design import Constants, Design, Readings, constants_of
+from .design import Body, Constants, Design, Readings, constants_of
 from .dynamics import Acceleration, State
 from .flat import field, put
 from .gaps import GapFactors, Gaps
@@ -27,6 +27,7 @@ from .layered import COUNTS, FewLayers, GivenLayer, Layer, LayeredConstants, Soi
 from .modes import Modes, Switches
 from .numerics import Bracket
 from .outcomes import Compression, Maxima
+from .outlined import FewPieces, GivenPiece, Lean, Piece, TaperedPiece, TaperedSoil, constants_beside
 
 LANES = 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
@@ -165,38 +166,86 @@ RECORDS = {_place(name): record for name, record in _ALL.items()}
 
 
 SOIL = WHOLE
-"""Where the layers of the soil of a design lie, from its lane on: in a second half of the array, laid out as the first,
-which only `LayeredLanes` have."""
+"""Where the soil of a design lies that is not uniform, from its lane on: in a second half of the array, laid out as the
+first, which only the workspaces of `SOILS` have."""
 
 
 class LayeredLanes(NamedTuple):
-    """A workspace for designs in soils of layers, whose constants are `LayeredConstants` with `FewLayers`."""
+    """A workspace for designs in soils of layers."""
 
     numbers: np.ndarray
     """The array, of twice the length."""
-    layers: tuple[int, ...]
+    parts: tuple[int, ...]
     """As many zeros as there are layers: how many is known when kernels are compiled."""
 
 
-def soil_size(layers: int) -> int:
-    """Return how many numbers of a lane belong to its soil in layers, times LANES."""
-    return LANES * (len(SoilSums._fields) + len(Layer._fields) * layers)
+class OutlinedLanes(NamedTuple):
+    """A workspace for boulders with an outline; ``parts`` has as many zeros as there are pieces of their soil."""
+
+    numbers: np.ndarray
+    parts: tuple[int, ...]
 
 
-def given_place(layers: int) -> int:
-    """Return where the rows of the layers of a design that is being started lie, from its lane on."""
-    return SOIL + soil_size(layers)
+class TaperedLanes(NamedTuple):
+    """A workspace for tapered boulders in uniform soil; ``parts`` has one zero."""
+
+    numbers: np.ndarray
+    parts: tuple[int, ...]
 
 
-assert soil_size(COUNTS[-1]) <= SIZE, "the layers of a lane reach into those of the next group"
-assert soil_size(COUNTS[-1]) + LANES * len(GivenLayer._fields) * COUNTS[-1] <= EVENT_SIZE
+class Nothing(NamedTuple):
+    """A record of no numbers."""
+
+
+class LaneSoil(NamedTuple):
+    """What the lanes of a workspace keep of the soil: a record of one other record and of several of a third."""
+
+    record: type
+    """The soil of the constants, `LayeredConstants`."""
+    whole: Any
+    part: Any
+    given_whole: Any
+    """What there is once of a design that is being started, the rows of a table below those of `Design`."""
+    given_part: Any
+    """What there is of every part of the soil."""
+    constants: Callable[[int], Callable[..., Any]]
+    """The function that works out the constants, of the number of parts."""
+
+    def size(self, count: int) -> int:
+        """Return how many numbers of a lane belong to its soil of as many parts, times LANES."""
+        return LANES * (len(self.whole._fields) + len(self.part._fields) * count)
+
+    def given_size(self, count: int) -> int:
+        """Return how many of them belong to what is given of it."""
+        return LANES * (len(self.given_whole._fields) + len(self.given_part._fields) * count)
+
+
+SOILS: dict[type, LaneSoil] = {
+    LayeredLanes: LaneSoil(FewLayers, SoilSums, Layer, Nothing, GivenLayer, constants_of_few),
+    OutlinedLanes: LaneSoil(FewPieces, Lean, Piece, Body, GivenPiece, constants_beside),
+    TaperedLanes: LaneSoil(TaperedSoil, Lean, TaperedPiece, Body, GivenPiece, lambda count: constants_beside(0)),
+}
+"""By the type of the workspace."""
+
+
+def soil_in(ws: Any) -> LaneSoil | None:
+    """Return what lanes keep of the soil, of a workspace or, inside kernels, its Numba type; None of uniform soil."""
+    return SOILS.get(getattr(ws, "instance_class", type(ws)))
+
+
+def given_place(soil: LaneSoil, count: int) -> int:
+    """Return where what is given of the soil of a design that is being started lies, from its lane on."""
+    return SOIL + soil.size(count)
+
+
+for _soil in SOILS.values():
+    assert _soil.size(COUNTS[-1]) <= SIZE, "the soil of a lane reaches into that of the next group"
+    assert _soil.size(COUNTS[-1]) + _soil.given_size(COUNTS[-1]) <= EVENT_SIZE
 
 
 def part(ws: Any, start: int) -> Any:
     """Return a workspace from one of its lanes on."""
-    if isinstance(ws, LayeredLanes):
-        return LayeredLanes(ws.numbers[start:], ws.layers)
-    return ws[start:]
+    return ws[start:] if soil_in(ws) is None else ws._replace(numbers=ws.numbers[start:])
 
 
 def offsets_of(record: Any) -> dict[str, int]:
@@ -213,17 +262,18 @@ def load(ws: Any, place: int, lane: int) -> Any:
         kind(field(ws, place + offsets[name], lane)) if name in offsets else KNOWN[name]
         for name, kind in get_type_hints(record).items()
     ]
-    if place == CONSTANTS and isinstance(ws, LayeredLanes):
-        return LayeredConstants(*numbers, load_soil(ws, lane))
+    soil = soil_in(ws)
+    if place == CONSTANTS and soil is not None:
+        return LayeredConstants(*numbers, soil.record(*_load_parts(ws, lane, SOIL, soil.whole, soil.part)))
     return record(*numbers)
 
 
-def load_soil(ws: LayeredLanes, lane: int) -> FewLayers:
-    """Return the soil of one lane."""
-    count, width = len(SoilSums._fields), len(Layer._fields)
-    numbers = [field(ws, SOIL + i * LANES, lane) for i in range(count + width * len(ws.layers))]
-    layers = tuple(Layer(*numbers[first : first + width]) for first in range(count, len(numbers), width))
-    return FewLayers(SoilSums(*numbers[:count]), layers)
+def _load_parts(ws: Any, lane: int, place: int, whole: Any, part: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Return a record of one kind and, behind it, as many of another as the soil has parts."""
+    count, width = len(whole._fields), len(part._fields)
+    numbers = [field(ws, place + i * LANES, lane) for i in range(count + width * len(ws.parts))]
+    parts = tuple(part(*numbers[first : first + width]) for first in range(count, len(numbers), width))
+    return whole(*numbers[:count]), parts
 
 
 def store(ws: Any, place: int, lane: int, record: Any) -> None:
@@ -231,38 +281,41 @@ def store(ws: Any, place: int, lane: int, record: Any) -> None:
     for name, offset in offsets_of(RECORDS[place]).items():
         put(ws, place + offset, lane, getattr(record, name))
     if isinstance(record, LayeredConstants):
-        for i, number in enumerate([*record.soil.sums, *itertools.chain(*record.soil.layers)]):
+        whole, parts = record.soil
+        for i, number in enumerate([*whole, *itertools.chain(*parts)]):
             put(ws, SOIL + i * LANES, lane, number)
 
 
 def store_given(ws: Any, lane: int, designs: np.ndarray, row: int) -> None:
-    """Write the layers of a design that is being started, the rows of a table below those of `Design`."""
-    if isinstance(ws, LayeredLanes):
+    """Write what is given of the soil of a design that is being started, the rows below those of `Design`."""
+    soil = soil_in(ws)
+    if soil is not None:
         for i, number in enumerate(designs[len(Design._fields) :, row]):
-            put(ws, given_place(len(ws.layers)) + i * LANES, lane, number)
+            put(ws, given_place(soil, len(ws.parts)) + i * LANES, lane, number)
 
 
-def load_given(ws: LayeredLanes, lane: int) -> tuple[GivenLayer, ...]:
-    """Return the layers of a design that is being started."""
-    first, width = given_place(len(ws.layers)), len(GivenLayer._fields)
-    numbers = [field(ws, first + i * LANES, lane) for i in range(width * len(ws.layers))]
-    return tuple(GivenLayer(*numbers[m : m + width]) for m in range(0, len(numbers), width))
+def load_given(ws: Any, lane: int) -> Any:
+    """Return what is given of the soil of a design that is being started: the parts, or another record and they."""
+    soil: Any = soil_in(ws)
+    whole, parts = _load_parts(ws, lane, given_place(soil, len(ws.parts)), soil.given_whole, soil.given_part)
+    return (whole, parts) if len(whole) else parts
 
 
 def constants_in_lane(ws: Any, lane: int, design: Design, readings: Readings) -> Any:
     """Return the constants of a design that is being started."""
-    if isinstance(ws, LayeredLanes):
-        return constants_of_few(len(ws.layers))(design, readings, load_given(ws, lane))
+    soil = soil_in(ws)
+    if soil is not None:
+        return soil.constants(len(ws.parts))(design, readings, load_given(ws, lane))
     return constants_of(design, readings, 0)
 
 
 @overload(constants_in_lane)
 def _constants_in_lane(ws: Any, lane: Any, design: Any, readings: Any) -> Callable[..., Any]:
-    if not hasattr(ws, "instance_class"):
+    soil = soil_in(ws)
+    if soil is None:
         return lambda ws, lane, design, readings: constants_of(design, readings, 0)
-    constants = constants_of_few(len(ws[1]))
     source = "def in_lane(ws, lane, design, readings):\n return constants(design, readings, load_given(ws, lane))"
-    return function_of(source, constants=constants, load_given=load_given)
+    return function_of(source, constants=soil.constants(len(ws[1])), load_given=load_given)
 
 
 def align_stack() -> None:
@@ -274,9 +327,9 @@ def align_stack() -> None:
 
 
 def copy_lane(ws: Any, lane: int, other: int, end: int) -> None:
-    """Copy the numbers of one lane to another, up to before a place, and its soil in layers."""
-    numbers = ws
-    if isinstance(ws, LayeredLanes):
-        numbers, behind = ws.numbers, SOIL + soil_size(len(ws.layers))
+    """Copy the numbers of one lane to another, up to before a place, and its soil where it is not uniform."""
+    numbers, soil = ws, soil_in(ws)
+    if soil is not None:
+        numbers, behind = ws.numbers, SOIL + soil.size(len(ws.parts))
         numbers[other + SOIL : other + behind : LANES] = numbers[lane + SOIL : lane + behind : LANES]
     numbers[other : other + end : LANES] = numbers[lane : lane + end : LANES]

@@ -25,7 +25,9 @@ _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered"
 
 _PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
 _HEAVE, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "second_opinion"))
-_OUTLINE, _OUTLINED = (f"kernels/boulder_kernels/{name}.py" for name in ("outline", "outlined_soil"))
+_OUTLINE, _BESIDE, _OUTLINED = (
+    f"kernels/boulder_kernels/{name}.py" for name in ("outline", "outlined", "outlined_soil")
+)
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return (1.0 + half) / (1.0 - half)", "return (1.0 - half) / (1.0 + half)"),
@@ -173,16 +175,16 @@ MUTATIONS = (
     Mutation(
         (143,), _OUTLINE, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
     ),
-    Mutation((144,), _OUTLINED, "lift + soil.lean[0] * c.d * sin if", "lift - soil.lean[0] * c.d * sin if"),
-    Mutation((144,), _OUTLINED, "c.C_cos - abs(soil.lean[0]) * c.d if", "c.C_cos if"),
+    Mutation((144,), _BESIDE, "lift + soil.lean[0] * c.d * sin if", "lift - soil.lean[0] * c.d * sin if"),
+    Mutation((144,), _BESIDE, "c.C_cos - abs(soil.lean[0]) * c.d if", "c.C_cos if"),
     Mutation((144,), _OUTLINED, "reaction.M - lean[0] * k.lever_d", "reaction.M + lean[0] * k.lever_d"),
     Mutation(
         (145,),
-        _OUTLINED,
-        "w_1 = -slope_of(outline, i, WIDTH) * d / design.W",
-        "w_1 = slope_of(outline, i, WIDTH) * d / design.W",
+        _BESIDE,
+        "-slope_of(outline, i, WIDTH) * d / design.W",
+        "slope_of(outline, i, WIDTH) * d / design.W",
     ),
-    Mutation((145,), _OUTLINED, "elements.ultimate[n] *= share", "elements.ultimate[n] *= 1.0"),
+    Mutation((145,), _BESIDE, "elements.ultimate[n] *= share", "elements.ultimate[n] *= 1.0"),
     Mutation(
         (146,),
         _OUTLINED,
@@ -193,5 +195,8 @@ MUTATIONS = (
     Mutation(
         (147,), _OUTLINED, "first += WEIGHTS[g] * length * pressed * r", "first += WEIGHTS[g] * length * pressed * low"
     ),
-    Mutation((147,), _OUTLINED, "total - linear - P_2 * piece.w_0 * logarithm", "total - P_2 * piece.w_0 * logarithm"),
+    Mutation((147,), _OUTLINED, "total - linear - P_2 * piece.w_0 * math.log", "total - P_2 * piece.w_0 * math.log"),
+    Mutation((147,), _OUTLINED, "piece.w_0 * x.S_2 + piece.w_1 * x.S_3", "piece.w_0 * x.S_2 + piece.w_1 * x.S_2"),
+    Mutation((147,), _OUTLINED, "piece.w_0 * D_1 + piece.w_1 * D_2", "piece.w_0 * D_1 + piece.w_1 * D_1"),
+    Mutation((147,), _OUTLINED, "slope_x, x.y, first, last, 1)", "slope_x, x.y, first, last, 0)"),
 )

@@ -22,7 +22,7 @@ from boulder_kernels.lane_steps import (
     take_over_steps,
 )
 from boulder_kernels.lanes import run_lanes
-from boulder_kernels.workspace import LANES, SIZE, WHOLE, LayeredLanes
+from boulder_kernels.workspace import LANES, SIZE, SOILS, WHOLE, LayeredLanes, OutlinedLanes, TaperedLanes
 
 from .samples import control, random_designs, table_of
 
@@ -135,18 +135,16 @@ def test_events_and_starts_are_vectorised(kernel) -> None:
         assert len(SCALAR.findall(code)) < packed / 10
 
 
-IN_LAYERS = {
-    attempt_steps: (),
-    take_over_steps: (),
-    start_steps: (),
-    compute_constants: (np.zeros((15 + 12, LANES)), 0, bk.corrected(), HOW, 8e-3),
-}
+IN_SOILS = (attempt_steps, take_over_steps, start_steps, compute_constants)
 
 
-@pytest.mark.parametrize("kernel", IN_LAYERS, ids=lambda kernel: kernel.__name__)
-def test_layers_of_soil_are_vectorised(kernel) -> None:
-    """Written out layer by layer, so that neither a loop nor a branch nor a logarithm keeps the lanes apart."""
-    code = assembly(kernel, LayeredLanes(np.zeros(2 * WHOLE), (0, 0)), *IN_LAYERS[kernel])
+@pytest.mark.parametrize("kernel", IN_SOILS, ids=lambda kernel: kernel.__name__)
+@pytest.mark.parametrize(("soil", "parts"), [(LayeredLanes, 2), (TaperedLanes, 1), (OutlinedLanes, 2)])
+def test_layers_and_pieces_of_soil_are_vectorised(soil, parts: int, kernel) -> None:
+    """Written out part by part, so that neither a loop nor a branch nor a logarithm keeps the lanes apart."""
+    given = np.zeros((15 + SOILS[soil].given_size(parts) // LANES, LANES))
+    starting = (given, 0, bk.corrected(), HOW, 8e-3) if kernel is compute_constants else ()
+    code = assembly(kernel, soil(np.zeros(2 * WHOLE), (0,) * parts), *starting)
     assert not CALL.search(code)
     found, register = widths(code), widest()
     if register and register != "xmm":

@@ -1,0 +1,135 @@
+"""Which way up, and with which face to the vehicle, a scanned stone passes at a site in the least depth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from boulder_sweep.answers.need import need
+from boulder_sweep.drawing import draw
+from boulder_sweep.settings import Sweep
+from boulder_sweep.stones.standing import Standing
+from boulder_sweep.stones.weighing import ScannedStone
+from boulder_sweep.text import ProgressCallback
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One way to stand, at the site.
+
+    Attributes
+    ----------
+    standing : Standing
+        The way.
+    row : dict
+        Row of `boulder_sweep.need` that asks for the largest depth, or has no depth at which the stone passes.
+    depth_m : float or None
+        Least depth at which it passes in every soil and before every vehicle of the site [m].
+    """
+
+    standing: Standing
+    row: dict[str, Any]
+    depth_m: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Placing:
+    """A stone at a site. Made by `placed`.
+
+    Attributes
+    ----------
+    found : ScannedStone
+        The stone.
+    ways : tuple of Way
+        Ways to stand on a flat foot, the one of least depth first.
+    rounded : int
+        Ways without a flat foot, which are not modelled.
+    cases : int
+        Soils and vehicles of the site, combined.
+    """
+
+    found: ScannedStone
+    ways: tuple[Way, ...]
+    rounded: int
+    cases: int
+
+    shown = 3
+    """Ways that are drawn, at most."""
+
+    @property
+    def passing(self) -> list[Way]:
+        """Ways that pass at some depth."""
+        return [way for way in self.ways if way.depth_m is not None]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        standings = self.found.to_dict([way.standing for way in self.ways])
+        placed = zip(standings.pop("standings"), self.ways, strict=True)
+        ways = [own | {"least_embedment_depth_m": way.depth_m, "answer": way.row} for own, way in placed]
+        return standings | {"rounded": self.rounded, "cases": self.cases, "ways": ways}
+
+    def plot(self, path: str | Path) -> None:
+        """Draw the best ways, from the side and to scale, in the ground.
+
+        Raises
+        ------
+        PictureError
+            It cannot be drawn.
+        """
+        draw("stone", "draw_placing", self, path)
+
+
+def boulder_block(found: ScannedStone, own: Standing) -> str:
+    """Return a stone on one of its feet as an entry that replaces the boulder of a settings file."""
+    profile = own.profile
+    points = zip(*(side.tolist() for side in (profile.height, profile.width, profile.near, profile.far)), strict=True)
+    listed = ", ".join(f"{{height: {z!r} m, width: {w!r} m, near: {n!r} m, far: {f!r} m}}" for z, w, n, f in points)
+    return f"boulder={{density: {found.density_kg_m3!r} kg/m^3, profile: [{listed}]}}"
+
+
+def placed(
+    found: ScannedStone,
+    site: Callable[[str], Sweep],
+    standings: tuple[Standing, ...] | None = None,
+    *,
+    margin: str | float = 0.0,
+    progress: ProgressCallback | None = None,
+) -> Placing:
+    """Find the least depth of every way in which a stone can stand.
+
+    Parameters
+    ----------
+    found
+        The stone.
+    site
+        Gives the settings of the site with a boulder, which it takes as `boulder_block` returns it.
+    standings
+        Ways to stand; all by default.
+    margin
+        Margin that is asked for, as of `boulder_sweep.need`.
+    progress
+        Called with the ways done and their number.
+
+    Raises
+    ------
+    SettingsError, QuestionError
+        The site cannot be asked.
+    """
+    asked = found.standings if standings is None else standings
+    flat = [own for own in asked if own.has_foot]
+    ways, cases = [], 0
+    for done, own in enumerate(flat):
+        if progress is not None:
+            progress(done, len(flat))
+        answers = need(site(boulder_block(found, own)), margin=margin)
+        rows, name = answers.arrow.to_pylist(), answers.key.answer
+        cases = len(rows)
+        none = next((row for row in rows if row[name] is None), None)
+        worst = max(rows, key=lambda row: row[name]) if none is None else none
+        ways.append(Way(own, worst, worst[name]))
+    if progress is not None:
+        progress(len(flat), len(flat))
+    ways.sort(key=lambda way: (way.depth_m is None, way.depth_m or 0.0))
+    return Placing(found, tuple(ways), len(asked) - len(flat), cases)

@@ -1,0 +1,418 @@
+"""What the soil beside a boulder is whose width varies over its height (Eq 145), and how its weight leans (Eq 144).
+
+At the ratio r = alpha/d of the depth a slice presses and brakes as one of a box, times its own width over that of the
+design. The soil is N elements or, in their limit, pieces of one soil and of linear width: a layer, cut where the
+outline has a point. They are arrays beside the constants of the design or, in lanes, numbers;
+`boulder_kernels.outlined_soil` works out what they press.
+
+Beside the width all keep what the weight of a boulder adds whose centre does not lie over the middle of its foot, the
+moment -D cos(theta) (Eq 144): the restoring couple of a box has equal arms either way, and D is half of what differs.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ._jit import array_kernel, exact_inlined, exact_kernel, function_of, overload
+from .design import Body, Constants, Design, G, SoilMass, body_of_box, constants_with, design_in, wedge_slope
+from .layered import (
+    DENSITY,
+    FRICTION,
+    LEAST_RATIO,
+    NO_SUMS,
+    PRESSURE,
+    PRESSURE_SLOPE,
+    SUBGRADE,
+    TO,
+    Bounds,
+    LayeredConstants,
+    Lumped,
+    SoilElements,
+    fill_elements,
+    layer_of,
+    nothing_lumped,
+)
+from .outline import HEIGHT, NODES, WEIGHTS, WIDTH, at_height, body_of_outline, on_piece, piece_at, slope_of
+
+
+class OutlinedElements(NamedTuple):
+    """N soil elements beside a boulder with an outline."""
+
+    elements: SoilElements
+    lean: np.ndarray
+    """D over the depth of embedment [N], shape (1,)."""
+    outline: np.ndarray
+    """Outline of the boulder, see `boulder_kernels.outline`."""
+
+
+class OutlinedPieces(NamedTuple):
+    """Pieces of one soil and of linear width, from the soil line down; arrays of shape (M,) as of `SoilLayers`."""
+
+    to: np.ndarray
+    K: np.ndarray
+    P_0: np.ndarray
+    P_1: np.ndarray
+    R: np.ndarray
+    w_0: np.ndarray
+    w_1: np.ndarray
+    """Width w_0 + w_1 r over that of the design [-]."""
+    lean: np.ndarray
+    outline: np.ndarray
+    """As of `OutlinedElements`."""
+
+
+class Piece(NamedTuple):
+    """One piece, with the fields of `OutlinedPieces`."""
+
+    low: float
+    to: float
+    K: float
+    P_0: float
+    P_1: float
+    R: float
+    w_0: float
+    w_1: float
+
+
+class Lean(NamedTuple):
+    """How the weight of a boulder in a lane leans."""
+
+    moment: float
+    """D over the depth of embedment [N]."""
+
+
+class FewPieces(NamedTuple):
+    """As many pieces as its type says, number by number: the soil of a design in a lane."""
+
+    lean: Lean
+    pieces: tuple[Piece, ...]
+
+
+class TaperedPiece(NamedTuple):
+    """Soil of one kind beside one linear width, whose ultimate resistance is proportional to depth."""
+
+    K: float
+    R: float
+    x_yield: float
+    """Displacement at which all of it yields [m]."""
+    w_0: float
+    w_1: float
+    """These, K and R as of `OutlinedPieces`."""
+
+
+class TaperedSoil(NamedTuple):
+    """The soil of a tapered boulder in a lane."""
+
+    lean: Lean
+    pieces: tuple[TaperedPiece]
+
+
+RECORDS = (OutlinedElements, OutlinedPieces, FewPieces, TaperedSoil)
+
+
+class GivenPiece(NamedTuple):
+    """One piece of the soil of a design, before it is worked out."""
+
+    to: float
+    """Lower end as a ratio of the depth [-]."""
+    density: float
+    friction: float
+    subgrade: float
+    p_0: float
+    p_1: float
+    """Its layer, as of `boulder_kernels.layered.GivenLayer`."""
+    w_0: float
+    w_1: float
+    """As of `OutlinedPieces`."""
+
+
+@exact_kernel
+def fill_outlined_elements(design: Design, layers: np.ndarray, soil: OutlinedElements) -> Lumped:
+    """Give N elements the values of the layers and the width that they lie beside (Eq 145); see `fill_elements`."""
+    elements, outline, d = soil.elements, soil.outline, design.d
+    lumped = fill_elements(design, layers, elements)
+    mass = first = second = K_soil = R_soil = 0.0
+    N = elements.ratio.size
+    m = 0
+    for n in range(N):
+        alpha = elements.ratio[n] * d
+        while m < len(layers) - 1 and (n + 0.5) * d / N >= layers[m, TO]:
+            m += 1
+        width = at_height(outline, WIDTH, d - alpha)
+        share = width / design.W
+        elements.stiffness[n] *= share
+        elements.ultimate[n] *= share
+        elements.drag[n] *= share
+        m_n = layers[m, DENSITY] * width * (d / N) * wedge_slope(layers[m, FRICTION]) * (d - alpha)
+        mass += m_n
+        first += m_n * (d - alpha)
+        second += m_n * (d - alpha) * (d - alpha)
+        K_soil = max(K_soil, elements.stiffness[n] / elements.ratio[n] * N)
+        R_soil = max(R_soil, elements.drag[n] * N)
+    bounds = Bounds(N, K_soil, R_soil, lumped.bounds.x_yield)
+    return Lumped(SoilMass(mass, first, second), bounds, NO_SUMS)
+
+
+class Place(NamedTuple):
+    """How far layers and outline have been cut into pieces: the next layer, and the next piece of the outline."""
+
+    layer: int
+    piece: int
+
+
+@exact_inlined
+def place_at_soil_line(design: Design, outline: np.ndarray) -> Place:
+    """Return where the uppermost piece lies."""
+    return Place(0, piece_at(outline, min(design.d, outline[-1, HEIGHT])))
+
+
+@exact_inlined
+def next_piece(
+    design: Design, layers: np.ndarray, outline: np.ndarray, low: float, at: Place
+) -> tuple[GivenPiece, Place]:
+    """Return the piece that begins at a ratio of the depth, and where the next begins (Eq 145); the last is repeated.
+
+    Parameters
+    ----------
+    design
+        The design, SI; density, friction angle and subgrade reaction of its soil are those of the layers.
+    layers, outline
+        Layers of its soil, shape (M, 6), and the outline of the boulder, shape (P, 4).
+    low
+        Where it begins.
+    at
+        What lies there.
+    """
+    d, last, m, i = design.d, len(layers) - 1, at.layer, at.piece
+    layer_to = min(layers[m, TO] / d, 1.0) if m < last else 1.0
+    piece_to = (d - outline[i, HEIGHT]) / d if i > 0 else 1.0
+    to = max(min(layer_to, piece_to), low)
+    piece = GivenPiece(
+        to,
+        layers[m, DENSITY],
+        layers[m, FRICTION],
+        layers[m, SUBGRADE],
+        layers[m, PRESSURE],
+        layers[m, PRESSURE_SLOPE],
+        on_piece(outline, i, WIDTH, d) / design.W,
+        -slope_of(outline, i, WIDTH) * d / design.W,
+    )
+    m += 1 if m < last and to >= layer_to else 0
+    i -= 1 if i > 0 and to >= piece_to else 0
+    return piece, Place(m, i)
+
+
+@exact_inlined
+def worked_out(design: Design, low: float, given: GivenPiece) -> Piece:
+    """Return a piece of the soil of a design that begins at a ratio of the depth (Eq 145)."""
+    p = given
+    layer = layer_of(design, low, p.to, p.density, p.friction, p.subgrade, p.p_0, p.p_1)
+    return Piece(low, p.to, layer.K, layer.P_0, layer.P_1, layer.R, p.w_0, p.w_1)
+
+
+@exact_inlined
+def lumped_beside(so_far: Lumped, piece: Piece, given: GivenPiece, design: Design) -> Lumped:
+    """Add a piece to what follows from those above it; see `boulder_kernels.layered.lumped_with`."""
+    low, to, d = piece.low, piece.to, design.d
+    mass, first, second = so_far.mass.mass, so_far.mass.first, so_far.mass.second
+    wedge = given.density * design.W * wedge_slope(given.friction)
+    for g in range(3):
+        r = low + NODES[g] * (to - low)
+        z = d * (1.0 - r)
+        slice_ = WEIGHTS[g] * d * (to - low) * wedge * (piece.w_0 + piece.w_1 * r) * z
+        mass += slice_
+        first += slice_ * z
+        second += slice_ * z * z
+    widest = max(piece.w_0 + piece.w_1 * low, piece.w_0 + piece.w_1 * to)
+    at_low = (piece.P_0 / max(low, LEAST_RATIO) + piece.P_1) / piece.K
+    at_to = (piece.P_0 / max(to, LEAST_RATIO) + piece.P_1) / piece.K
+    within, b = low < to, so_far.bounds
+    bounds = Bounds(
+        0,
+        max(b.K_soil, piece.K * widest if within else 0.0),
+        max(b.R_soil, piece.R * widest if within else 0.0),
+        max(b.x_yield, max(at_low, at_to) if within else 0.0),
+    )
+    return Lumped(SoilMass(mass, first, second), bounds, NO_SUMS)
+
+
+@exact_kernel
+def fill_outlined_pieces(design: Design, layers: np.ndarray, soil: OutlinedPieces) -> Lumped:
+    """Cut layers and outline into pieces (Eq 145), and return what follows from them; see `fill_layers`."""
+    so_far, low, at = nothing_lumped(), 0.0, place_at_soil_line(design, soil.outline)
+    for n in range(soil.to.size):
+        given, at = next_piece(design, layers, soil.outline, low, at)
+        piece = worked_out(design, low, given)
+        so_far = lumped_beside(so_far, piece, given, design)
+        soil.to[n], soil.K[n], soil.R[n] = piece.to, piece.K, piece.R
+        soil.P_0[n], soil.P_1[n], soil.w_0[n], soil.w_1[n] = piece.P_0, piece.P_1, piece.w_0, piece.w_1
+        low = piece.to
+    return so_far
+
+
+@array_kernel
+def write_given(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, out: np.ndarray) -> None:
+    """Write what lanes are given of designs beside outlines: the body, and the pieces one after another.
+
+    Parameters
+    ----------
+    designs
+        The designs, SI, shape (15, n).
+    layers, outlines
+        Shape (n, M, 6) and (n, P, 4).
+    out
+        Shape (7 + 8 C, n), of C pieces.
+    """
+    body_size, size = 7, 8
+    for row in range(out.shape[1]):
+        design, outline = design_in(designs, row), outlines[row]
+        body = body_of_outline(design, outline)
+        out[0, row], out[1, row], out[2, row], out[3, row] = body.m_b, body.J, body.x, body.y
+        out[4, row], out[5, row], out[6, row] = body.line, body.foot, body.lean
+        low, at = 0.0, place_at_soil_line(design, outline)
+        for n in range((len(out) - body_size) // size):
+            p, at = next_piece(design, layers[row], outline, low, at)
+            first = body_size + n * size
+            out[first, row], out[first + 1, row], out[first + 2, row] = p.to, p.density, p.friction
+            out[first + 3, row], out[first + 4, row], out[first + 5, row] = p.subgrade, p.p_0, p.p_1
+            out[first + 6, row], out[first + 7, row] = p.w_0, p.w_1
+            low = p.to
+
+
+def given_beside(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, count: int) -> np.ndarray:
+    """Return designs as rows of a table for lanes, and below them what is given, shape (22 + 8 count, n).
+
+    Arguments: see `write_given`.
+    """
+    out = np.empty((len(Body._fields) + len(GivenPiece._fields) * count, designs.shape[1]))
+    write_given(np.ascontiguousarray(designs), layers, outlines, out)
+    return np.concatenate([designs, out])
+
+
+@functools.cache
+def constants_beside(count: int) -> Callable[..., Any]:
+    """Return a function that gives the constants of a design beside as many pieces as given; 0 for `TaperedSoil`.
+
+    Its arguments are design, readings and the body and a tuple of `GivenPiece`; what it does is written out.
+    """
+    lines = ["def constants(design, readings, given):", "body, pieces = given", "so_far = nothing_lumped()"]
+    for n in range(max(count, 1)):
+        low = f"piece_{n - 1}.to" if n else "0.0"
+        lines.append(f"piece_{n} = worked_out(design, {low}, pieces[{n}])")
+        lines.append(f"so_far = lumped_beside(so_far, piece_{n}, pieces[{n}], design)")
+    fields = ", ".join(f"c.{name}" for name in Constants._fields)
+    soil = f"FewPieces(lean, ({''.join(f'piece_{n}, ' for n in range(count))}))"
+    tapered = "TaperedPiece(piece_0.K, piece_0.R, piece_0.P_1 / piece_0.K, piece_0.w_0, piece_0.w_1)"
+    lines += [
+        "b = so_far.bounds",
+        "c = constants_with(design, body, readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)",
+        "lean = Lean(lean_with(body, design, readings.restoring_gravity))",
+        f"return Record({fields}, {soil if count else f'TaperedSoil(lean, ({tapered},))'})",
+    ]
+    known = (nothing_lumped, worked_out, lumped_beside, constants_with, lean_with, Lean)
+    names = {function.__name__: function for function in (*known, FewPieces, TaperedSoil, TaperedPiece)}
+    function = function_of("\n ".join(lines), Record=LayeredConstants, **names)
+    function.__module__ = __name__
+    return exact_inlined(function)
+
+
+def is_outlined(soil: Any) -> bool:
+    """Whether a record of the soil, or its Numba type, is that beside an outline."""
+    return getattr(soil, "instance_class", type(soil)) in RECORDS
+
+
+def with_outline(soil: Any, outline: np.ndarray) -> Any:
+    """Return a record of the soil, to be filled anew, beside another outline."""
+    return soil._replace(outline=outline)
+
+
+@overload(with_outline)
+def _with_outline(soil: Any, outline: Any) -> Callable[..., Any]:
+    values = ", ".join(f"soil.{name}" for name in soil.instance_class._fields[:-1])
+    return function_of(
+        f"def with_outline(soil, outline):\n return Record({values}, outline)", Record=soil.instance_class
+    )
+
+
+def body_beside(design: Design, soil: Any) -> Body:
+    """Return the boulder beside a record of the soil: of its outline, or the box of the design."""
+    return body_of_outline(design, soil.outline) if is_outlined(soil) else body_of_box(design)
+
+
+@overload(body_beside)
+def _body_beside(design: Any, soil: Any) -> Callable[..., Body]:
+    if is_outlined(soil):
+        return lambda design, soil: body_of_outline(design, soil.outline)
+    return lambda design, soil: body_of_box(design)
+
+
+@exact_inlined
+def lean_with(body: Body, design: Design, gravity: bool) -> float:
+    """Return D over the depth [N] (Eq 144), where the restoring moment is the couple of the weight, or else 0."""
+    return body.m_b * G * body.lean / design.d if gravity else 0.0
+
+
+def keep_lean(body: Body, design: Design, gravity: bool, soil: Any) -> None:
+    """Keep what the weight adds beside the soil."""
+    if is_outlined(soil):
+        soil.lean[0] = lean_with(body, design, gravity)
+
+
+@overload(keep_lean)
+def _keep_lean(body: Any, design: Any, gravity: Any, soil: Any) -> Callable[..., None]:
+    if not is_outlined(soil):
+        return lambda body, design, gravity, soil: None
+
+    def keep(body: Body, design: Design, gravity: bool, soil: Any) -> None:
+        """Keep it."""
+        soil.lean[0] = lean_with(body, design, gravity)
+
+    return keep
+
+
+def _soil_in(c: Any) -> Any:
+    """Return the record of the soil of constants or of their Numba type; None of uniform soil."""
+    if hasattr(c, "instance_class"):
+        names = c.instance_class._fields
+        return c[names.index("soil")] if "soil" in names else None
+    return getattr(c, "soil", None)
+
+
+LIFT = "c.C_cos * abs(sin) + c.C_sin * versin"
+
+
+def lift_of(sin: float, versin: float, c: Constants) -> float:
+    """Return the energy of the weight, lifted by a rotation with this sine and versine [J] (Eqs 37-39, 144)."""
+    lift = c.C_cos * abs(sin) + c.C_sin * versin
+    soil = _soil_in(c)
+    return float(lift + soil.lean[0] * c.d * sin if is_outlined(soil) else lift)
+
+
+@overload(lift_of)
+def _lift_of(sin: Any, versin: Any, c: Any) -> Callable[..., float]:
+    more = " + c.soil.lean[0] * c.d * sin" if is_outlined(_soil_in(c)) else ""
+    return function_of(f"def lift_of(sin, versin, c):\n return {LIFT}{more}")
+
+
+def least_couple(c: Constants) -> float:
+    """Return the lesser of the moments of the weight about the ends of the foot [N m]; they differ by 2 D (Eq 144)."""
+    soil = _soil_in(c)
+    return float(c.C_cos - abs(soil.lean[0]) * c.d if is_outlined(soil) else c.C_cos)
+
+
+@overload(least_couple)
+def _least_couple(c: Any) -> Callable[..., float]:
+    less = " - abs(c.soil.lean[0]) * c.d" if is_outlined(_soil_in(c)) else ""
+    return function_of(f"def least_couple(c):\n return c.C_cos{less}")
+
+
+def empty_outlined(pieces: int, elements: int, outline: np.ndarray) -> OutlinedPieces | OutlinedElements:
+    """Return a soil to fill beside an outline: N elements, or where N is 0 as many pieces as given."""
+    if elements > 0:
+        return OutlinedElements(SoilElements(*np.empty((4, elements))), np.zeros(1), outline)
+    to, K, P_0, P_1, R, w_0, w_1 = np.empty((7, pieces))
+    return OutlinedPieces(to, K, P_0, P_1, R, w_0, w_1, np.zeros(1), outline)
