@@ -12,8 +12,9 @@ from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3
+from boulder_sweep.settings.model import FOOT_WORDS
 from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.stones.rock import ROCK_KG_M3
 
 if TYPE_CHECKING:
     import pyarrow as pa

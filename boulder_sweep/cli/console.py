@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
-from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES, ROCK_KG_M3
+from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:

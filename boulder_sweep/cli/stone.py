@@ -25,6 +25,7 @@ from boulder_sweep.cli.options import (
 )
 from boulder_sweep.cli.output import say, show
 from boulder_sweep.cli.progress import kernels_for, working
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ Examples:
 @click.command("stone", short_help="Volume, mass, foot and profile of a scanned stone.", epilog=EXAMPLES)
 @click.argument("rock", type=click.Path())
 @click.argument("site", type=click.Path(), required=False)
-@click.option("--mass", metavar="'18.2 t'", help="Mass of the whole stone [default: rock of 2650 kg/m³].")
+@click.option("--mass", metavar="'18.2 t'", help=f"Mass of the whole stone [default: rock of {ROCK_KG_M3:g} kg/m³].")
 @click.option("--unit", default="m", metavar="UNIT", help="Unit of the scan: m, mm, cm, in or ft [m].")
 @click.option("--up", metavar="END", help="End that is up, for a block of settings: a, -a, b, -b, c, -c, x, ...")
 @click.option("--facing", metavar="END", help="End that faces the vehicle, with --up.")

@@ -45,8 +45,9 @@ from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
-from boulder_sweep.settings.model import ROCK_KG_M3, Model, ReadingChoice, SolverSettings
+from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
 from boulder_sweep.soils import plain
+from boulder_sweep.stones.rock import ROCK_KG_M3
 
 __all__ = ["Trajectory", "simulate"]
 

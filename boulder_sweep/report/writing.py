@@ -22,9 +22,10 @@ from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
 from boulder_sweep.report.sentences import Named
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
-from boulder_sweep.settings.model import FOOT_WORDS, ROCK_KG_M3, SolverSettings, completed
+from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system
 from boulder_sweep.settings.site_data import derived_words
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
 from boulder_sweep.text import counted, printable, why

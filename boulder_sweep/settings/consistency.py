@@ -9,8 +9,9 @@ from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import MOST_SOLIDITY
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
-from boulder_sweep.settings.model import ROCK_KG_M3, UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
+from boulder_sweep.settings.model import UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
 from boulder_sweep.settings.shape import Shape
+from boulder_sweep.stones.rock import ROCK_KG_M3
 
 SLIDES = "or the ground slides"
 """What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""

@@ -16,10 +16,11 @@ from boulder_sweep.settings import fields
 from boulder_sweep.settings.consistency import check_complete, check_pairs
 from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
-from boulder_sweep.settings.model import ROCK_KG_M3, Criterion, Model, SolverSettings
+from boulder_sweep.settings.model import Criterion, Model, SolverSettings
 from boulder_sweep.settings.overrides import apply_overrides
 from boulder_sweep.settings.problems import ProblemList, SettingsError, check_regular_file, reason_of, refuse, shorten
 from boulder_sweep.settings.tree import Mapping, Scalar, parse
+from boulder_sweep.stones.rock import ROCK_KG_M3
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.sweep import Axis, Sweep

@@ -42,8 +42,6 @@ FOOT_WORDS = {
     "rounded": "foot: rounded (boulder.foot), which is not modelled",
 }
 """What every answer says of it."""
-ROCK_KG_M3 = 2650.0
-"""Density of the rock that is assumed where only the mass of a boulder is given: that of granite and most others."""
 
 
 UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")

@@ -12,9 +12,9 @@ from boulder_sweep import elementary
 from boulder_sweep.columns import BOULDER_MASS, WAY_OUT
 from boulder_sweep.designs import LEAST_SOLIDITY, SIDES
 from boulder_sweep.settings.fields import BY_NAME, Field
-from boulder_sweep.settings.model import ROCK_KG_M3
 from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.problems import Position, Problem
+from boulder_sweep.stones.rock import ROCK_KG_M3
 
 if TYPE_CHECKING:
     from boulder_sweep.settings.model import Model

@@ -6,6 +6,8 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any
 
+from boulder_sweep.stones.rock import is_flat
+
 
 @dataclass(frozen=True, slots=True)
 class ProfilePoint:
@@ -27,8 +29,6 @@ class ProfilePoint:
     far: float
 
 
-LEAST_FOOT = 0.5
-"""A foot that is shorter or narrower than this share of the largest section counts as rounded."""
 BOX = (ProfilePoint(0.0, 1.0, 0.5, 0.5), ProfilePoint(1.0, 1.0, 0.5, 0.5))
 
 
@@ -55,7 +55,7 @@ class Shape:
         if not self.points:
             return True
         foot, longest = self.points[0], max(point.near + point.far for point in self.points)
-        return foot.width >= LEAST_FOOT and foot.near + foot.far >= LEAST_FOOT * longest
+        return is_flat(foot.width, 1.0) and is_flat(foot.near + foot.far, longest)
 
     @property
     def filled(self) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.stones.fitting import Profile, fitted, sides_of
+from boulder_sweep.stones.rock import LEAST_FOOT, is_flat
 from boulder_sweep.stones.sections import Sections, doubled_share, sections_of
 
 if TYPE_CHECKING:
@@ -34,8 +35,6 @@ FINE_HULL = 1500
 """Faces of a convex hull up to which all are tried as sides of the box; beyond, one in every direction."""
 SECTIONS = 128
 """Sections over the height to which a profile is fitted."""
-LEAST_FOOT = 0.5
-"""Least length and width of a foot as a share of those of the largest section: shorter ones count as rounded."""
 MOST_CUT = 0.25
 """Largest part of the height that is cut off to get a foot."""
 CUT_STEP_M = 0.01
@@ -99,13 +98,13 @@ def is_firm(profile: Profile) -> bool:
     """Return whether a foot reaches far enough out before and behind the centre of mass."""
     x = profile.centre[0]
     reach = min(profile.near[0] + x, profile.far[0] - x)
-    return bool(reach >= 0.5 * LEAST_FOOT * profile.length.max() * (1.0 - 1e-9))
+    return is_flat(2.0 * float(reach), float(profile.length.max()))
 
 
 def has_foot(profile: Profile) -> bool:
-    """Return whether the foot of a profile is long and wide enough to count as flat."""
-    sides = (profile.length, profile.width)
-    return all(side[0] >= LEAST_FOOT * side.max() * (1.0 - 1e-9) for side in sides)
+    """Return whether the foot of a profile is long and wide enough to count as flat, also as printed in millimetres."""
+    printed = np.round(profile.near, 3) + np.round(profile.far, 3), np.round(profile.width, 3)
+    return all(is_flat(side[0], side.max()) for side in (profile.length, profile.width, *printed))
 
 
 class Stone:

@@ -10,11 +10,10 @@ from typing import Any
 
 from boulder_sweep.drawing import draw
 from boulder_sweep.stones.reading import read_scan
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.stones.solid import solid_of
 from boulder_sweep.stones.standing import Standing, Stone
 
-ROCK_KG_M3 = 2650.0
-"""Density that is assumed where none is known."""
 POINT = ("height_m", "width_m", "near_m", "far_m")
 """Entries of a point of a profile."""
 USUAL_ROCK_KG_M3 = (2000.0, 3300.0)

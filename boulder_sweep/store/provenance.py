@@ -38,8 +38,9 @@ _DECIDING_SOURCES = (
     "soils.py",
     "judge/*.py",
     *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "notes", "shape")),
+    "stones/rock.py",
 )
-"""Modules, in addition to the kernels, whose code determines the rows: of the settings those that the others import."""
+"""Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
 
 
 def canonical(content: Any) -> str:

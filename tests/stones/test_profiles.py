@@ -7,8 +7,9 @@ import pytest
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.stones.fitting import MOST_PIECES, fitted, sides_of
+from boulder_sweep.stones.rock import LEAST_FOOT
 from boulder_sweep.stones.sections import doubled_share, sections_of
-from boulder_sweep.stones.standing import LEAST_FOOT, MOST_CUT, Stone
+from boulder_sweep.stones.standing import MOST_CUT, Stone, has_foot
 from tests.stones.shapes import box, cylinder, frustum, rock, solid, sphere, stone
 from tests.stones.test_solid import moved
 
@@ -160,6 +161,17 @@ def test_a_point_that_no_cut_makes_a_foot():
     assert not own.has_foot
     assert own.cut_m == 0.0
     assert LEAST_FOOT > MOST_CUT, "a cone has half its width at half its height"
+
+
+@pytest.mark.parametrize(("foot", "enough"), [(1.0020, True), (1.0008, False), (0.9990, False)])
+def test_a_foot_is_judged_as_it_is_printed_too(foot, enough):
+    """Just half of the largest section, and not so any more in whole millimetres."""
+    profile = dataclasses.replace(
+        stone(box(2.0, 2.0, 2.0)).standing("z", "x").profile,
+        near=np.array([0.5 * foot, 1.0006]),
+        far=np.array([0.5 * foot, 1.0006]),
+    )
+    assert has_foot(profile) is enough
 
 
 @pytest.mark.parametrize("seed", range(3))
