@@ -310,7 +310,7 @@ def soil_words(data: dict[str, Any]) -> str:
     if "subgrade_reaction_MN_m3" in data:
         beta, cov = data["subgrade_reaction_MN_m3"], data["subgrade_reaction_cov"]
         parts.append(f"subgrade reaction {beta:.3g} MN/m^3, cov {100.0 * cov:.0f} %, which follows the angle (API)")
-    return "; ".join(parts) or "every constant is given beside these readings, and counts"
+    return "; ".join(parts) or "the readings are not used: the file gives every constant"
 
 
 def _reading_words(reading: dict[str, float]) -> str:
