@@ -91,7 +91,7 @@ def test_what_is_measured_wins(soil):
     assert soil(RAW, "soil.friction_angle=35 deg").constants[ANGLE] == 35.0
     every = soil(f"{RAW}\n{CONSTANTS}")
     assert every.distributions == {}
-    assert "every constant is given" in derived_words(every.derived)[0]
+    assert "the file gives every constant" in derived_words(every.derived)[0]
 
 
 def test_a_measured_density_is_that_of_the_stress(soil):
