@@ -115,6 +115,34 @@ def read_single(node: Node, field: Field) -> float:
     return value
 
 
+def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
+    """Return the single values of a block by the names of its fields.
+
+    Raises
+    ------
+    LeafError
+        With every mistake in it: no block, an unknown key, a wrong value.
+    """
+    keys = ", ".join(known)
+    if not isinstance(node, Mapping) or node.unit is not None:
+        raise LeafError([Mistake(node.position, f"{what} must be a block of keys: {keys}")])
+    values: dict[str, float] = {}
+    mistakes: list[Mistake] = []
+    for entry in node:
+        field = known.get(entry.key)
+        if field is None:
+            hint = did_you_mean(entry.key, tuple(known))
+            mistakes.append(Mistake(entry.position, f"'{shorten(entry.key)}' is not a key of {what} ({keys}){hint}"))
+            continue
+        try:
+            values[field.name] = read_single(entry.value, field)
+        except LeafError as error:
+            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
+    if mistakes:
+        raise LeafError(mistakes)
+    return values
+
+
 def sample_of(field: Field) -> str:
     """Return the value that a message about an entry suggests: its default; empty where it has none."""
     return "" if field.default is None else describe(field.default, field.unit)

@@ -16,9 +16,8 @@ import numpy as np
 from boulder_sweep import investigation as sand
 from boulder_sweep.approach import Approach, NoApproachError
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
+from boulder_sweep.settings.leaf import LeafError, Mistake, read_block, read_single
 from boulder_sweep.settings.model import Bound, Field
-from boulder_sweep.settings.problems import did_you_mean, shorten
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 APPROACH = "approach"
@@ -101,34 +100,6 @@ def read_approach(node: Node) -> Approach:
         message = f"reaches {speed:.4g} m/s; more than 100 m/s (360 km/h) is not admitted"
         raise LeafError([Mistake(node.position, message)])
     return approach
-
-
-def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
-    """Return the single values of a block by the names of its fields.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in it: no block, an unknown key, a wrong value.
-    """
-    keys = ", ".join(known)
-    if not isinstance(node, Mapping) or node.unit is not None:
-        raise LeafError([Mistake(node.position, f"{what} must be a block of keys: {keys}")])
-    values: dict[str, float] = {}
-    mistakes: list[Mistake] = []
-    for entry in node:
-        field = known.get(entry.key)
-        if field is None:
-            hint = did_you_mean(entry.key, tuple(known))
-            mistakes.append(Mistake(entry.position, f"'{shorten(entry.key)}' is not a key of {what} ({keys}){hint}"))
-            continue
-        try:
-            values[field.name] = read_single(entry.value, field)
-        except LeafError as error:
-            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
-    if mistakes:
-        raise LeafError(mistakes)
-    return values
 
 
 def approach_data(approach: Approach) -> dict[str, Any]:
@@ -366,7 +337,7 @@ def unfold_soils(root: Mapping, listed: Collection[str]) -> tuple[list[Mistake],
             data.append(({"name": name.text.strip()} if isinstance(name, Scalar) else {}) | found)
         for key in given[1:]:
             del soil.entries[key]
-        replace_entry(soil, given[0], _soil_entries(entry, found))
+        soil.replace(given[0], _soil_entries(entry, found))
     return mistakes, data
 
 
@@ -446,7 +417,7 @@ def unfold_approaches(root: Mapping) -> tuple[list[Mistake], list[dict[str, Any]
         name = vehicle.get("name")
         data.append(({"name": name.text.strip()} if isinstance(name, Scalar) else {}) | approach_data(approach))
         speed = Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s")
-        replace_entry(vehicle, APPROACH, [Entry(SPEED, entry.position, speed)])
+        vehicle.replace(APPROACH, [Entry(SPEED, entry.position, speed)])
     return mistakes, data
 
 
@@ -456,11 +427,3 @@ def blocks_of(root: Mapping, section: str) -> Iterator[Mapping]:
     for one in node.items if isinstance(node, Sequence) else [node]:
         if isinstance(one, Mapping):
             yield one
-
-
-def replace_entry(block: Mapping, key: str, new: list[Entry]) -> None:
-    """Put entries in the place of one."""
-    entries: dict[str, Entry] = {}
-    for entry in block:
-        entries |= {one.key: one for one in new} if entry.key == key else {entry.key: entry}
-    block.entries = entries

@@ -96,6 +96,13 @@ class Mapping:
         entry = self.entries.get(key)
         return None if entry is None else entry.value
 
+    def replace(self, key: str, new: list[Entry]) -> None:
+        """Put entries in the place of one."""
+        entries: dict[str, Entry] = {}
+        for entry in self:
+            entries |= {one.key: one for one in new} if entry.key == key else {entry.key: entry}
+        self.entries = entries
+
 
 Node = Scalar | Sequence | Mapping
 

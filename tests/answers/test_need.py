@@ -138,9 +138,10 @@ def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
     assert found.reason == "overturns"
 
 
-def test_what_is_not_monotone_is_said_with_all_that_passes() -> None:
+@pytest.mark.parametrize("count", [150, pytest.param(300, marks=pytest.mark.nightly)])
+def test_what_is_not_monotone_is_said_with_all_that_passes(count: int) -> None:
     """Hardly buried, a boulder may slide less than is allowed; deeper it turns over; deeper still it is held."""
-    found = need(random_designs(150), between=("0.05 m", "1.2 m"))
+    found = need(random_designs(count), between=("0.05 m", "1.2 m"))
     frame = found.frame[found.frame.found == "not_monotone"]
     assert len(frame) >= 10
     rows, inside, outside = [], [], []

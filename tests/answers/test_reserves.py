@@ -30,10 +30,10 @@ def passes(frame: pd.DataFrame, **inputs: np.ndarray) -> np.ndarray:
     return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS
 
 
-@pytest.fixture(scope="module")
-def reserves_of_many() -> pd.DataFrame:
+@pytest.fixture(scope="module", params=[240, pytest.param(400, marks=pytest.mark.nightly)])
+def reserves_of_many(request: pytest.FixtureRequest) -> pd.DataFrame:
     """What random designs withstand."""
-    return reserves(random_designs(240)).frame
+    return reserves(random_designs(request.param)).frame
 
 
 def with_constants(sweep: Sweep, **values: float) -> Sweep:

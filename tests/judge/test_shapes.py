@@ -19,7 +19,10 @@ from boulder_sweep.soils import SLICES, outlines_of, width_capped, with_soil
 from tests.judge.plain import plain_designs
 
 RWG = Path(__file__).parents[2] / "configs" / "rwg.yaml"
-LEANING = "[{height: 0, width: 1.5, length: 1.5}, {height: 1.6, width: 1.8, near: 0.9, far: 0.8}, {height: 3.44, width: 1.5, near: 0.8, far: 0.5}]"  # noqa: E501
+LEANING = (
+    "[{height: 0, width: 1.5, length: 1.5}, {height: 1.6, width: 1.8, near: 0.9, far: 0.8}, "
+    "{height: 3.44, width: 1.5, near: 0.8, far: 0.5}]"
+)
 
 
 def shaped(tmp_path: Path, entry: str, *more: str) -> Sweep:

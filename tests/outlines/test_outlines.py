@@ -159,9 +159,9 @@ def test_the_weight_of_a_crooked_boulder_turns_about_the_ends_of_its_foot():
         assert lift_of(sin, versin, c) == pytest.approx(weight * (arm * np.sin(theta) - known.z * versin), rel=1e-12)
 
 
+@pytest.mark.parametrize("elements", [60, pytest.param(300, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_whole_impacts_are_those_of_the_oracle(shape):
-    elements = 60
+def test_whole_impacts_are_those_of_the_oracle(shape, elements):
     outline = SHAPES[shape](RWG)
     known = outlined_oracle.simulate(stone_of(outline), oracle.RWG, 0.45, elements)
     assert known.imbalance < 1e-7
