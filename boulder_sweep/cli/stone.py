@@ -125,13 +125,14 @@ def _place(
     """Find and print the best ways to stand at a site; return the exit code."""
     from boulder_sweep.answers.placing import boulder_block, placed
 
+    said = True
+
     def with_boulder(block: str) -> Sweep:
         """Return the site with a boulder; what is to be said of it is said once."""
         nonlocal said
         said, silent = True, quiet or said
         return take_values(load_sweep(site, (*overrides, block), silent), at, silent)
 
-    said = True
     first = next((own for own in (found.standings if chosen is None else (chosen,)) if own.has_foot), None)
     if first is None:
         raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")
