@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def draw_stone(found: ScannedStone, path: str | Path) -> None:
     ]
     with figure(path, 3 * PANEL_IN, 2 * PANEL_IN + 0.9) as fig:
         panels = list(fig.subplots(2, 3).flat)
-        _same_scale(panels, shown)
+        _same_scale(panels, _view_of(shown, [0.0] * len(shown)))
         for axes, own in zip(panels, shown, strict=True):
             draw_standing(axes, own)
             foot = f"cut {own.cut_m:.2f} m" if own.cut_m else "no cut"
@@ -75,16 +75,16 @@ def draw_placing(placing: Placing, path: str | Path) -> None:
     best = placing.passing[: placing.shown]
     if not best:
         raise PictureError("no way to stand passes at any depth, so there is nothing to draw")
-    depth_m = max(way.depth_m or 0.0 for way in best)
-    with figure(path, len(best) * PANEL_IN, PANEL_IN + 1.1) as fig:
+    view = _view_of([way.standing for way in best], [way.depth_m or 0.0 for way in best])
+    with figure(path, len(best) * PANEL_IN, view.height_in + 1.3) as fig:
         panels = list(np.atleast_1d(fig.subplots(1, len(best))))
-        _same_scale(panels, [way.standing for way in best], depth_m)
+        _same_scale(panels, view)
         for axes, way in zip(panels, best, strict=True):
             own, ground_m = way.standing, way.depth_m or 0.0
             axes.axhspan(axes.get_ylim()[0], 0.0, facecolor=STYLES["soil"].fill, edgecolor="none", zorder=0)
             axes.axhline(0.0, color=STYLES["wedge"].line, linewidth=1.2, zorder=1)
             draw_standing(axes, own, ground_m)
-            axes.set_title(f"{own.up} up, {own.facing} to the vehicle: {ground_m:.2f} m deep")
+            axes.set_title(f"{own.up} up, {own.facing} to the vehicle:\n{ground_m:.3f} m deep")
         headline(fig, f"{placing.found.file}: {placing.found.mass_kg / 1e3:.3g} t")
         caption(
             fig,
@@ -109,14 +109,31 @@ def draw_standing(axes: Axes, own: Standing, ground_m: float = 0.0) -> None:
     axes.plot(own.centre[0], own.centre[1] - ground_m, "o", color=BLACK, markersize=4.0)
 
 
-def _same_scale(panels: Sequence[Axes], shown: Sequence[Standing], ground_m: float = 0.0) -> None:
-    """Give all panels one scale, with room for the largest stone; heights count from the ground."""
-    left = max(float(own.outline[:, 1].max()) for own in shown) + ROOM_M
-    right = max(float(own.outline[:, 2].max()) for own in shown) + ROOM_M
-    low = min(float(own.outline[:, 0].min()) for own in shown) - ROOM_M
-    high = max(float(own.outline[:, 0].max()) for own in shown) + ROOM_M
+class View(NamedTuple):
+    """What the panels of a picture show [m]; heights count from the ground."""
+
+    left: float
+    right: float
+    low: float
+    high: float
+
+    @property
+    def height_in(self) -> float:
+        """Height of a panel."""
+        return PANEL_IN * (self.high - self.low) / (self.right - self.left)
+
+
+def _view_of(shown: Sequence[Standing], grounds_m: Sequence[float]) -> View:
+    """Return a view with room for the largest stone; the ground is at these heights over the feet."""
+    outlines = [own.outline - (ground_m, 0.0, 0.0) for own, ground_m in zip(shown, grounds_m, strict=True)]
+    (low, _, _), (high, near, far) = (of(np.concatenate(outlines), axis=0) for of in (np.min, np.max))
+    return View(-near - ROOM_M, far + ROOM_M, low - ROOM_M, high + ROOM_M)
+
+
+def _same_scale(panels: Sequence[Axes], view: View) -> None:
+    """Give all panels one view."""
     for axes in panels:
-        axes.set_xlim(-left, right)
-        axes.set_ylim(low - ground_m, high)
+        axes.set_xlim(view.left, view.right)
+        axes.set_ylim(view.low, view.high)
         axes.set_aspect("equal")
         axes.tick_params(colors=GREY, labelsize=7.5)
