@@ -19,6 +19,7 @@ from docs.studies import (
     gallery,
     moves,
     scale,
+    shapes,
     site_data,
     soil,
     stones,
@@ -303,6 +304,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
     "published-spreads": answers.published_spreads,
+    "stone-shapes": lambda root: shapes.shapes_table(root / GRID).markdown(),
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
     "stone-site": stones.site_of_example,
@@ -320,6 +322,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
 LONG = {
     *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
     *(name for name in CONTENTS if name.startswith("forms-")),
-    *("wild-families", "uncertainty-cases", "moves", "partial-factors"),
+    *("wild-families", "uncertainty-cases", "moves", "partial-factors", "stone-site"),
 }
 """Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""

@@ -24,6 +24,7 @@ from docs.studies.gallery import draw_sites
 from docs.studies.knife_edge import draw_knife_edge
 from docs.studies.readings import readings_study
 from docs.studies.readings_plot import draw_readings
+from docs.studies.shapes import draw_shapes
 from docs.studies.stones import example_stone
 
 FOLDER = Path("docs/images")
@@ -65,6 +66,7 @@ def draw_all(root: Path) -> list[Path]:
     need(load(root / SITE), both_readings=True).plot(named("design_chart.png"))
     draw_knife_edge(named("knife_edge.png"))
     example_stone(root).plot(named("stone.png"))
+    draw_shapes(named("shapes.png"))
     with tempfile.TemporaryDirectory() as scratch:
         pulse = Path(scratch) / "pulse.csv"
         pulse.write_text(example_pulse(), encoding="utf-8")
