@@ -152,7 +152,8 @@ def _place(
 
 def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]:
     """Return the ways to stand at a site, the one of least depth first, and a block of settings for that one."""
-    from boulder_sweep.answers.printing import table_lines
+    from boulder_sweep.answers.printing import grade_lines, table_lines
+    from boulder_sweep.judge.validity import NOT_A_RATING
 
     passing = result.passing
     cases = "" if result.cases == 1 else f", in the worst of {result.cases} combinations of soil and vehicle"
@@ -191,6 +192,8 @@ def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
         "above: height over the ground; mass: of what is left after the cut",
         *rest,
+        *grade_lines(way.row for way in passing),
+        f"an answer is {NOT_A_RATING}",
         "",
         "# the best of these, for the settings file in place of its boulder",
         "boulder:",

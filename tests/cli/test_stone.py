@@ -15,7 +15,7 @@ from boulder_sweep.stones.weighing import scanned
 from tests.stones.shapes import box, frustum, sphere, written
 
 ROOT = Path(__file__).parents[2]
-ROCK, SITE = ROOT / "docs" / "examples" / "rock.ply", ROOT / "configs" / "site.yaml"
+ROCK, SITE_FILE = ROOT / "docs" / "examples" / "rock.ply", ROOT / "configs" / "site.yaml"
 
 
 @pytest.fixture
@@ -171,20 +171,21 @@ def test_what_is_refused(sweep, block, words, message):
 
 @pytest.fixture(scope="module")
 def placed_at_a_site():
-    """Place the example at the site of the configs, one soil, two ends up."""
+    """Place the example at the site of the configs, in one soil, with three of its ends up."""
     found = scanned(ROCK, mass_kg=23_500.0)
-    ways = tuple(found.stone.standing(*way) for way in (("a", "b"), ("c", "a"), ("c", "-a")))
-    return placed(found, lambda boulder: load(SITE, [boulder, "soil.friction_angle=40 deg"]), ways)
+    ways = tuple(found.stone.standing(*way) for way in (("a", "b"), ("-a", "-c"), ("c", "b")))
+    return placed(found, lambda boulder: load(SITE_FILE, [boulder, "soil.friction_angle=40 deg"]), ways)
 
 
 def test_a_stone_at_a_site_is_asked_for_its_least_depth(placed_at_a_site):
     """Every depth is that which `need` finds for the block of settings of that way."""
     found = placed_at_a_site
     assert len(found.ways) + found.rounded == 3
+    assert len(found.passing) == 2
     depths = [way.depth_m for way in found.passing]
     assert depths == sorted(depths)
     for way in found.passing:
-        sweep = load(SITE, [boulder_block(found.found, way.standing), "soil.friction_angle=40 deg"])
+        sweep = load(SITE_FILE, [boulder_block(found.found, way.standing), "soil.friction_angle=40 deg"])
         assert need(sweep).arrow["least_embedment_depth_m"].to_pylist() == [way.depth_m]
 
 
@@ -193,7 +194,7 @@ def test_the_block_of_the_best_way_is_taken(placed_at_a_site, sweep, tmp_path, m
     text = "\n".join(placing_lines(placed_at_a_site, str(tmp_path / "rock.ply"), "m", str(tmp_path / "site.yaml")))
     assert "at " in text
     (tmp_path / "rock.ply").write_bytes(ROCK.read_bytes())
-    site = SITE.read_text(encoding="utf-8").replace("[36, 40] deg", "40 deg")
+    site = SITE_FILE.read_text(encoding="utf-8").replace("[36, 40] deg", "40 deg")
     before, after = site.index("boulder:"), site.index("soil:")
     block = text[text.index("boulder:") :]
     (tmp_path / "site.yaml").write_text(site[:before] + block + "\n\n" + site[after:], encoding="utf-8")
@@ -208,7 +209,7 @@ def test_a_picture_of_the_best_ways(placed_at_a_site, tmp_path):
 
 
 def test_a_site_needs_a_mass(sweep, block):
-    code, _, err = sweep("stone", block, str(SITE))
+    code, _, err = sweep("stone", block, str(SITE_FILE))
     assert code == 2
     assert "at a site the stone must be weighed: give --mass" in err
     code, _, err = sweep("stone", block, "--margin", "10%")
