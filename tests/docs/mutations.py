@@ -196,7 +196,7 @@ MUTATIONS = (
         (147,), _OUTLINED, "first += WEIGHTS[g] * length * pressed * r", "first += WEIGHTS[g] * length * pressed * low"
     ),
     Mutation((147,), _OUTLINED, "total - linear - P_2 * piece.w_0 * math.log", "total - P_2 * piece.w_0 * math.log"),
-    Mutation((147,), _OUTLINED, "piece.w_0 * x.S_2 + piece.w_1 * x.S_3", "piece.w_0 * x.S_2 + piece.w_1 * x.S_2"),
+    Mutation((147,), _OUTLINED, "piece.w_1 * x.S_3) + R", "piece.w_1 * x.S_2) + R"),
     Mutation((147,), _OUTLINED, "piece.w_0 * D_1 + piece.w_1 * D_2", "piece.w_0 * D_1 + piece.w_1 * D_1"),
     Mutation((147,), _OUTLINED, "slope_x, x.y, first, last, 1)", "slope_x, x.y, first, last, 0)"),
 )
