@@ -48,7 +48,9 @@ from boulder_sweep.settings.notes import (
     terzaghi_curve,
 )
 from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, describe, needed
+from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
+from boulder_sweep.soils import SLICES, is_layered
 from boulder_sweep.views.wording import REASON_WORDS
 
 OUTCOME_WORDS = {
@@ -71,6 +73,10 @@ REFUSED_AT = (
     *("vehicle_second_spring_N_m", "boulder_mass_kg"),
 )
 """The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`."""
+FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
+"""Sides that the reader cannot change where the boulder is a stone with a profile of its own."""
+OF_THE_PAGE = {"L": "reach_m", "bed_offset": "bed_offset_m"}
+"""Where the page has its own names for what the verdict takes: a boulder reaches from where it is struck."""
 ANGLES = np.arange(20.0, 61.0)
 """Friction angles [deg] at which the page knows which soil constants belong together."""
 
@@ -86,9 +92,10 @@ def page_data(
     units: str,
 ) -> dict[str, Any]:
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
-    ground = Ground.of_dict(settings["model"].get("ground", {}))
+    ground, shape = Ground.of_dict(settings["model"].get("ground", {})), shape_of(settings)
+    law = settings["model"].get("resistance", RESISTANCES[0])
     simulated = control._replace(elements=min(control.elements, MOST_ELEMENTS))
-    simulated = simulated._replace(paired=is_paired(readings, simulated, layered=not ground.is_proportional))
+    simulated = simulated._replace(paired=is_paired(readings, simulated, layered=is_layered(law, ground, shape)))
     return {
         "title": title,
         "units": units,
@@ -105,7 +112,7 @@ def page_data(
             if spec.name in OUTCOME_WORDS
         ],
         "start": dict(start),
-        "resistance": settings["model"].get("resistance", RESISTANCES[0]),
+        "resistance": law,
         "ground": {**ground.as_dict(), "is_proportional": ground.is_proportional, "water_kg_m3": WATER_KG_M3},
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": [*zip(REASONS, REFUSED_AT, strict=True)],
@@ -118,7 +125,11 @@ def page_data(
             "short": SHORT_OF_FRONT,
         },
         "boulder": {
-            "flat_foot": float(settings["model"]["foot"] == FEET[0]),
+            "flat_foot": float(settings["model"]["foot"] == FEET[0] and shape.stands_flat),
+            "profile": [] if shape.is_box else [astuple(point) for point in shape.points],
+            "filled": shape.filled,
+            "fixed": FIXED_SIDES if shape.taper is None else [],
+            "slices": SLICES,
             "rock_assumed": settings["model"].get("rock_assumed", False),
             "least_solidity": LEAST_SOLIDITY,
             "most_solidity": MOST_SOLIDITY,
@@ -139,8 +150,13 @@ def page_data(
         "colours": COLOURS,
         "yaml": {system: _yaml(settings, ground, system) for system in SYSTEMS},
         "chosen": [dict(one) for one in chosen],
-        "kernel": base64.b64encode(KERNEL.read_bytes()).decode(),
+        "kernel": _packed(KERNEL.read_bytes()),
     }
+
+
+def shape_of(settings: Mapping[str, Any]) -> Shape:
+    """Return the shape of the boulders of resolved settings."""
+    return Shape.of_list(settings["model"].get("profile", []))
 
 
 def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
@@ -155,6 +171,7 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
     return {
         **map_of(rows),
         "names": rows.names,
+        "grades": rows.robustness,
         "grid": bool(rows.axes),
         "mapped": any(len(set(along)) > 1 for along in values.values()),
         "values": values,
@@ -165,7 +182,7 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
             axis: {"names": own.names, "inputs": {name: along.tolist() for name, along in own.inputs.items()}}
             for axis, own in rows.sets.items()
         },
-        "codes": base64.b64encode(gzip.compress(codes.tobytes(), 6, mtime=0)).decode(),
+        "codes": _packed(codes.tobytes()),
     }
 
 
@@ -205,6 +222,11 @@ def _as_list(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
+def _packed(content: bytes) -> str:
+    """Return bytes as text that takes little of a page."""
+    return base64.b64encode(gzip.compress(content, 6, mtime=0)).decode()
+
+
 def _layout() -> dict[str, Any]:
     """Order of the kernel's numbers, and the table column of each input."""
     return {
@@ -212,10 +234,11 @@ def _layout() -> dict[str, Any]:
         "settings": entry_points.SETTINGS,
         "outcome": entry_points.OUTCOME,
         "history": entry_points.HISTORY,
-        "sizes": ["bed_offset_m" if name == "bed_offset" else SOURCES.get(name, name) for name in verdicts.SIZES],
+        "sizes": [(SOURCES | OF_THE_PAGE).get(name, name) for name in verdicts.SIZES],
         "rulings": verdicts.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": entry_points.LAYER_ROOM,
+        "piece_room": entry_points.PIECE_ROOM,
         "element_room": entry_points.ELEMENT_ROOM,
         "memory_room": entry_points.MEMORY_ROOM,
         "columns": {**SOURCES, **dict(zip(SecondSpring._fields, SECOND_SPRING_COLUMNS, strict=True))},
@@ -326,6 +349,7 @@ def _quantity(value: float, unit: str, system: str) -> str:
 def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str, list[str]]:
     """What a settings file says beside the inputs: more entries of vehicle and soil, and the lines that follow."""
     criterion, model, solver = (settings[name] for name in ("criterion", "model", "solver"))
+    taper = shape_of(settings).taper
     soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
     readings = model["preset"]
     if readings == "mixed":
@@ -337,7 +361,7 @@ def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str,
         for entry in fields_of("criterion")
     ]
     return {
-        "boulder": [f"foot: {model['foot']}"],
+        "boulder": [f"foot: {model['foot']}", *([f"taper: {taper:.6g}"] if taper not in (None, 1.0) else [])],
         "vehicle": [f"calibrated_crush: {_quantity(model['calibrated_crush_m'], 'm', system)}"],
         "soil": _ground_entries(ground, system),
         "lines": [

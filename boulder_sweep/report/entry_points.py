@@ -29,6 +29,7 @@ from boulder_kernels.embedded import step_errors
 from boulder_kernels.impact import STEP_RATIO
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
+from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import LAST, PLASTIC_WITH_GAP, Memory, memory_of
 from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
@@ -59,7 +60,7 @@ HISTORY = (
 """Columns of a time history, in this order; m, rad, N, J. The parts of the energy as in `EnergyLedger`."""
 ENERGY = HISTORY.index("vehicle_kinetic")
 """Index of the first energy."""
-EXPORTS = {"outcomes": "pipipppp", "rulings": "ipppp", "history": "ppippippppppp"}
+EXPORTS = {"outcomes": "pipipipppp", "rulings": "ipppp", "history": "ppipippippppppp"}
 """The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number."""
 carray: Any = None
 """`numba.carray`, which is there when kernels are compiled: a report is written without Numba."""
@@ -111,6 +112,8 @@ LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 """Numbers for each layer of the soil of a design: enough for the layers, and once for their sums."""
 
 
+PIECE_ROOM = len(OutlinedPieces._fields) - 1
+"""The same for each piece of the soil beside a boulder with an outline: of M layers and P points M + P - 2."""
 ELEMENT_ROOM, MEMORY_ROOM = 6, LAST + 6
 """The same for each of N soil elements with what it remembers, and once for all; before them, where a record is kept,
 2 N + 1 for each of its samples."""
@@ -129,6 +132,18 @@ def elements_from(room: np.ndarray, n: int) -> SoilElements:
 
 
 @inlined
+def pieces_from(t: np.ndarray, lean: np.ndarray, outline: np.ndarray) -> OutlinedPieces:
+    """Return the rows of an array, and a number of another, as the soil of one design beside an outline."""
+    return OutlinedPieces(t[0], t[1], t[2], t[3], t[4], t[5], t[6], lean, outline)
+
+
+@inlined
+def outlined_elements_from(room: np.ndarray, n: int, outline: np.ndarray) -> OutlinedElements:
+    """Return the first numbers of an array as n soil elements of one design beside an outline."""
+    return OutlinedElements(elements_from(room, n), room[4 * n : 4 * n + 1], outline)
+
+
+@inlined
 def memory_from(room: np.ndarray, n: int, gap: bool, samples: np.ndarray) -> Memory:
     """Return the numbers behind n soil elements as what they remember."""
     return Memory(room[4 * n : 5 * n], room[5 * n : 6 * n], gap, room[6 * n :], samples)
@@ -140,6 +155,7 @@ def solve(
     row: int,
     designs: np.ndarray,
     layers: np.ndarray,
+    outlines: np.ndarray,
     soil_at: Any,
     readings: Readings,
     control: Control,
@@ -147,10 +163,17 @@ def solve(
 ) -> int:
     """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
     design, spring = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
-    m, n = layers.shape[1], control.elements
+    m, points, n = layers.shape[1], outlines.shape[1], control.elements
     room = carray(soil_at, (max(LAYER_ROOM * m, ELEMENT_ROOM * n + MEMORY_ROOM),))
     if m == 0:
         outcome = simulate(Problem(design, None, spring), readings, control, record)
+    elif points > 0 and n == 0:
+        k = m + points - 2
+        pieces = pieces_from(carray(soil_at, (7, k)), carray(soil_at, (PIECE_ROOM * k,))[7 * k :], outlines[row])
+        outcome = simulate(Problem(design, SoilProfile(layers[row], pieces, None), spring), readings, control, record)
+    elif points > 0:
+        beside = SoilProfile(layers[row], outlined_elements_from(room, n, outlines[row]), None)
+        outcome = simulate(Problem(design, beside, spring), readings, control, record)
     elif n == 0:
         profile = SoilProfile(layers[row], layers_from(carray(soil_at, (6, m)), room[6 * m :]), None)
         outcome = simulate(Problem(design, profile, spring), readings, control, record)
@@ -171,7 +194,16 @@ def solve(
 
 @array_kernel
 def outcomes(
-    designs_at: Any, n: int, layers_at: Any, m: int, soil_at: Any, settings_at: Any, fine_at: Any, coarse_at: Any
+    designs_at: Any,
+    n: int,
+    layers_at: Any,
+    m: int,
+    outlines_at: Any,
+    points: int,
+    soil_at: Any,
+    settings_at: Any,
+    fine_at: Any,
+    coarse_at: Any,
 ) -> None:
     """Simulate n designs, and estimate their errors as the settings ask for it.
 
@@ -184,10 +216,14 @@ def outcomes(
     layers_at
         Layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`.
     m
-        Number of layers; 0 for a uniform elastic soil.
+        Number of layers; 0 for a uniform elastic soil beside boxes.
+    outlines_at
+        Outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outline`.
+    points
+        Number of points of an outline; 0 for boxes.
     soil_at
-        Room for the soil of one design: for its layers, LAYER_ROOM m numbers, or for N soil elements ELEMENT_ROOM N +
-        MEMORY_ROOM.
+        Room for the soil of one design: for its layers, LAYER_ROOM m numbers, for its pieces beside an outline,
+        PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + MEMORY_ROOM.
     settings_at
         Settings, shape (len(SETTINGS),).
     fine_at
@@ -198,25 +234,25 @@ def outcomes(
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, estimated, way = readings_from(s), s[9] > 0.0, int(s[PAIRED_AT])
     designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (11, n)), carray(coarse_at, (11, n))
-    layers = carray(layers_at, (n, m, 6))
+    layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     for row in range(n):
-        second = solve(finer, row, designs, layers, soil_at, readings, control_from(s, estimated), record)
+        second = solve(finer, row, designs, layers, outlines, soil_at, readings, control_from(s, estimated), record)
         if not estimated or way == ONCE:
             continue
         if way == CHECKED and second == NONE_NEEDED:
             continue
         if way == CHECKED and second == FINER:
-            solve(coarser, row, designs, layers, soil_at, readings, halved_control_from(s), record)
+            solve(coarser, row, designs, layers, outlines, soil_at, readings, halved_control_from(s), record)
             if not np.isnan(coarser[THETA_MAX, row]):
                 confirm_error(fine, coarse, table, SAFETY_CONFIRMED, row)
                 for column in range(11):
                     finer[column, row] = coarser[column, row]
                 continue
-        solve(coarser, row, designs, layers, soil_at, readings, control_from(s, False), record)
+        solve(coarser, row, designs, layers, outlines, soil_at, readings, control_from(s, False), record)
         if way == CHECKED and second == COARSER:
             confirm_error(coarse, fine, table, safety, row)
         else:
@@ -297,6 +333,8 @@ def history(
     design_from: Any,
     layers_at: Any,
     m: int,
+    outline_at: Any,
+    points: int,
     soil_at: Any,
     settings_at: Any,
     n: int,
@@ -314,8 +352,8 @@ def history(
     ----------
     design_from
         Inputs, shape (len(DESIGN),).
-    layers_at, m, soil_at
-        Layers of its soil, and room for it, as of `outcomes`; with soil elements for n samples, too.
+    layers_at, m, outline_at, points, soil_at
+        Layers of its soil, its outline, and room for the soil, as of `outcomes`; with soil elements for n samples, too.
     settings_at
         Settings, shape (len(SETTINGS),).
     n
@@ -338,7 +376,7 @@ def history(
     record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
     out[:] = np.nan
     record.states[:] = np.nan
-    layers = carray(layers_at, (1, m, 6))[0]
+    layers, outline = carray(layers_at, (1, m, 6))[0], carray(outline_at, (1, points, 4))[0]
     centre, elements = carray(centre_at, (2,)), control.elements
     samples, kept = carray(soil_at, (n, 2 * elements + 1)), n * (2 * elements + 1)
     room = carray(soil_at, (kept + ELEMENT_ROOM * elements + MEMORY_ROOM,))[kept:]
@@ -346,6 +384,18 @@ def history(
         simulate(Problem(design, None, second), readings, control, record)
         uniform = constants_in(design, readings, elements, None)
         write_history(uniform, design, second, readings, record, out, centre)
+    elif points > 0 and elements == 0:
+        k = m + points - 2
+        pieces = pieces_from(carray(soil_at, (7, k)), carray(soil_at, (PIECE_ROOM * k,))[7 * k :], outline)
+        in_pieces = SoilProfile(layers, pieces, None)
+        simulate(Problem(design, in_pieces, second), readings, control, record)
+        of_pieces = constants_in(design, readings, 0, in_pieces)
+        write_history(of_pieces, design, second, readings, record, out, centre)
+    elif points > 0:
+        beside = SoilProfile(layers, outlined_elements_from(room, elements, outline), None)
+        simulate(Problem(design, beside, second), readings, control, record)
+        of_outlined = constants_in(design, readings, elements, beside)
+        write_history(of_outlined, design, second, readings, record, out, centre)
     elif elements == 0:
         profile = SoilProfile(
             layers, layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]), None

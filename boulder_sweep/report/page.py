@@ -14,7 +14,14 @@ from bokeh.embed.util import standalone_docs_json_and_render_items
 from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.report.contents import held_at, page_data, reading_words, setting_lines, table_data
+from boulder_sweep.report.contents import (
+    held_at,
+    page_data,
+    reading_words,
+    setting_lines,
+    shape_of,
+    table_data,
+)
 from boulder_sweep.report.figures import curves, parts_of, verdict_map
 from boulder_sweep.report.sketch import sketch_of
 from boulder_sweep.text import script_data
@@ -27,7 +34,7 @@ if TYPE_CHECKING:
 
 ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = (
-    *("kernel", "verdict", "simulator", "units", "plots", "scene", "maps"),
+    *("kernel", "verdict", "outline", "simulator", "units", "plots", "scene", "maps"),
     *("walker", "controls", "choices", "player", "texts", "page"),
 )
 """Our own script, in this order."""
@@ -145,6 +152,8 @@ def assembled(
         lines=setting_lines(settings),
         readings=reading_words(settings),
         ground=ground_words(settings),
+        shape=shape_of(settings).words,
+        fixed=data["boulder"]["fixed"],
         uncertain="distributions" in settings,
         law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),
         data=script_data(data),

@@ -98,6 +98,8 @@ class Rows:
     inputs : dict of str to ndarray
         Given inputs: single values, axes in their dimension, or one value for each row. They broadcast against each
         other, and for a grid against its shape.
+    robustness : tuple of str
+        Grade of the designs of each code, asked for or not; empty words where there is none.
     """
 
     folder: Location
@@ -109,6 +111,7 @@ class Rows:
     axes: dict[str, np.ndarray]
     sets: dict[str, NamedSets]
     inputs: dict[str, np.ndarray]
+    robustness: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -132,8 +135,10 @@ class Rows:
 
     def counts(self) -> dict[str, int]:
         """Return the number of rows of each name."""
-        found = np.bincount(self.codes, minlength=len(self.names))
-        return {name: int(n) for name, n in zip(self.names, found, strict=True) if n}
+        found: Counter[str] = Counter()
+        for name, n in zip(self.names, np.bincount(self.codes, minlength=len(self.names)).tolist(), strict=True):
+            found[name] += n
+        return dict(+found)
 
     def depth(self) -> np.ndarray:
         """Embedment depth [m] of every design, in a shape that broadcasts against that of the grid."""
@@ -300,7 +305,7 @@ def read_rows(folder: Location) -> Rows:
     stored = list(dict.fromkeys(own for name in wanted for own in _stored(name)))
     codes = np.full(finished.rows, 255, np.uint8)
     columns = {name: np.full(finished.rows, np.nan) for name in stored}
-    names: list[str] = []
+    names: list[tuple[str, str]] = []
     flags: Counter[str] = Counter()
     grades: Counter[str] = Counter()
     asked = bool(settings["model"].get("second_opinion")) or kind_of(finished) in (NEED, CAPACITY)
@@ -310,7 +315,7 @@ def read_rows(folder: Location) -> Rows:
         if "robustness" not in finished.lacking:
             grades.update(_of_passes(table, "robustness"))
         rows = table.column("design_id").to_numpy()
-        codes[rows] = _codes(table, names, "robustness" if asked else None)
+        codes[rows] = _codes(table, names, asked=asked)
         for name in stored:
             columns[name][rows] = table.column(name).to_numpy()
     codes[codes == 255] = len(names)
@@ -324,7 +329,8 @@ def read_rows(folder: Location) -> Rows:
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
     told = flag_counts(flags.items()) if flags else {}
-    return Rows(folder, finished, (*names, NOT_YET), codes, told, dict(grades), axes, sets, inputs)
+    words, robustness = zip(*names, (NOT_YET, ""), strict=True)
+    return Rows(folder, finished, words, codes, told, dict(grades), axes, sets, inputs, robustness)
 
 
 def _check_whole(file: AnswerFile, path: Location) -> None:
@@ -396,23 +402,23 @@ def _of_passes(table: Any, name: str) -> dict[str, int]:
     return {one["values"] or "": one["counts"] for one in pc.value_counts(words.cast("string")).to_pylist()}
 
 
-def _codes(table: Any, names: list[str], grade: str | None) -> np.ndarray:
-    """Code of every row of a part; new verdicts and reasons are added to the names.
+def _codes(table: Any, names: list[tuple[str, str]], *, asked: bool) -> np.ndarray:
+    """Code of every row of a part; new names, each with the grade of its designs, are added.
 
-    A pass has no reason; the column of its grade, if one is named, stands in for it.
+    A pass has no reason; where second opinions were asked, its grade stands in for it.
     """
     verdicts, reasons = (table.column(name).combine_chunks() for name in ("verdict", "reason"))
-    if grade is not None:
-        reasons = _coalesced(table.column(grade), reasons)
+    reasons = _coalesced(table.column("robustness"), reasons)
     whys = reasons.dictionary.to_pylist()
     pairs = verdicts.indices.to_numpy().astype(np.int64) * max(len(whys), 1) + reasons.indices.to_numpy()
     place = np.zeros(int(pairs.max(initial=0)) + 1, np.uint8)
     for pair in np.unique(pairs):
         verdict, why = verdicts.dictionary[int(pair) // len(whys)].as_py(), whys[int(pair) % len(whys)]
-        name = f"{verdict}: {why}" if why else verdict
-        if name not in names:
-            names.append(name)
-        place[pair] = names.index(name)
+        grade = why if verdict == "pass" else ""
+        name = f"{verdict}: {why}" if why and (asked or not grade) else verdict
+        if (name, grade) not in names:
+            names.append((name, grade))
+        place[pair] = names.index((name, grade))
     return place[pairs]
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from boulder_sweep.settings.model import Ground
+from boulder_sweep.settings.shape import BOX, Shape
 
 LEFT, RIGHT = 4.6, 5.0
 """How much is drawn before and behind the boulder [m]."""
@@ -44,9 +47,10 @@ class Stratum(NamedTuple):
 class Sketch(NamedTuple):
     """What the template draws; lengths in metres, y upwards from the ground, x from the struck face."""
 
-    length: float
-    height: float
-    depth: float
+    corners: tuple[tuple[float, float], ...]
+    """Of the boulder, from the near one of its foot around."""
+    at_water: tuple[float, float]
+    """Where the near and the far face are at the water table; at the foot or the top where it lies beyond them."""
     bumper: float
     hood: float
     roof: float
@@ -74,11 +78,19 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     ground = Ground.of_dict(settings["model"].get("ground", {}))
     above, roof = height - depth, hood + CAB_M
     bottom = -depth - BELOW
-    beside = length + 0.35
+    points = Shape.of_list(settings["model"].get("profile", [])).points or BOX
+    shares = np.array([(point.height, point.near, point.far) for point in points])
+    heights, near, far = (shares * (height, length, length)).T
+    struck = float(np.interp(depth + inputs["impact_height_m"], heights, near))
+    front, back = struck - near, struck + far
+    around = [*zip(front, heights, strict=True), *reversed([*zip(back, heights, strict=True)])]
+    water = depth - (ground.water_table_m or 0.0)
+    first, last = float(front.min()), float(back.max())
+    beside = last + 0.35
     dimensions = (
         Dimension(beside, 0.0, beside, above, "above ground", above, beside + 0.12, above / 2, "start"),
         Dimension(beside, -depth, beside, 0.0, "embedment", depth, beside + 0.12, -depth + 0.12, "start"),
-        Dimension(0.0, above + 0.2, length, above + 0.2, "length", length, 0.0, above + 0.3, "start"),
+        Dimension(first, above + 0.2, last, above + 0.2, "length", length, first, above + 0.3, "start"),
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
     )
     tops = [0.0, *(layer.from_m for layer in ground.layers)]
@@ -114,14 +126,13 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     bottom = min(bottom, -written - 0.2)
     strata[-1] = strata[-1]._replace(bottom=-bottom)
     return Sketch(
-        length=length,
-        height=height,
-        depth=depth,
+        corners=tuple((float(x), float(z) - depth) for x, z in around),
+        at_water=(float(np.interp(water, heights, front)), float(np.interp(water, heights, back))),
         bumper=bumper,
         hood=hood,
         roof=roof,
         left=-LEFT,
-        right=length + RIGHT,
+        right=last + RIGHT,
         top=max(above + 0.6, roof) + SKY,
         bottom=bottom,
         dimensions=dimensions,

@@ -95,7 +95,6 @@ def write_report(
     notes = _notes_on_rules(rows.finished.judged_by)
     try:
         settings, control = completed(identity["settings"]), known_control(identity["control"])
-        _check_shape(settings)
         readings = Readings(**identity["readings"])
         text = assembled(
             title=str(settings["name"]),
@@ -155,7 +154,6 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         raise ReportError(f"design {number} cannot be computed: {block.reasons[0]}")
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     settings, control = sweep.resolved(), control_of(sweep, accuracy_of(sweep))
-    _check_shape(settings)
     text = assembled(
         title=sweep.name,
         settings=settings,
@@ -167,21 +165,6 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         units=units,
     )
     return _written(target, text)
-
-
-def _check_shape(settings: Mapping[str, Any]) -> None:
-    """Refuse boulders that are no boxes: the simulator of a page does not know them.
-
-    Raises
-    ------
-    ReportError
-        They are none.
-    """
-    if "profile" in settings["model"]:
-        raise ReportError(
-            "the simulator of a page knows boxes only, and these boulders have a profile or taper; "
-            "sweep plot, export and simulate show them"
-        )
 
 
 def checked_page(path: str | Path) -> Path:

@@ -50,6 +50,14 @@ class Shape:
         return len({(point.width, point.near, point.far) for point in self.points}) <= 1
 
     @property
+    def taper(self) -> float | None:
+        """Width and length of the top over those of the foot, if that says it all; 1 for a box."""
+        if self.is_box:
+            return 1.0
+        both = all(point.near == point.far == 0.5 * point.width for point in self.points)
+        return self.points[-1].width / self.points[0].width if both and len(self.points) == 2 else None
+
+    @property
     def stands_flat(self) -> bool:
         """Whether the foot is at least half as wide and as long as the largest section."""
         if not self.points:

@@ -10,7 +10,7 @@ import pytest
 
 import boulder_sweep
 from boulder_kernels import Control, corrected, simulate_table
-from boulder_sweep.errors import QuestionError, ReportError
+from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import Ground
@@ -130,17 +130,6 @@ def test_answers_take_profiles_and_give_their_mass(tmp_path):
     assert answer.least_embedment_depth_m > box.least_embedment_depth_m
     with pytest.raises(QuestionError, match="second opinions know boxes"):
         boulder_sweep.need(sweep, robust=True)
-
-
-def test_the_page_refuses_what_it_cannot_simulate(tmp_path):
-    sweep = shaped(tmp_path, "taper: 0.8")
-    table_of(sweep, tmp_path / "table")
-    for write in (
-        lambda: boulder_sweep.write_report(tmp_path / "table", tmp_path / "page.html"),
-        lambda: boulder_sweep.write_explorer(sweep, 0, tmp_path / "page.html"),
-    ):
-        with pytest.raises(ReportError, match="knows boxes only"):
-            write()
 
 
 def test_side_views_show_the_shape(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.report import write_explorer
 from boulder_sweep.settings.problems import SettingsError
-from tests.report.conftest import GRID, LIST, SITE, reported
+from tests.report.conftest import GRID, LIST, SETS, SITE, reported
 from tests.soils.test_ground import IN_FILE
 
 STRIP = SITE.replace("height: 3.4 m", "height: {from: 1.8 m, to: 3.6 m, count: 19}")
@@ -125,6 +125,40 @@ def test_passes_that_are_not_robust_are_hatched(tmp_path, opened):
 def explorer(tmp_path_factory):
     """Page for the design of a file, whose impact height is given."""
     return write_explorer(boulder_sweep.load("configs/rwg.yaml"), 0, tmp_path_factory.mktemp("page") / "rwg.html")
+
+
+def check_grades(page, table):
+    """Hold what the verdict says of every row against the table; return the rows, and the grades of their passes."""
+    names = page.evaluate("page.inputs.map((input) => input.name)")
+    rows = [{name: float(table[name][k]) for name in names} for k in range(len(table))]
+    grades = table.robustness.astype(object).where(table.verdict == "pass", "").tolist()
+    assert page.evaluate("(rows) => rows.map((one) => gradeOf(page.data.rows, page.codes, one))", rows) == grades
+    return rows, grades
+
+
+def test_the_verdict_has_the_grade_of_a_design_that_is_a_row_of_the_table(report, result, opened):
+    page = opened(report)
+    rows, grades = check_grades(page, boulder_sweep.read(result))
+    assert set(grades) == {"robust", "open", ""}
+    for grade in ("robust", "open"):
+        page.evaluate("(row) => page.take(row)", rows[grades.index(grade)])
+        assert page.inner_text("#verdict").startswith("✔ pass")
+        assert page.inner_text("#verdict").endswith(f"; {grade} in the table")
+    depth = float(page.input_value("#in-embedment_depth_m"))
+    page.fill("#in-embedment_depth_m", f"{depth + 0.001:.6g}")
+    assert page.inner_text("#verdict").startswith("✔ pass")
+    assert "in the table" not in page.inner_text("#verdict")
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("text", [SETS, LIST], ids=["named soils", "list"])
+def test_rows_of_named_soils_and_of_lists_have_their_grade(text, tmp_path, opened):
+    lines = [f"{height},{0.65 * height},{angle}" for height in (3.2, 3.4) for angle in (30, 38, 42)]
+    (tmp_path / "designs.csv").write_text("boulder_height_m,embedment_depth_m,friction_angle_deg\n" + "\n".join(lines))
+    page = opened(reported(text, tmp_path))
+    rows, grades = check_grades(page, boulder_sweep.read(tmp_path / "site.sweep"))
+    other = rows[grades.index("robust")] | {"boulder_height_m": 3.31}
+    assert page.evaluate("(one) => gradeOf(page.data.rows, page.codes, one)", other) == ""
 
 
 def test_what_the_command_refuses_the_page_refuses_in_the_same_words(explorer, opened):

@@ -33,6 +33,12 @@ def test_every_row_has_its_verdict(rows, table):
     assert rows.counts() == {name: int((names == name).sum()) for name in set(names)}
 
 
+def test_every_row_has_its_grade_whether_it_was_asked_for_or_not(rows, table):
+    graded = table.robustness.astype(object).where(table.verdict == "pass", "")
+    assert [rows.robustness[code] for code in rows.codes] == list(graded)
+    assert len(set(graded)) > 1
+
+
 def test_passes_outside_of_what_was_tested_are_counted(rows, table):
     passing = table[table.verdict == "pass"].validity.astype(object)
     assert rows.flags.get("", 0) == (passing == "").sum()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -53,6 +54,15 @@ def test_a_taper_is_a_profile_of_two_points(ratio):
     assert top.width / foot.width == pytest.approx(ratio)
     assert max(foot.width, top.width) == max(foot.near + foot.far, top.near + top.far) == 1.0
     assert tapered(ratio).filled == pytest.approx((1 + ratio + ratio**2) / 3 / max(1, ratio) ** 2)
+    assert tapered(ratio).taper == pytest.approx(ratio)
+
+
+def test_only_a_taper_is_said_by_one_number():
+    assert Shape().taper == 1.0
+    foot, top = tapered(0.8).points
+    for other in (replace(top, width=0.9), replace(top, near=0.3), replace(foot, far=0.45)):
+        assert Shape((foot, replace(other, height=1.0))).taper is None
+    assert Shape((foot, replace(top, height=0.5), top)).taper is None
 
 
 def test_a_taper_goes_with_axes_of_the_sides(load_it, minimal):

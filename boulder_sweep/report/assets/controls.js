@@ -50,6 +50,8 @@ class Controls {
     this.units = units;
     /** Whether the impact height follows from Eq 9. @type {boolean} */
     this.face = data.face;
+    /** Inputs that cannot be moved. @type {string[]} */
+    this.fixed = [...data.boulder.fixed, ...(data.face ? ["impact_height_m"] : [])];
     /** @type {Refused} */
     this.words = data.refused;
     /** @type {Front} */
@@ -130,7 +132,7 @@ class Controls {
       const place = box.closest(".control");
       place.querySelector(".unit").textContent = name === "" ? "" : `[${name}]`;
       place.classList.toggle("unusual", this.unusual(input, value));
-      if (input.name === "impact_height_m") slide.disabled = box.disabled = this.face;
+      slide.disabled = box.disabled = this.fixed.includes(input.name);
     }
     byId("face-hint").textContent = this.face ? "The impact height follows from the other heights (Eq 9)." : "";
     this.showFlags(design);

@@ -3,9 +3,16 @@
 
 /**
  * Names of the numbers that the kernel takes and gives, each in its order, how many numbers a layer of soil has, and how
- * many the kernel makes of it, of a soil element, and of all elements; written by Python.
+ * many the kernel makes of it, of a piece beside an outline, of a soil element, and of all elements; written by Python.
  * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], sizes: string[],
- *   rulings: string[], layer: number, layer_room: number, element_room: number, memory_room: number}} Layout
+ *   rulings: string[], layer: number, layer_room: number, piece_room: number, element_room: number,
+ *   memory_room: number}} Layout
+ */
+
+/**
+ * The soil of a design: its layers, none in a uniform elastic soil beside a box, and the outline of a boulder that is no
+ * box, point by point.
+ * @typedef {{layers: number[], outline: number[]}} Soil
  */
 
 /**
@@ -17,7 +24,7 @@
  * @typedef {object} Motion
  * @property {Float64Array} time
  * @property {Record<string, Float64Array>} columns by the names of `Layout.history`; the samples that were reached
- * @property {number} c_x centre of mass of boulder and soil, from the lower left corner of the boulder [m]
+ * @property {number} c_x centre of mass of boulder and soil, from where the boulder is struck and over its foot [m]
  * @property {number} c_y
  */
 
@@ -37,12 +44,12 @@ class Kernel {
   }
 
   /**
-   * @param {string} base64 the module
+   * @param {string} packed the module
    * @param {Layout} layout
    */
-  static async load(base64, layout) {
-    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-    return new Kernel((await WebAssembly.instantiate(bytes)).instance, layout);
+  static async load(packed, layout) {
+    const { instance } = await WebAssembly.instantiate(await unpacked(packed));
+    return new Kernel(instance, layout);
   }
 
   /**
@@ -65,14 +72,16 @@ class Kernel {
 
   /**
    * @param {number} layers of the soil of a design
+   * @param {number} points of its outline
    * @param {number[]} settings in the order of `Layout.settings`
    * @param {number} [samples] of its motion
    * @returns {number} how many numbers the kernel needs for the soil
    */
-  soilRoom(layers, settings, samples = 0) {
-    const { layer_room, element_room, memory_room } = this.layout;
+  soilRoom(layers, points, settings, samples = 0) {
+    const { layer_room, piece_room, element_room, memory_room } = this.layout;
     const elements = settings[this.layout.settings.indexOf("elements")];
-    return Math.max(layer_room * layers, samples * (2 * elements + 1) + element_room * elements + memory_room);
+    const pieces = piece_room * (layers + points);
+    return Math.max(layer_room * layers, pieces, samples * (2 * elements + 1) + element_room * elements + memory_room);
   }
 
   /**
@@ -89,23 +98,26 @@ class Kernel {
   /**
    * Simulate designs up to their verdict.
    * @param {KernelDesign[]} designs
-   * @param {number[][]} layers of the soil of each, as many for all; none in a uniform soil
+   * @param {Soil[]} soils of each, of as many layers and points for all
    * @param {number[]} settings in the order of `Layout.settings`
    * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome`
    */
-  outcomes(designs, layers, settings) {
+  outcomes(designs, soils, settings) {
     const { design, outcome, layer } = this.layout;
     const n = designs.length;
-    const given = layers.flat();
-    const m = n > 0 ? layers[0].length / layer : 0;
+    const layers = soils.flatMap((one) => one.layers);
+    const outlines = soils.flatMap((one) => one.outline);
+    const [m, points] = n > 0 ? [layers.length / n / layer, outlines.length / n / 4] : [0, 0];
     const { at, views } = this.room([
-      2, design.length * n, given.length, this.soilRoom(m, settings), settings.length, outcome.length * n, outcome.length * n,
+      2, design.length * n, layers.length, outlines.length, this.soilRoom(m, points, settings), settings.length,
+      outcome.length * n, outcome.length * n,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
-    views[2].set(given);
-    views[4].set(settings);
-    this.call("outcomes", [at[1], n, at[2], m, ...at.slice(3)]);
-    return Object.fromEntries(outcome.map((name, k) => [name, views[5].slice(k * n, (k + 1) * n)]));
+    views[2].set(layers);
+    views[3].set(outlines);
+    views[5].set(settings);
+    this.call("outcomes", [at[1], n, at[2], m, at[3], points, ...at.slice(4)]);
+    return Object.fromEntries(outcome.map((name, k) => [name, views[6].slice(k * n, (k + 1) * n)]));
   }
 
   /**
@@ -129,24 +141,25 @@ class Kernel {
   /**
    * Simulate one design over time.
    * @param {KernelDesign} one
-   * @param {number[]} layers of its soil; none in a uniform elastic soil
+   * @param {Soil} soil
    * @param {number[]} settings in the order of `Layout.settings`
    * @param {Float64Array} times ascending [s]
    * @returns {Motion}
    */
-  history(one, layers, settings, times) {
+  history(one, { layers, outline }, settings, times) {
     const { design, history, layer } = this.layout;
     const n = times.length;
-    const m = layers.length / layer;
+    const [m, points] = [layers.length / layer, outline.length / 4];
     const { at, views } = this.room([
-      2, design.length, layers.length, this.soilRoom(m, settings, n), settings.length, n, 6 * n, 2 * n, 4 * n, n,
-      history.length * n, 2,
+      2, design.length, layers.length, outline.length, this.soilRoom(m, points, settings, n), settings.length, n, 6 * n,
+      2 * n, 4 * n, n, history.length * n, 2,
     ]);
     design.forEach((name, field) => (views[1][field] = one[name]));
     views[2].set(layers);
-    views[4].set(settings);
-    views[5].set(times);
-    this.call("history", [at[1], at[2], m, at[3], at[4], n, ...at.slice(5)]);
+    views[3].set(outline);
+    views[5].set(settings);
+    views[6].set(times);
+    this.call("history", [at[1], at[2], m, at[3], points, at[4], at[5], n, ...at.slice(6)]);
     const [found, centre] = views.slice(-2);
     const end = found.subarray(0, n).findIndex(Number.isNaN);
     const reached = end < 0 ? n : end;

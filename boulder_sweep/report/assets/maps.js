@@ -5,6 +5,7 @@
  * Rows of a table: a code for each design of a grid (the last axis fastest) or of a list; written by Python.
  * @typedef {object} TableRows
  * @property {string[]} names what a code stands for
+ * @property {string[]} grades of the passes of each code by their robustness; empty words of others
  * @property {boolean} grid
  * @property {boolean} mapped whether anything varies
  * @property {Record<string, number[]>} values along each axis, or of each design of the list
@@ -23,6 +24,8 @@
  *   names?: string[], answer?: string}} Cell
  */
 
+/** Share by which values may differ that are the same but for their last digits. */
+const ROUNDING = 1e-9;
 /** Where the rectangles of a strip lie, which has one input only. */
 const STRIP = 0.5;
 /** Verdicts, from the best to the worst that a rectangle can show for designs that lie on each other. */
@@ -34,6 +37,30 @@ const HATCHES = { "pass: sensitive": "sensitive", "pass: open": "open" };
 /** @param {string} name verdict and reason, or grade @returns {boolean} */
 function isPass(name) {
   return name.split(":")[0] === "pass";
+}
+
+/**
+ * The grade of a design by the table.
+ * @param {TableRows} rows
+ * @param {Uint8Array} codes
+ * @param {Record<string, number>} design
+ * @returns {string} empty where it is no row of the table, or does not pass there
+ */
+function gradeOf(rows, codes, design) {
+  /** @type {Record<string, number>} */
+  const known = { ...design, embedment_ratio: design.embedment_depth_m / design.boulder_height_m };
+  const is = (/** @type {string} */ name, /** @type {number} */ value) => Math.abs(known[name] - value) <= ROUNDING * Math.abs(value);
+  const names = Object.keys(rows.values);
+  const lies = (/** @type {string} */ name, /** @type {number} */ place) => {
+    const value = rows.values[name][place];
+    if (!(name in rows.sets)) return is(name, value);
+    return Object.entries(rows.sets[name].inputs).every(([one, own]) => is(one, own[value]));
+  };
+  if (!Object.entries(rows.given).every(([name, value]) => is(name, value))) return "";
+  if (!rows.grid) return rows.grades[codes.find((_, row) => names.every((name) => lies(name, row))) ?? -1] ?? "";
+  const places = names.map((name) => rows.values[name].findIndex((_, place) => lies(name, place)));
+  if (places.includes(-1)) return "";
+  return rows.grades[codes[names.reduce((at, name, k) => at * rows.values[name].length + places[k], 0)]];
 }
 
 /**

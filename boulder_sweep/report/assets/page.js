@@ -75,7 +75,8 @@ class Page {
 
   /** @param {string} panel @param {Judged} found @param {Motion} motion @param {Record<string, number>} inputs */
   showFound(panel, found, motion, inputs) {
-    this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found);
+    const grade = this.data.rows === null ? "" : gradeOf(this.data.rows, this.codes, inputs);
+    this.showVerdict(byId(`${panel}-verdict`) ?? byId("verdict"), found, grade);
     const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
     table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
     const flags = String(found.validity ?? "").split(";").filter((name) => name !== "");
@@ -95,12 +96,14 @@ class Page {
 
   /** @param {Record<string, number>} one @returns {Scene} */
   scene(one) {
+    const outline = this.simulator.outline(one);
+    const reach = reachOf(outline, one.embedment_depth_m + one.impact_height_m);
     return {
-      length: one.boulder_length_m, height: one.boulder_height_m, depth: one.embedment_depth_m,
+      outline, depth: one.embedment_depth_m,
       blow: one.impact_height_m, friction: one.friction_angle_deg / DEGREES, mass: one.vehicle_mass_kg,
       speed: one.impact_speed_m_s, spring: one.vehicle_spring_N_m, damper: one.vehicle_damper_N_s_m,
       bumper: one.bumper_height_m, hood: one.hood_height_m, bed: one.bed_offset_m,
-      line: one.boulder_length_m + this.data.rules.limits[1], rating: this.data.rules.rating,
+      line: reach + this.data.rules.limits[1], rating: this.data.rules.rating,
     };
   }
 
@@ -117,8 +120,8 @@ class Page {
     byId(`${panel}-caption`).textContent = words;
   }
 
-  /** @param {HTMLElement} place @param {Judged} found */
-  showVerdict(place, found) {
+  /** @param {HTMLElement} place @param {Judged} found @param {string} grade of a pass by the table; empty where unknown */
+  showVerdict(place, found, grade) {
     place.className = `verdict ${found.verdict}`;
     const sign = { pass: "✔", fail: "✘", undecided: "?", error: "!" }[found.verdict];
     const limit = number(this.data.rules.rotation * DEGREES);
@@ -126,6 +129,7 @@ class Page {
     if (found.reason !== "") words.push(this.data.words[found.reason] ?? found.reason);
     if (found.margin !== null) words.push(`margin ${percent(found.margin)}`);
     if (found.max_rotation_deg !== null) words.push(`turns ${number(found.max_rotation_deg)}°, limit ${limit}°`);
+    if (found.verdict === "pass" && grade !== "") words.push(`${grade} in the table`);
     place.replaceChildren(element("b", `${sign} ${found.verdict}`), element("span", words.length > 0 ? `: ${words.join("; ")}` : ""));
   }
 
@@ -444,7 +448,7 @@ class Page {
   /** Fill the lists that axes are chosen from. */
   offer() {
     const { rows } = this.data;
-    const inputs = this.inputs.filter((input) => input.name !== "impact_height_m");
+    const inputs = this.inputs.filter(({ name }) => name !== "impact_height_m" && !this.data.boulder.fixed.includes(name));
     const all = /** @type {[string, string][]} */ (inputs.map((input) => [input.name, input.label]));
     this.axes.live.offer(all, "embedment_depth_m", "friction_angle_deg");
     byId("units").value = this.units.system;

@@ -3,7 +3,7 @@
 
 /**
  * What a side view shows of a design; SI.
- * @typedef {{length: number, height: number, depth: number, blow: number, friction: number, mass: number,
+ * @typedef {{outline: Outline, depth: number, blow: number, friction: number, mass: number,
  *   speed: number, spring: number, damper: number, bumper: number, hood: number, bed: number, line: number,
  *   rating: string}} Scene
  */
@@ -26,24 +26,34 @@ class SideView {
    */
   draw(s, motion, sample) {
     this.svg.replaceChildren();
-    const wedge = s.depth * Math.tan(Math.PI / 4 + s.friction / 2);
-    const [left, right] = [-(s.bed + 1.6), Math.max(s.length + wedge, s.line + 2.8) + 0.4];
-    const [bottom, top] = [-s.depth - 0.4, Math.max(s.height - s.depth, 2.6) + 0.7];
+    const slope = Math.tan(Math.PI / 4 + s.friction / 2);
+    const { near, far } = facesOf(s.outline, s.depth + s.blow);
+    const corners = [...far, ...near.reverse()];
+    const [reach, height] = [0, 1].map((k) => Math.max(...far.map((corner) => corner[k])));
+    const [left, right] = [-(s.bed + 1.6), Math.max(reach + s.depth * slope, s.line + 2.8) + 0.4];
+    const [bottom, top] = [-s.depth - 0.4, Math.max(height - s.depth, 2.6) + 0.7];
     this.svg.setAttribute("viewBox", `${left} ${-top} ${right - left} ${top - bottom}`);
     /** @param {string} name */
     const at = (name) => (motion.time.length > 0 ? motion.columns[name][sample] : 0);
     const [x_b, theta, x_v] = ["x_b", "theta_b", "x_v"].map(at);
 
     this.shape("soil", [[left - 50, bottom - 50], [right + 50, bottom - 50], [right + 50, 0], [left - 50, 0]]);
-    /** @type {(x: number, y: number) => [number, number]} a point given from the boulder's lower left corner */
-    const place = (x, y) => {
+    /** @type {(corner: [number, number]) => [number, number]} a point of the boulder, from where it is struck, over its foot */
+    const place = ([x, y]) => {
       const [u, v, sin, cos] = [x - motion.c_x, y - motion.c_y, Math.sin(theta), Math.cos(theta)];
       return [motion.c_x + x_b + u * cos + v * sin, motion.c_y - s.depth - u * sin + v * cos];
     };
-    const [foot, edge] = [place(s.length, 0), place(s.length, s.depth)];
-    this.shape("wedge", [foot, edge, [edge[0] + wedge, edge[1]]]);
-    this.shape("first", [[0, -s.depth], [s.length, -s.depth], [s.length, s.height - s.depth], [0, s.height - s.depth]]);
-    this.shape("boulder", [place(0, 0), place(s.length, 0), place(s.length, s.height), place(0, s.height)]);
+    // The soil that moves with the boulder: along its buried far face, and as much farther as it lies over the foot.
+    const [struck, soilLine] = [far[0][0] - s.outline[0][FAR], Math.min(s.depth, height)];
+    /** @type {[number, number][]} */
+    const buried = [...far.filter(([, z]) => z < soilLine), [struck + atHeight(s.outline, FAR, soilLine), soilLine]];
+    const beyond = buried.map((corner) => {
+      const [x, y] = place(corner);
+      return /** @type {[number, number]} */ ([x + corner[1] * slope, y]);
+    });
+    this.shape("wedge", [...buried.map(place), ...beyond.reverse()]);
+    this.shape("first", corners.map(([x, z]) => [x, z - s.depth]));
+    this.shape("boulder", corners.map(place));
     this.line("limit", [s.line, 0], [s.line, 2.5]);
     this.text("limit", s.line + 0.08, 2.5, `${s.rating}: limit`);
     this.text("limit", s.line + 0.08, 2.18, "of the cargo bed");
@@ -52,7 +62,7 @@ class SideView {
     const peak = Math.max(0, ...(motion.columns.F_v ?? []));
     const force = at("F_v");
     if (force > 0.02 * peak) {
-      const head = place(0, s.blow + s.depth);
+      const head = place([0, s.blow + s.depth]);
       this.arrow("force", [head[0] - (LONGEST_ARROW * force) / peak, head[1]], head);
     }
   }

@@ -87,10 +87,11 @@ function layersOf(law, ground, design, gravity) {
 /**
  * Volume of a boulder over that of the box of its sides: `boulder_sweep.designs.solidity_of`.
  * @param {Record<string, number>} inputs
+ * @param {number} filled that of the profile of the boulder
  * @returns {number}
  */
-function solidityOf(inputs) {
-  if (!("boulder_mass_kg" in inputs)) return 1;
+function solidityOf(inputs, filled) {
+  if (!("boulder_mass_kg" in inputs)) return filled;
   const box = inputs.boulder_length_m * inputs.boulder_width_m * inputs.boulder_height_m;
   return inputs.boulder_mass_kg / (inputs.boulder_density_kg_m3 * box);
 }
@@ -131,7 +132,7 @@ class Simulator {
    * @returns {KernelDesign}
    */
   kernelDesign(inputs) {
-    const { layout, resistance, ground } = this.data;
+    const { layout, resistance, ground, boulder } = this.data;
     /** @type {KernelDesign} */
     const design = Object.fromEntries(
       layout.design.map((/** @type {string} */ field) => {
@@ -139,8 +140,8 @@ class Simulator {
         return [field, field === "phi" ? value / DEGREES : value];
       }),
     );
-    // A box has the mass of the boulder that was weighed.
-    if ("boulder_mass_kg" in inputs) design.rho_b = inputs.boulder_mass_kg / (design.L * design.W * design.H);
+    // What is simulated has the mass of the boulder that was weighed.
+    if ("boulder_mass_kg" in inputs) design.rho_b = inputs.boulder_mass_kg / (design.L * design.W * design.H * boulder.filled);
     // Without a second spring it is like the first, from a crush on that is never reached.
     const springs = { k_2: design.k_2 ?? design.k_v, s_2: design.s_2 ?? NEVER };
     const submerged = ground.water_table_m === 0 ? 1 - ground.water_kg_m3 / design.rho_s : 1;
@@ -150,14 +151,28 @@ class Simulator {
 
   /**
    * @param {KernelDesign} design
-   * @returns {number[]} the layers of its soil; none where it is elastic and its resistance grows with depth
+   * @returns {Soil} without layers where it is elastic, beside a box, and its resistance grows with depth
    */
-  layers(design) {
-    const { resistance, ground, rules } = this.data;
-    const g = rules.tested.gravity;
-    if (!ground.is_proportional) return layersOf(resistance, ground, design, g);
+  soil(design) {
+    const { resistance, ground, rules, boulder } = this.data;
     const { rho_s, phi, beta } = design;
-    return this.data.settings[this.at("unloading")] > 0 ? [Infinity, rho_s, phi, beta, 0, passiveCoefficient(phi) ** 2 * rho_s * g] : [];
+    const g = rules.tested.gravity;
+    const isBox = boulder.profile.length === 0;
+    const outline = outlineOf(boulder.profile, /** @type {any} */ (design));
+    /** @type {number[]} */
+    let layers = [];
+    if (!ground.is_proportional) layers = layersOf(resistance, ground, design, g);
+    else if (!isBox || this.data.settings[this.at("unloading")] > 0) {
+      layers = [Infinity, rho_s, phi, beta, 0, passiveCoefficient(phi) ** 2 * rho_s * g];
+    }
+    if (isBox) return { layers, outline: [] };
+    if (resistance === "width_capped") layers = inSlices(layers, resistance, design, outline, boulder.slices);
+    return { layers, outline: outline.flat() };
+  }
+
+  /** @param {Record<string, number>} inputs @returns {Outline} of the boulder [m] */
+  outline({ boulder_height_m: H, boulder_width_m: W, boulder_length_m: L }) {
+    return outlineOf(this.data.boulder.profile, { H, W, L });
   }
 
   /** @returns {boolean} whether a design takes a hundred times as long as in the closed form of the soil */
@@ -174,8 +189,8 @@ class Simulator {
     const exposed = inputs.boulder_height_m - inputs.embedment_depth_m;
     const [bumper, hood] = [inputs.bumper_height_m, inputs.hood_height_m];
     const impact = this.data.face ? 0.5 * (Math.min(exposed, hood) + bumper) : inputs.impact_height_m;
-    const { flat_foot, least_solidity, most_solidity } = this.data.boulder;
-    const solidity = solidityOf(inputs);
+    const { flat_foot, least_solidity, most_solidity, filled, profile } = this.data.boulder;
+    const solidity = solidityOf(inputs, filled);
     let refused = 0;
     if (solidity > most_solidity) refused = 5;
     if (inputs.vehicle_second_spring_N_m < inputs.vehicle_spring_N_m) refused = 4;
@@ -183,7 +198,9 @@ class Simulator {
     if (hood < bumper) refused = 2;
     if (exposed <= 0) refused = 1;
     const [refusal, at] = this.data.refusals[refused];
-    const shape = { solidity, flat_foot, known_shape: Number(solidity >= least_solidity) };
+    const known_shape = Number(profile.length > 0 || solidity >= least_solidity);
+    const reach_m = reachOf(this.outline(inputs), inputs.embedment_depth_m + impact);
+    const shape = { solidity, flat_foot, known_shape, reach_m };
     return { inputs: { ...inputs, ...shape, impact_height_m: impact }, refusal, at };
   }
 
@@ -233,7 +250,7 @@ class Simulator {
     if (judged.verdict !== "error") for (const name of names) judged[name] = decided[name];
     const times = refusal === "" ? this.times : new Float64Array(0);
     const one = this.kernelDesign(inputs);
-    return { judged, motion: this.kernel.history(one, this.layers(one), this.settings(beyond), times), inputs };
+    return { judged, motion: this.kernel.history(one, this.soil(one), this.settings(beyond), times), inputs };
   }
 
   /** @returns {Motion} of what is not simulated */
@@ -255,7 +272,7 @@ class Simulator {
   judged(designs, changed) {
     const complete = designs.map((design) => this.completed(design));
     const given = complete.map((one) => this.kernelDesign(one.inputs));
-    const outcomes = this.kernel.outcomes(given, given.map((one) => this.layers(one)), this.settings(changed));
+    const outcomes = this.kernel.outcomes(given, given.map((one) => this.soil(one)), this.settings(changed));
     const { rules } = this.data;
     const rulings = this.kernel.rulings(outcomes, complete.map(({ inputs }) => inputs), rules.limits);
     return complete.map(({ inputs, refusal }, row) => {

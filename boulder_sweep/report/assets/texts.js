@@ -14,10 +14,17 @@ function yamlOf(data, design, units) {
   for (const { name, section, key, unit } of /** @type {Input[]} */ (data.inputs)) {
     if (name === "impact_height_m" && data.face) continue;
     if (name === "boulder_density_kg_m3" && data.boulder.rock_assumed) continue;
+    if (data.boulder.fixed.includes(name)) continue;
     (sections[section] ??= []).push(`${key}: ${units.written(design[name], unit)}`);
   }
   const { boulder, vehicle, soil, lines } = data.yaml[units.system];
+  const [H, W, L] = ["height", "width", "length"].map((side) => design[`boulder_${side}_m`]);
+  const points = outlineOf(data.boulder.profile, { H, W, L }).map((point) => {
+    const entries = ["height", "width", "near", "far"].map((key, k) => `${key}: ${units.written(point[k], "m")}`);
+    return `{${entries.join(", ")}}`;
+  });
   sections.boulder.push(...boulder);
+  if (data.boulder.fixed.length > 0) sections.boulder.push(`profile: [${points.join(", ")}]`);
   sections.vehicle.push(...vehicle);
   sections.soil.push(...soil);
   return [
