@@ -17,6 +17,7 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import held_at, page_data, reading_words, setting_lines, table_data
 from boulder_sweep.report.figures import curves, parts_of, verdict_map
 from boulder_sweep.report.sketch import sketch_of
+from boulder_sweep.settings.shown_units import shown_settings
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
@@ -142,9 +143,9 @@ def assembled(
         heading=heading,
         sketch=sketch_of(chosen[0]["inputs"], settings) if chosen else None,
         settings=settings,
-        lines=setting_lines(settings),
+        lines=setting_lines(shown_settings(settings, units)),
         readings=reading_words(settings),
-        ground=ground_words(settings),
+        ground=ground_words(settings, units),
         uncertain="distributions" in settings,
         law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),
         data=script_data(data),

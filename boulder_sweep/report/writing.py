@@ -29,7 +29,7 @@ from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
 from boulder_sweep.text import counted, printable, why
-from boulder_sweep.views.wording import UNLOADING_WORDS
+from boulder_sweep.views.wording import UNLOADING_WORDS, name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
@@ -244,6 +244,8 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
         rock = quantity_text("kg/m^3", units, ROCK_KG_M3)
         notes.append(f"The density of the rock was not given: {rock} is assumed, and no pass is robust.")
     notes += [f"{words}." for words in derived_words(settings.get("derived", {}), units)]
+    if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
+        notes.append(f"Each uncertain input is taken at one value: {', '.join(taken)}.")
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:
@@ -256,6 +258,12 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
             f"{MOST_ELEMENTS:,}, which differ little from more."
         )
     return notes
+
+
+def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
+    """Return at which quantile an uncertain input was taken, with its value if that is the same in all designs."""
+    value = inputs.get(name)
+    return f"{value_text(name, value, units) if isinstance(value, float) else name_of(name)} ({how})"
 
 
 def _facts(
