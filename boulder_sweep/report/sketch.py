@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from boulder_sweep.settings.model import Ground
 
-LEFT, RIGHT = 4.6, 5.0
-"""How much is drawn before and behind the boulder [m]."""
+LEFT, RIGHT = 5.4, 4.0
+"""How much is drawn before and behind the boulder [m]: room for constants of the soil there, and dimensions here."""
 SKY, BELOW = 0.5, 0.5
 """Room above what stands, and below the boulder [m]."""
 TEXT, LINE = 0.26, 0.34
@@ -75,9 +75,10 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     above, roof = height - depth, hood + CAB_M
     bottom = -depth - BELOW
     beside = length + 0.35
+    low = -depth / 2 if abs((ground.water_table_m or 0.0) - depth) < 2 * LINE else -depth + 0.12  # beside its words
     dimensions = (
         Dimension(beside, 0.0, beside, above, "above ground", above, beside + 0.12, above / 2, "start"),
-        Dimension(beside, -depth, beside, 0.0, "embedment", depth, beside + 0.12, -depth + 0.12, "start"),
+        Dimension(beside, -depth, beside, 0.0, "embedment", depth, beside + 0.12, low, "start"),
         Dimension(0.0, above + 0.2, length, above + 0.2, "length", length, 0.0, above + 0.3, "start"),
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
     )
@@ -97,7 +98,7 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
     known = [*tops, ground.water_table_m or 0.0]
     bottom = min(bottom, -max(level for level in known if level <= 2 * height) - BELOW)
-    bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0)) * LINE * len(tops) - 0.3)
+    bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0) + bool(ground.layers)) * LINE * len(tops) - 0.3)
     strata = []
     written = 0.0
     for place, (top, constants) in enumerate(zip(tops, own, strict=True)):
@@ -105,8 +106,13 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
             break
         under = min(tops[place + 1] if place + 1 < len(tops) else -bottom, -bottom)
         units = (("φ′", "deg"), ("ρ", "kg/m^3"), ("k", "MN/m^3"), ("c", "kPa"))
-        named = tuple(
-            (name, value, unit) for (name, unit), value in zip(units, constants, strict=True) if name != "c" or value
+        named = (
+            *((("from", top, "m"),) if ground.layers else ()),
+            *(
+                (name, value, unit)
+                for (name, unit), value in zip(units, constants, strict=True)
+                if name != "c" or value
+            ),
         )
         first = max(top, written) + LINE
         written = first + (len(named) - 1) * LINE
