@@ -68,6 +68,7 @@ def test_every_link_leads_somewhere_and_nothing_is_fetched(site: Path) -> None:
 
 def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
     words = {
+        "index.html": 'role="dialog" aria-label="Search"',
         "quick_start.html": "Which boulder, buried how deep",
         "benchmarks/index.html": "numbalsoda",
         "command_line.html": "sweep fit-vehicle",
