@@ -97,7 +97,7 @@ def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "G
     if by_soil and need.others:
         lines.append("(by the readings of the file; -o writes those by the others as well)")
     remarks = [*volume_lines(tables[0][0]), *_legend(need, file), *_grades(need), *_outside(need)]
-    remarks += foot_lines(need.sweep.model, need.arrow["reason"].unique().to_pylist())
+    remarks += foot_lines(need.sweep.model, need.arrow["reason"].unique().to_pylist(), units)
     if need.key.name == BOULDER_MASS.name:
         remarks += _edges(need, units, file)
     return [*lines, *(part for line in remarks for part in textwrap.wrap(line, width, subsequent_indent="  "))]
@@ -120,11 +120,11 @@ def _by_soil(need: Need, rows: Sequence[Row], width: int, units: str) -> list[li
     names = [name for name in HEADS if name not in (*open_, BOULDER_MASS.name) and varies(need.sweep, need.arrow, name)]
     labels = [name for name in need.sweep.plan.labels if name in need.arrow.column_names]
     soils = [((name, ""), word_of(name)) for name in labels if name == SOIL]
-    soils += [(head_of(name, units), number_of(name)) for name in names if BY_NAME[name].section == SOIL]
+    soils += [(head_of(name, units), number_of(name, units)) for name in names if BY_NAME[name].section == SOIL]
     if not soils or need.sweep.table is not None or key.name == BOULDER_MASS.name:
         return []
     others = [((name, ""), word_of(name)) for name in labels if name != SOIL]
-    others += [(head_of(name, units), number_of(name)) for name in names if BY_NAME[name].section != SOIL]
+    others += [(head_of(name, units), number_of(name, units)) for name in names if BY_NAME[name].section != SOIL]
     others += [] if key.name.startswith("boulder_") else [_mass(units)]
     answer = _answer(key, "", 1.0 if units == "si" else shown_unit(key.field.unit, units).size)
     found: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}

@@ -13,7 +13,7 @@ from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import FOOT_WORDS
-from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.settings.shown_units import number_text, quantity_text, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 if TYPE_CHECKING:
@@ -89,11 +89,11 @@ def grade_lines(rows: Iterable[Row]) -> list[str]:
     return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
 
 
-def foot_lines(model: Model, reasons: Iterable[str | None] = ()) -> list[str]:
+def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:
     """Return on which foot boulders stand, of what rock they are if that is assumed, and what to do about reasons."""
     words = [FOOT_WORDS[model.foot]]
     if model.rock_assumed:
-        words.append(f"rock: {ROCK_KG_M3:g} kg/m^3 assumed (boulder.density); no pass is robust")
+        words.append(f"rock: {quantity_text('kg/m^3', units, ROCK_KG_M3)} assumed (boulder.density); no pass is robust")
     occurring = set(reasons)
     words += [f"undecided ({reason}): {advice}" for reason, advice in WAY_OUT.items() if reason in occurring]
     return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
@@ -139,7 +139,7 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
     if found.sweep.model.second_opinion:
         lines += grade_lines(rows)
-    lines += foot_lines(found.sweep.model)
+    lines += foot_lines(found.sweep.model, units=units)
     if count == 1:
         lines += ["", *_index_lines(found, width)]
     return lines
@@ -188,7 +188,7 @@ def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, u
     lines += volume_lines(lines[0])
     if any(sign in line for line in lines for sign in "≥≤"):
         lines.append("≥, ≤: passes at the worst value tried")
-    return [*lines, *grade_lines(rows), *foot_lines(found.sweep.model)]
+    return [*lines, *grade_lines(rows), *foot_lines(found.sweep.model, units=units)]
 
 
 def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:
@@ -276,7 +276,7 @@ def leading(sweep: Sweep, table: pa.Table, names: Sequence[str], units: str) -> 
     labels: list[Column] = [((name, ""), word_of(name)) for name in sweep.plan.labels if name in table.column_names]
     if sweep.table is not None:
         return [*labels, (("design", ""), lambda row: str(row["design_id"]))]
-    return labels + [(head_of(name, units), number_of(name)) for name in names if varies(sweep, table, name)]
+    return labels + [(head_of(name, units), number_of(name, units)) for name in names if varies(sweep, table, name)]
 
 
 def word_of(name: str) -> Cell:
@@ -292,8 +292,8 @@ def varies(sweep: Sweep, table: pa.Table, name: str) -> bool:
     return name in table.column_names and len(set(table[name].to_pylist())) > 1
 
 
-def number_of(name: str) -> Cell:
-    """Return a formatter for an input."""
+def number_of(name: str, units: str) -> Cell:
+    """Return a formatter for an input in these units."""
     if name == "embedment_ratio":
         return lambda row: f"{row['embedment_depth_m'] / row['boulder_height_m']:.5g}"
-    return lambda row: f"{row[name]:.5g}"
+    return lambda row: number_text(row[name], units)

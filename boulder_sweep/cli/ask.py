@@ -97,9 +97,9 @@ def need(
     from boulder_sweep.answers.need_printing import need_lines
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet)
+    sweep = load_sweep(grid, overrides, quiet, units)
     if question["probability"] is None:
-        sweep = take_values(sweep, at, quiet)
+        sweep = take_values(sweep, at, quiet, units)
     elif at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
     refuse_unwritable(out, picture)
@@ -183,7 +183,7 @@ def uncertainty(
     refuse_units_of_json(units, as_json)
     from boulder_sweep.settings.overrides import ALL_OPINIONS
 
-    sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet)
+    sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet, units)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     with working(quiet, kernels_for(sweep)) as progress:
@@ -258,7 +258,7 @@ def capacity(
     from boulder_sweep.answers.reserves import reserves
 
     refuse_units_of_json(units, as_json)
-    sweep = take_values(load_sweep(grid, overrides, quiet), at, quiet)
+    sweep = take_values(load_sweep(grid, overrides, quiet, units), at, quiet, units)
     refuse_unwritable(out)
     with working(quiet, kernels_for(sweep)) as progress:
         result = reserves(sweep, jobs=jobs, progress=progress)

@@ -95,21 +95,21 @@ def cluster_options(function: Command) -> Command:
     return command
 
 
-def load_sweep(path: str, overrides: Sequence[str], quiet: bool) -> Sweep:
-    """Load settings and print the notes on them, and how inputs follow from the data of a site."""
+def load_sweep(path: str, overrides: Sequence[str], quiet: bool, units: str = "si") -> Sweep:
+    """Load settings and print the notes on them, and how inputs follow from the data of a site, in these units."""
     from boulder_sweep.settings import load
     from boulder_sweep.settings.site_data import derived_words
 
     sweep = load(path, overrides)
     if not quiet:
-        for words in derived_words(sweep.derived):
+        for words in derived_words(sweep.derived, units):
             say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
         for note in sweep.notes:
             say(f"note: {note}")
     return sweep
 
 
-def take_values(sweep: Sweep, at: str | None, quiet: bool) -> Sweep:
+def take_values(sweep: Sweep, at: str | None, quiet: bool, units: str = "si") -> Sweep:
     """Return settings with one value for every uncertain input, and print these values."""
     from boulder_sweep.judge.quantiles import at_values, words_of
 
@@ -117,7 +117,7 @@ def take_values(sweep: Sweep, at: str | None, quiet: bool) -> Sweep:
     if sweep.taken_at and not quiet:
         from boulder_sweep.cli.console import wrap
 
-        say("\n".join(wrap(f"note: {words_of(sweep)}")))
+        say("\n".join(wrap(f"note: {words_of(sweep, units)}")))
     return sweep
 
 

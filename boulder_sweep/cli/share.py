@@ -277,7 +277,7 @@ def explore(
         raise click.UsageError("--set changes entries of a file: name one")
     if case is None and at is not None:
         raise click.UsageError("--at is for a file with uncertain inputs: name one")
-    sweep = example() if case is None else take_values(load_sweep(case, overrides, quiet=False), at, quiet=False)
+    sweep = example() if case is None else take_values(load_sweep(case, overrides, False, units), at, False, units)
     refuse_missing(sweep, case or sweep.name, design)
     target = Path(page or f"{sweep.name.replace('/', '-').replace(' ', '-')}.html")
     written = write_explorer(sweep, design, target, units=units, command=_command())

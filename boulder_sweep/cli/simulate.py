@@ -75,7 +75,7 @@ def simulate(
     """Simulate one design of CASE with its time history, beyond the rotation limit and to the end."""
     from boulder_sweep.cli import console
 
-    sweep = take_values(load_sweep(case, overrides, quiet), at, quiet)
+    sweep = take_values(load_sweep(case, overrides, quiet, units), at, quiet, units)
     number = design or 0
     refuse_missing(sweep, case, number)
     refuse_unwritable_history(plot, trajectory, energy, animate)

@@ -19,6 +19,7 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import sampled_rows
 from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.shown_units import quantity_text
 
 if TYPE_CHECKING:
     from boulder_sweep.judge.judged import Judged
@@ -134,14 +135,13 @@ def _with_quantiles(sweep: Sweep, normals: dict[str, float], taken_at: dict[str,
     )
 
 
-def words_of(sweep: Sweep) -> str:
+def words_of(sweep: Sweep, units: str = "si") -> str:
     """Return the values that uncertain inputs were taken at, in words; empty where there were none."""
     columns = sweep.constants | {name: values for axis in sweep.axes for name, values in axis.columns.items()}
     parts = []
     for name, how in sweep.taken_at.items():
-        values, unit = np.unique(columns[name]), BY_NAME[name].unit
-        ends = f"{values[0]:.4g}" if len(values) == 1 else f"{values[0]:.4g} to {values[-1]:.4g}"
-        parts.append(f"{BY_NAME[name].path} {ends}{'' if unit == '1' else f' {unit}'} ({how})")
+        ends, field = (np.min(columns[name]), np.max(columns[name])), BY_NAME[name]
+        parts.append(f"{field.path} {quantity_text(field.unit, units, *ends)} ({how})")
     return "uncertain inputs taken at one value each: " + ", ".join(parts) if parts else ""
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from boulder_sweep.answers.files import CAPACITY, NEED, AnswerFile
 from boulder_sweep.answers.need import Need
 from boulder_sweep.columns import GRADES, TO_BUILD
-from boulder_sweep.judge.robustness import IN_WORDS, SENSITIVE_IN_WORDS, meaning_of
+from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS, meaning_of
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
 from boulder_sweep.report.asked import capacity_sentences, need_sentences
 from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
@@ -120,7 +120,9 @@ def _grades(rows: Rows, n: int) -> Sentence:
     """Say how many of the passes are robust."""
     robust, sensitive, left = (rows.grades.get(grade, 0) for grade in GRADES)
     if left == n:
-        return ("No second opinion was asked for; whether a pass stands under another form of the model is open.",)
+        asked = rows.kind in (NEED, CAPACITY) or "second_opinion" in rows.finished.identity["settings"]["model"]
+        reason = MEANINGS["open"].capitalize() if asked else "No second opinion was asked for"
+        return (f"{reason}; whether a pass stands under another form of the model is open.",)
     parts = ((robust, f"robust ({IN_WORDS})"), (sensitive, f"sensitive ({SENSITIVE_IN_WORDS})"), (left, "open"))
     told = listed(tuple(f"{count:,} {verb(count, 'are', 'is')} {words}" for count, words in parts if count))
     return (f"Of the {n:,} that {verb(n, 'pass', 'passes')}, {told}.",)

@@ -281,7 +281,7 @@ def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _units() -> list[str]:
-    return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES, *TO_BUILD)} | {"J", "N"})
+    return sorted({spec.unit for spec in (*INPUTS, *OUTCOMES, *TO_BUILD)} | {"J", "N", "kPa"})
 
 
 def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any], ground: Ground) -> dict[str, Any]:

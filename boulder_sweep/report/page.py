@@ -24,6 +24,7 @@ from boulder_sweep.report.contents import (
 )
 from boulder_sweep.report.figures import curves, parts_of, verdict_map
 from boulder_sweep.report.sketch import sketch_of
+from boulder_sweep.settings.shown_units import shown_settings
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
@@ -149,9 +150,9 @@ def assembled(
         heading=heading,
         sketch=sketch_of(chosen[0]["inputs"], settings) if chosen else None,
         settings=settings,
-        lines=setting_lines(settings),
+        lines=setting_lines(shown_settings(settings, units)),
         readings=reading_words(settings),
-        ground=ground_words(settings),
+        ground=ground_words(settings, units),
         shape=shape_of(settings).words,
         fixed=data["boulder"]["fixed"],
         uncertain="distributions" in settings,

@@ -28,8 +28,9 @@ PLAYWRIGHT = (
 """Where Playwright keeps its browser, within its folder."""
 PLAYWRIGHT_FOLDERS = (".cache/ms-playwright", "Library/Caches/ms-playwright", "AppData/Local/ms-playwright")
 HELP = "install Chromium or Chrome, or write the page as .html and print it from a browser"
-MOST_SECONDS = 120
-"""After so long a browser that has not printed the page is ended."""
+MOST_SECONDS = 600
+"""After so long a browser that has not printed the page hangs and is ended; it works for five seconds, of which a busy
+machine makes minutes."""
 SETTLED_MS = 30_000
 """Time of the page that passes before it is printed; the browser skips it while nothing happens."""
 

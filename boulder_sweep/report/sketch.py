@@ -10,8 +10,8 @@ import numpy as np
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import BOX, Shape
 
-LEFT, RIGHT = 4.6, 5.0
-"""How much is drawn before and behind the boulder [m]."""
+LEFT, RIGHT = 5.4, 4.0
+"""How much is drawn before and behind the boulder [m]: room for constants of the soil there, and dimensions here."""
 SKY, BELOW = 0.5, 0.5
 """Room above what stands, and below the boulder [m]."""
 TEXT, LINE = 0.26, 0.34
@@ -49,8 +49,8 @@ class Sketch(NamedTuple):
 
     corners: tuple[tuple[float, float], ...]
     """Of the boulder, from the near one of its foot around."""
-    at_water: tuple[float, float]
-    """Where the near and the far face are at the water table; at the foot or the top where it lies beyond them."""
+    at_water: float
+    """Where the far face is at the water table; at the foot or the top where it lies beyond them."""
     bumper: float
     hood: float
     roof: float
@@ -87,9 +87,10 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     water = depth - (ground.water_table_m or 0.0)
     first, last = float(front.min()), float(back.max())
     beside = last + 0.35
+    low = -depth / 2 if abs((ground.water_table_m or 0.0) - depth) < 2 * LINE else -depth + 0.12  # beside its words
     dimensions = (
         Dimension(beside, 0.0, beside, above, "above ground", above, beside + 0.12, above / 2, "start"),
-        Dimension(beside, -depth, beside, 0.0, "embedment", depth, beside + 0.12, -depth + 0.12, "start"),
+        Dimension(beside, -depth, beside, 0.0, "embedment", depth, beside + 0.12, low, "start"),
         Dimension(first, above + 0.2, last, above + 0.2, "length", length, first, above + 0.3, "start"),
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
     )
@@ -109,7 +110,7 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
     known = [*tops, ground.water_table_m or 0.0]
     bottom = min(bottom, -max(level for level in known if level <= 2 * height) - BELOW)
-    bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0)) * LINE * len(tops) - 0.3)
+    bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0) + bool(ground.layers)) * LINE * len(tops) - 0.3)
     strata = []
     written = 0.0
     for place, (top, constants) in enumerate(zip(tops, own, strict=True)):
@@ -117,8 +118,13 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
             break
         under = min(tops[place + 1] if place + 1 < len(tops) else -bottom, -bottom)
         units = (("φ′", "deg"), ("ρ", "kg/m^3"), ("k", "MN/m^3"), ("c", "kPa"))
-        named = tuple(
-            (name, value, unit) for (name, unit), value in zip(units, constants, strict=True) if name != "c" or value
+        named = (
+            *((("from", top, "m"),) if ground.layers else ()),
+            *(
+                (name, value, unit)
+                for (name, unit), value in zip(units, constants, strict=True)
+                if name != "c" or value
+            ),
         )
         first = max(top, written) + LINE
         written = first + (len(named) - 1) * LINE
@@ -127,7 +133,7 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     strata[-1] = strata[-1]._replace(bottom=-bottom)
     return Sketch(
         corners=tuple((float(x), float(z) - depth) for x, z in around),
-        at_water=(float(np.interp(water, heights, front)), float(np.interp(water, heights, back))),
+        at_water=float(np.interp(water, heights, back)),
         bumper=bumper,
         hood=hood,
         roof=roof,

@@ -23,13 +23,13 @@ from boulder_sweep.report.sentences import Named
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
-from boulder_sweep.settings.shown_units import check_system
+from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.site_data import derived_words
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
 from boulder_sweep.text import counted, printable, why
-from boulder_sweep.views.wording import UNLOADING_WORDS
+from boulder_sweep.views.wording import UNLOADING_WORDS, name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
@@ -111,7 +111,7 @@ def write_report(
             facts=_facts(
                 identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)
             ),
-            notes=[*notes, *_general_notes(settings, control)],
+            notes=[*notes, *_general_notes(settings, control, units)],
             units=units,
         )
     except (KeyError, TypeError) as unfamiliar:
@@ -161,7 +161,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         readings=readings_of(sweep),
         start=inputs,
         facts=_facts(versions(), settings_sha256(settings), kernels_sha256(), command, None),
-        notes=_general_notes(settings, control),
+        notes=_general_notes(settings, control, units),
         units=units,
     )
     return _written(target, text)
@@ -220,12 +220,15 @@ def _notes_on_rules(judged_by: str) -> list[str]:
     ]
 
 
-def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
-    """Return notes on how these designs are simulated."""
+def _general_notes(settings: Mapping[str, Any], control: Control, units: str) -> list[str]:
+    """Return notes on how these designs are simulated, in the units asked for."""
     notes = [f"{FOOT_WORDS[settings['model']['foot']].capitalize()}."]
     if settings["model"].get("rock_assumed"):
-        notes.append(f"The density of the rock was not given: {ROCK_KG_M3:g} kg/m³ is assumed, and no pass is robust.")
-    notes += [f"{words}." for words in derived_words(settings.get("derived", {}))]
+        rock = quantity_text("kg/m^3", units, ROCK_KG_M3)
+        notes.append(f"The density of the rock was not given: {rock} is assumed, and no pass is robust.")
+    notes += [f"{words}." for words in derived_words(settings.get("derived", {}), units)]
+    if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
+        notes.append(f"Each uncertain input is taken at one value: {', '.join(taken)}.")
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:
@@ -238,6 +241,12 @@ def _general_notes(settings: Mapping[str, Any], control: Control) -> list[str]:
             f"{MOST_ELEMENTS:,}, which differ little from more."
         )
     return notes
+
+
+def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
+    """Return at which quantile an uncertain input was taken, with its value if that is the same in all designs."""
+    value = inputs.get(name)
+    return f"{value_text(name, value, units) if isinstance(value, float) else name_of(name)} ({how})"
 
 
 def _facts(

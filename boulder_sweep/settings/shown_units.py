@@ -20,6 +20,8 @@ _SHOWN: dict[str, tuple[str, str]] = {
     "N/m": ("kN/m", "lb/in"),
     "N*s/m": ("kN*s/m", "lb*s/in"),
     "kPa": ("kPa", "psf"),
+    "MPa": ("MPa", "tsf"),
+    "m/s^2": ("m/s^2", "ft/s^2"),
 }
 _FORCES = {"kN": ("kN", "kip"), "N": ("kN", "kip"), "J": ("kJ", "kip*ft")}
 _OF_FORCE = {"kN": 1.0, "N": 1e-3, "J": 1e-3}
@@ -82,6 +84,30 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
         return ShownUnit(unit, 1.0)
     shown = _SHOWN[unit][position]
     return ShownUnit(shown, float(factor(shown, unit)))
+
+
+def number_text(value: float, units: str) -> str:
+    """Return an input in five digits; below 10,000 in four in US units, in which few values are round."""
+    return f"{value:.{4 if units == 'us' and abs(value) < 1e4 else 5}g}"
+
+
+def quantity_text(unit: str, units: str, *ends: float, digits: str = ".4g") -> str:
+    """Return a value or a range in the units asked for: ``3.2 m``, ``3.2 to 3.6 m``.
+
+    Parameters
+    ----------
+    unit
+        Unit of the table in which the values are given; 1 is not written.
+    units
+        ``si`` for that unit, ``us`` for the one that stands for it.
+    *ends
+        The value, or both ends of the range.
+    digits
+        Format of the numbers.
+    """
+    shown, size = (unit, 1.0) if units == "si" else shown_unit(unit, units)
+    numbers = " to ".join(dict.fromkeys(f"{end / size:{digits}}" for end in ends))
+    return numbers if shown == "1" else f"{numbers} {shown}"
 
 
 def shown_column(stored: str, units: str) -> Shown:

@@ -18,6 +18,7 @@ from boulder_sweep.approach import Approach, NoApproachError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.leaf import LeafError, Mistake, read_block, read_single
 from boulder_sweep.settings.model import Bound, Field
+from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 
 APPROACH = "approach"
@@ -112,15 +113,19 @@ def approach_data(approach: Approach) -> dict[str, Any]:
     return {**given, "impact_speed_m_s": approach.impact_speed_m_s}
 
 
-def approach_words(data: dict[str, Any]) -> str:
+def approach_words(data: dict[str, Any], units: str = "si") -> str:
     """Return in one line how a speed follows from a run-up, by what `approach_data` returned."""
     start, curve = data.get("from_m_s", math.inf), data.get("curve_speed_m_s", math.inf)
-    first = "from rest" if start == 0.0 else f"from {_speed(min(start, curve))}"
+
+    def shown(name: str, unit: str) -> str:
+        return quantity_text(unit, units, data[name])
+
+    first = "from rest" if start == 0.0 else f"from {_speed(min(start, curve), units)}"
     if curve < start:
-        first += f", the most in a curve of {data['curve_radius_m']:.4g} m (sqrt({data['friction']:g} g r))"
+        first += f", the most in a curve of {shown('curve_radius_m', 'm')} (sqrt({data['friction']:g} g r))"
     street = "" if data["grade"] == 0.0 else f", grade {100.0 * data['grade']:+g} %"
-    run = f"over {data['length_m']:.4g} m with {data['acceleration_m_s2']:.4g} m/s^2{street}"
-    return f"{_speed(data['impact_speed_m_s'])} is the most that reaches the boulder: {first}, {run}"
+    run = f"over {shown('length_m', 'm')} with {shown('acceleration_m_s2', 'm/s^2')}{street}"
+    return f"{_speed(data['impact_speed_m_s'], units)} is the most that reaches the boulder: {first}, {run}"
 
 
 SOIL_KEYS = ("friction_angle", "density", "subgrade_reaction")
@@ -264,7 +269,7 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
     return data
 
 
-def soil_words(data: dict[str, Any]) -> str:
+def soil_words(data: dict[str, Any], units: str = "si") -> str:
     """Return in one line what is taken of readings, by what `soil_of` returned."""
     weakest = min(data["readings"], key=lambda own: own["friction_angle_deg"])
     count = len(data["readings"])
@@ -273,20 +278,23 @@ def soil_words(data: dict[str, Any]) -> str:
     if "friction_angle_deg" in data:
         angle, sd = data["friction_angle_deg"], data["friction_angle_sd_deg"]
         parts.append(
-            f"friction angle {angle:.4g} deg, sd {sd:g} deg, by {_reading_words(weakest)}{of} ({data['source']})"
+            f"friction angle {angle:.4g} deg, sd {sd:g} deg, by {_reading_words(weakest, units)}{of} ({data['source']})"
         )
     if "density_low_kg_m3" in data:
-        ends = f"{data['density_low_kg_m3']:.0f} to {data['density_high_kg_m3']:.0f} kg/m^3"
-        parts.append(f"density {ends}, uniform (EM 1110-2-2504, Table 3-1)")
+        ends = data["density_low_kg_m3"], data["density_high_kg_m3"]
+        density = quantity_text("kg/m^3", units, *ends, digits=".0f")
+        parts.append(f"density {density}, uniform (EM 1110-2-2504, Table 3-1)")
     if "subgrade_reaction_MN_m3" in data:
-        beta, cov = data["subgrade_reaction_MN_m3"], data["subgrade_reaction_cov"]
-        parts.append(f"subgrade reaction {beta:.3g} MN/m^3, cov {100.0 * cov:.0f} %, which follows the angle (API)")
+        beta = quantity_text("MN/m^3", units, data["subgrade_reaction_MN_m3"], digits=".3g")
+        cov = data["subgrade_reaction_cov"]
+        parts.append(f"subgrade reaction {beta}, cov {100.0 * cov:.0f} %, which follows the angle (API)")
     return "; ".join(parts) or "the readings are not used: the file gives every constant"
 
 
-def _reading_words(reading: dict[str, float]) -> str:
+def _reading_words(reading: dict[str, float], units: str) -> str:
+    depth = quantity_text("m", units, reading.get("depth_m", 0.0))
     if "q_c_MPa" in reading:
-        return f"q_c {reading['q_c_MPa']:g} MPa at {reading['depth_m']:.4g} m, C_N {reading['stress_factor']:.3g}"
+        return f"q_c {quantity_text('MPa', units, reading['q_c_MPa'])} at {depth}, C_N {reading['stress_factor']:.3g}"
     if "relative_density" in reading:
         return f"relative density {100.0 * reading['relative_density']:g} %"
     corrected = f"(N1)60 {reading['n1_60']:.4g}"
@@ -294,7 +302,7 @@ def _reading_words(reading: dict[str, float]) -> str:
         return corrected
     energy = f"{100.0 * reading['energy_ratio']:g} %"
     factors = f"C_N {reading['stress_factor']:.3g}, rods {reading['rod_factor']:g}"
-    return f"N {reading['n']:g} ({energy}) at {reading['depth_m']:.4g} m, {corrected} with {factors}"
+    return f"N {reading['n']:g} ({energy}) at {depth}, {corrected} with {factors}"
 
 
 def unfold_soils(root: Mapping, listed: Collection[str]) -> tuple[list[Mistake], list[dict[str, Any]]]:
@@ -371,18 +379,19 @@ def _soil_entries(entry: Entry, data: dict[str, Any]) -> list[Entry]:
     ]
 
 
-def derived_words(derived: dict[str, Any]) -> list[str]:
+def derived_words(derived: dict[str, Any], units: str = "si") -> list[str]:
     """Return how inputs were worked out, a line each, by `boulder_sweep.settings.Sweep.derived`."""
     lines = []
     for key, path, words in (("soil", "soil", soil_words), (APPROACH, "vehicle.speed", approach_words)):
         for data in derived.get(key, []):
             of_set = f" ({data['name']})" if "name" in data else ""
-            lines.append(f"{path}{of_set}: {words(data)}")
+            lines.append(f"{path}{of_set}: {words(data, units)}")
     return lines
 
 
-def _speed(speed: float) -> str:
-    return f"{speed:.4g} m/s ({speed / 0.44704:.3g} mph)"
+def _speed(speed: float, units: str) -> str:
+    mph = f"{speed / 0.44704:.3g} mph"
+    return f"{speed:.4g} m/s ({mph})" if units == "si" else mph
 
 
 def unfold_approaches(root: Mapping) -> tuple[list[Mistake], list[dict[str, Any]]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.columns import BY_NAME
 from boulder_sweep.settings.model import UNLOADINGS, Ground
 from boulder_sweep.settings.shape import Shape
-from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.settings.shown_units import number_text, shown_unit
 from boulder_sweep.text import NO_BREAK_SPACE
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def label(name: str, units: str = "si") -> str:
 def value_text(name: str, value: float, units: str = "si") -> str:
     """Return the value of an input with its unit: ``φ′ = 36°``."""
     unit = unit_of(name, units)
-    number = f"{value / size_of(name, units):.5g}"
+    number = number_text(value / size_of(name, units), units)
     shown = f"{number}°" if unit == "deg" else f"{number} {unit}".rstrip()
     return SYMBOLS[name].format(shown) if name in SYMBOLS else f"{name_of(name)} {shown}"
 

@@ -68,6 +68,11 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) 
     return "".join(piece if _CODE.fullmatch(piece) else relinked(piece, source) for piece in pieces)
 
 
+def on_post_page(output: str, **_: Any) -> str:
+    """Name the search, which the theme leaves without a name for those who hear the page."""
+    return output.replace('role="dialog"', 'role="dialog" aria-label="Search"', 1)
+
+
 @cache
 def taken() -> tuple[str, ...]:
     """Return files from elsewhere that belong to the site, as placed in the repository: pages, and what is linked."""

@@ -37,6 +37,22 @@ def test_the_section_has_its_dimensions_layers_and_water_in_the_units_chosen(tmp
     assert "length 5.41" in " ".join(page.locator(".section svg text").all_text_contents())
 
 
+def test_all_of_a_report_in_us_units_is_in_them_and_says_what_uncertain_inputs_were_taken_at(tmp_path):
+    uncertain = ["soil.friction_angle={mean: 40 deg, cov: 5 %}", "soil.water_table=0.8 m", "soil.cohesion=4 kPa"]
+    (tmp_path / "site.yaml").write_text(SITE)
+    sweep = boulder_sweep.at_values(boulder_sweep.load(tmp_path / "site.yaml", uncertain), "mean")
+    boulder_sweep.run(sweep, tmp_path / "site.sweep")
+    text = write_report(tmp_path / "site.sweep", tmp_path / "site.html", units="us").read_text()
+    for said in (
+        "water table 2.625 ft down",
+        "cohesion 83.54 psf",
+        "water_table_ft: 2.62467",
+        "boulder_length_ft: 5.413",
+    ):
+        assert said in text
+    assert "Each uncertain input is taken at one value: φ′ = 40° (mean)." in text
+
+
 @pytest.mark.nightly
 def test_the_page_is_printed_to_a_pdf(result, tmp_path, chromium):
     file = write_report(result, tmp_path / "page.pdf", heading=Heading(client="City"))

@@ -135,7 +135,6 @@ def test_the_section_is_that_of_the_stone_and_its_water_ends_at_the_faces():
     np.testing.assert_allclose(ys, np.array([0, 1.6, 3.44, 3.44, 1.6, 0]) - 2.03)
     reaches = np.array([-0.75, -0.9, -0.8, 0.5, 0.8, 0.75])
     np.testing.assert_allclose(xs, STRUCK + reaches)
-    at_water = np.interp(1.23, [0, 1.6], [0.75, 0.9]), np.interp(1.23, [0, 1.6], [0.75, 0.8])
-    assert drawn.at_water == pytest.approx((STRUCK - at_water[0], STRUCK + at_water[1]))
+    assert drawn.at_water == pytest.approx(STRUCK + np.interp(1.23, [0, 1.6], [0.75, 0.8]))
     length = next(one for one in drawn.dimensions if one.name == "length")
     assert (length.x1 - length.x0, length.value) == pytest.approx((1.7, 1.7))

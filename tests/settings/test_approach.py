@@ -70,6 +70,9 @@ def test_the_file(load_it, minimal):
         "vehicle.speed: 16.49 m/s (36.9 mph) is the most that reaches the boulder: from 8.941 m/s (20 mph), over 80 m "
         "with 1.2 m/s^2"
     )
+    assert derived_words(sweep.derived, "us")[0] == (
+        "vehicle.speed: 36.9 mph is the most that reaches the boulder: from 20 mph, over 262.5 ft with 3.937 ft/s^2"
+    )
     us = WHOLE.replace("80 m", "262.46719160104987 ft").replace("1.2 m/s^2", "3.937007874015748 ft/s^2")
     assert load_it(minimal.replace(SPEED, us)).constants["impact_speed_m_s"] == pytest.approx(speed, rel=1e-12)
 

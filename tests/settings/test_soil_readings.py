@@ -66,6 +66,7 @@ def test_cones_and_relative_density(soil):
 
 def test_us_units(soil):
     metric, us = soil("cpt: {q_c: 9 MPa, depth: 1.5 m}"), soil("cpt: {q_c: 93.984 tsf, depth: 4.9212598 ft}")
+    assert "q_c 93.98 tsf at 4.921 ft, C_N" in derived_words(us.derived, "us")[0]
     assert us.constants[ANGLE] == pytest.approx(metric.constants[ANGLE], abs=1e-4)
 
 
@@ -110,6 +111,10 @@ def test_what_was_used_is_said_and_kept(soil):
         "soil: friction angle 41.71 deg, sd 3 deg, by N 24 (60 %) at 1.5 m, (N1)60 30.6 with C_N 1.7, rods 0.75 "
         "(Hatanaka and Uchida 1996); density 1762 to 2243 kg/m^3, uniform (EM 1110-2-2504, Table 3-1); subgrade "
         "reaction 87.1 MN/m^3, cov 58 %, which follows the angle (API)"
+    )
+    (us,) = derived_words(sweep.derived, "us")
+    assert us == words.replace("1.5 m", "4.921 ft").replace("1762 to 2243 kg/m^3", "110 to 140 pcf").replace(
+        "87.1 MN/m^3", "321 pci"
     )
     (data,) = sweep.resolved()["derived"]["soil"]
     assert data["friction_angle_deg"] == sweep.constants[ANGLE]

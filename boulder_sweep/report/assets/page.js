@@ -9,8 +9,8 @@ const SPREAD = 0.25;
 const PAUSE = 150;
 /** Screens on which legends stand below their figures; the style of the page has the same. */
 const NARROW = "(max-width: 46rem)";
-/** Width of a sheet of A4 between its margins [px]. */
-const PAPER = 680;
+/** Width that is printed [px]: that of a sheet of A4 between its margins, less a tenth; so most pages hold what belongs together. */
+const PAPER = 612;
 
 /** The whole page: what the reader does, and what is simulated and shown for it. */
 class Page {
