@@ -9,7 +9,7 @@ A point of the boulder at (a, b) from the common centre of mass, a to the right 
 
     X = a cos(theta) + b sin(theta),   Y = y_b - a sin(theta) + b cos(theta)
 
-Soil, base and sides are sums over `flat.WIDTH` pieces each, in an order of their own, so that the bits are those of any
+Soil, base and sides are sums over `PIECES` pieces each, by `PARTS` partial sums, so that the bits are those of any
 processor. Every force is either the slope of one potential or takes energy out of the motion.
 """
 
@@ -29,11 +29,15 @@ from .soil import Kinematics, soil_kinematics
 
 PIECES = WIDTH
 """Elements of the soil over the depth, strips of the foot, and points of the sides."""
+PARTS = 8
+"""Partial sums: as many as numbers in the widest registers. Piece j belongs to that of j modulo PARTS."""
+EACH = PIECES // PARTS
 SIDE_ROWS, SIDE_COLUMNS = 8, 4
 """Points of the sides over the depth and over the length."""
-SETS, FOOT, SIDE_A, SIDE_B, SIDE_DEPTH, SUMS = (PIECES * n for n in range(6))
-"""Places in the workspace: sets of the strips and where they lie along the foot; points of the sides; six sums."""
-ROOM = SUMS + 6 * PIECES
+SETS, FOOT, SIDE_A, SIDE_B, SIDE_DEPTH, RATIO, SUMS = (PIECES * n for n in range(7))
+"""Places in the workspace: sets of the strips and where they lie along the foot; points of the sides; middles of the
+soil elements as shares of the depth; partial sums of five numbers."""
+ROOM = SUMS + 5 * PARTS
 """Numbers in the workspace."""
 FULL_DRAG = 0.5
 """A soil element drags in full where it is covered by this share of its height; the element at the soil line is."""
@@ -174,19 +178,24 @@ def prepare(work: np.ndarray, f: HeaveConstants) -> None:
         put(work, SIDE_A, j, (column + 0.5) * (f.L / SIDE_COLUMNS) - c.c_x)
         put(work, SIDE_B, j, c.z_0 - depth)
         put(work, SIDE_DEPTH, j, depth)
+        put(work, RATIO, j, (j + 0.5) * (1.0 / PIECES))
 
 
 @inlined
 def summed(work: np.ndarray, n: int) -> float:
-    """Sum the pieces of the number n, by halves."""
-    first = SUMS + n * PIECES
-    for j in range(16):
-        put(work, first, j, field(work, first, j) + field(work, first, j + 16))
-    for j in range(8):
-        put(work, first, j, field(work, first, j) + field(work, first, j + 8))
+    """Add up the partial sums of the number n, by halves."""
+    first = SUMS + n * PARTS
     left = (field(work, first, 0) + field(work, first, 4)) + (field(work, first, 2) + field(work, first, 6))
     right = (field(work, first, 1) + field(work, first, 5)) + (field(work, first, 3) + field(work, first, 7))
     return left + right
+
+
+@inlined
+def add_to(work: np.ndarray, j: int, along_x: float, turning: float, lifting: float) -> None:
+    """Add to the partial sums j of the first three numbers: force along X, moment, force upwards."""
+    put(work, SUMS, j, field(work, SUMS, j) + along_x)
+    put(work, SUMS + PARTS, j, field(work, SUMS + PARTS, j) + turning)
+    put(work, SUMS + 2 * PARTS, j, field(work, SUMS + 2 * PARTS, j) + lifting)
 
 
 @inlined
@@ -213,21 +222,22 @@ class Element(NamedTuple):
 
 
 @inlined
-def soil_element(j: int, y_b: float, sin: float, versin: float, k: Kinematics, f: HeaveConstants) -> Element:
+def soil_element(
+    work: np.ndarray, j: int, y_b: float, sin: float, versin: float, k: Kinematics, f: HeaveConstants
+) -> Element:
     """Forces and energy of soil element j; its depth follows the rise of the face that it presses on (Eq 132)."""
     c = f.c
-    ratio = (j + 0.5) * (1.0 / PIECES)
+    ratio = field(work, RATIO, j)
     u = k.A - k.slope_x * ratio
     v = k.B - k.slope_v * ratio
     alpha = c.d * ratio
     d_n = alpha - c.z_0
     edge = c.l_n if u > 0.0 else c.l_n - f.L
     depth = max(alpha - f.heave * (y_b - edge * sin + d_n * versin), 0.0)
-    h_e = c.d * (1.0 / PIECES)
     stiffness = c.K_soil * (1.0 / PIECES) / c.d
     limited = min(max(u, -c.x_yield), c.x_yield)
     stored = stiffness * (0.5 * limited * limited + c.x_yield * (abs(u) - abs(limited)))
-    covered = min(depth, FULL_DRAG * h_e) / (FULL_DRAG * h_e)
+    covered = min(depth * (PIECES / (FULL_DRAG * c.d)), 1.0)
     drag = -c.R_soil * (1.0 / PIECES) * covered * v * abs(v)
     lift = f.heave * stored if depth > 0.0 else 0.0
     lift_lever = d_n * sin - edge * (1.0 - versin)
@@ -265,7 +275,7 @@ def foot_strip(
     a, cos = field(work, FOOT, j), 1.0 - versin
     X, Y = a * cos - f.c.c_y * sin, -a * sin - f.c.c_y * cos
     elastic = min(max(f.k_strip * strip_depth(work, j, y_b, sin, versin, f), 0.0), f.q_strip)
-    on = min(elastic / (f.k_strip * f.s_0), 1.0)
+    on = min(elastic * (1.0 / (f.k_strip * f.s_0)), 1.0)
     total = min(max(elastic - on * f.c_strip * (w_b - omega_b * X), 0.0), f.q_strip)
     return Strip(elastic, total, X, Y)
 
@@ -305,14 +315,21 @@ def forces(
     sin, versin = sine_versine(theta_b)
     cos = 1.0 - versin
     k = soil_kinematics(x_b, v_b, omega_b, sin, versin, c)
-    for j in range(PIECES):
-        e = soil_element(j, y_b, sin, versin, k, f)
-        F = e.spring + e.drag
-        put(work, SUMS, j, F)
-        put(work, SUMS + PIECES, j, e.lift * e.lift_lever - F * e.lever)
-        put(work, SUMS + 2 * PIECES, j, e.lift)
-        put(work, SUMS + 3 * PIECES, j, max(-F, 0.0))
-        put(work, SUMS + 4 * PIECES, j, max(F, 0.0))
+    for j in range(PARTS):
+        along_x = turning = lifting = far = near = 0.0
+        for part in range(EACH):
+            e = soil_element(work, j + part * PARTS, y_b, sin, versin, k, f)
+            F = e.spring + e.drag
+            along_x += F
+            turning += e.lift * e.lift_lever - F * e.lever
+            lifting += e.lift
+            far += max(-F, 0.0)
+            near += max(F, 0.0)
+        put(work, SUMS, j, along_x)
+        put(work, SUMS + PARTS, j, turning)
+        put(work, SUMS + 2 * PARTS, j, lifting)
+        put(work, SUMS + 3 * PARTS, j, far)
+        put(work, SUMS + 4 * PARTS, j, near)
     far, near = summed(work, 3), summed(work, 4)
     # The faces slip along themselves, each with one speed all over.
     along = v_b * sin + w_b * cos
@@ -322,24 +339,31 @@ def forces(
     Q_y = (F_far + F_near) * cos
     Q_theta = F_near * (f.L - c.l_n) - F_far * c.l_n
 
-    for j in range(PIECES):
-        a, b = field(work, SIDE_A, j), field(work, SIDE_B, j)
-        X, Y = a * cos + b * sin, b * cos - a * sin
-        v_x, v_y = v_b + omega_b * Y, w_b - omega_b * X
-        pressed = f.side * max(field(work, SIDE_DEPTH, j) - f.heave * y_b, 0.0)
-        share = -pressed / math.sqrt(v_x * v_x + v_y * v_y + f.v_s * f.v_s)
-        put(work, SUMS, j, field(work, SUMS, j) + share * v_x)
-        put(work, SUMS + PIECES, j, field(work, SUMS + PIECES, j) + share * (v_x * Y - v_y * X))
-        put(work, SUMS + 2 * PIECES, j, field(work, SUMS + 2 * PIECES, j) + share * v_y)
+    for j in range(PARTS):
+        along_x = turning = lifting = 0.0
+        for part in range(EACH):
+            piece = j + part * PARTS
+            a, b = field(work, SIDE_A, piece), field(work, SIDE_B, piece)
+            X, Y = a * cos + b * sin, b * cos - a * sin
+            v_x, v_y = v_b + omega_b * Y, w_b - omega_b * X
+            pressed = f.side * max(field(work, SIDE_DEPTH, piece) - f.heave * y_b, 0.0)
+            share = -pressed / math.sqrt(v_x * v_x + v_y * v_y + f.v_s * f.v_s)
+            along_x += share * v_x
+            turning += share * (v_x * Y - v_y * X)
+            lifting += share * v_y
+        add_to(work, j, along_x, turning, lifting)
 
     weight = f.m_b * G
     if f.heave > 0.0:
-        for j in range(PIECES):
-            s = foot_strip(work, j, y_b, w_b, omega_b, sin, versin, f)
-            rub = -f.friction * s.total * slipping(v_b + omega_b * s.Y, f)
-            put(work, SUMS, j, field(work, SUMS, j) + rub)
-            put(work, SUMS + PIECES, j, field(work, SUMS + PIECES, j) + (rub * s.Y - s.total * s.X))
-            put(work, SUMS + 2 * PIECES, j, field(work, SUMS + 2 * PIECES, j) + s.total)
+        for j in range(PARTS):
+            along_x = turning = lifting = 0.0
+            for part in range(EACH):
+                s = foot_strip(work, j + part * PARTS, y_b, w_b, omega_b, sin, versin, f)
+                rub = -f.friction * s.total * slipping(v_b + omega_b * s.Y, f)
+                along_x += rub
+                turning += rub * s.Y - s.total * s.X
+                lifting += s.total
+            add_to(work, j, along_x, turning, lifting)
         Q_theta += weight * (f.a_b * cos + f.b_b * sin)
         Q_y -= weight
     else:
@@ -431,14 +455,19 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
     """
     sin, versin = sine_versine(theta_b)
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
-    for j in range(PIECES):
-        e = soil_element(j, y_b, sin, versin, k, f)
-        depth = max(strip_depth(work, j, y_b, sin, versin, f), 0.0)
-        elastic = min(f.k_strip * depth, f.q_strip)
-        pressed = elastic * (depth - 0.5 * elastic / f.k_strip)
-        put(work, SUMS, j, e.energy + f.heave * pressed)
-        put(work, SUMS + PIECES, j, e.spring)
-        put(work, SUMS + 2 * PIECES, j, e.lift + f.heave * elastic)
+    for j in range(PARTS):
+        energy = along_x = lifting = 0.0
+        for part in range(EACH):
+            piece = j + part * PARTS
+            e = soil_element(work, piece, y_b, sin, versin, k, f)
+            depth = max(strip_depth(work, piece, y_b, sin, versin, f), 0.0)
+            elastic = min(f.k_strip * depth, f.q_strip)
+            energy += e.energy + f.heave * elastic * (depth - elastic * (0.5 / f.k_strip))
+            along_x += e.spring
+            lifting += e.lift + f.heave * elastic
+        put(work, SUMS, j, energy)
+        put(work, SUMS + PARTS, j, along_x)
+        put(work, SUMS + 2 * PARTS, j, lifting)
     V, Q_x, Q_y = summed(work, 0), summed(work, 1), summed(work, 2)
     weight = f.m_b * G
     if f.heave > 0.0:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ._jit import inlined, kernel
 from .dense_output import Track, displacement_at, slope_at, track, turning_point
-from .design import Constants, constants_of, corrected, design_in, error_arm, is_computable
+from .design import Constants, G, constants_of, corrected, design_in, error_arm, is_computable
 from .dormand_prince import AA, ERROR, STAGES, A, C
 from .dynamics import contact_displacement, spring_compression
 from .flat import field, put
@@ -59,8 +59,8 @@ CAUTION = 0.01
 """Share of the least energy by which the energy must be below it: the errors of integrator and search, and more."""
 TURNS = 3
 """How often the least energy is looked for along x_b and along y_b in turn."""
-HALVINGS = 24
-"""Halvings of an interval in which it is looked for."""
+PLACED = 1e-6
+"""How precisely, as a share of the energy that lifts the boulder by its length."""
 
 
 class HeaveControl(NamedTuple):
@@ -211,32 +211,54 @@ def foot_rises(work: np.ndarray, q: Tracks, tau_end: float, h: float, f: HeaveCo
     What is pressed in is kept at the end of a step (`press_in`), so no step may go on from where a strip is deepest.
     """
     tau, capacity = tau_end, f.q_strip / f.k_strip
-    sin, versin = sine_versine(displacement_at(q.theta_b, 0.0))
-    y = displacement_at(q.y_b, 0.0)
+    start, end = foot_at(q, 0.0), foot_at(q, tau)
+    coming_back = 0
     for j in range(PIECES):
-        sinking, at_end = sinking_in(work, j, q, 0.0, f), sinking_in(work, j, q, tau, f)
+        sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
+        coming_back += int((sinking > LEAST_SINKING * h) & (at_end < 0.0))
+    if coming_back == 0:
+        return tau
+    for j in range(PIECES):
+        sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
         # A strip that slows down gets no deeper than it would at the speed that it has.
-        reach = strip_depth(work, j, y, sin, versin, f) + sinking * tau
+        reach = strip_depth(work, j, start.y, start.sin, start.versin, f) + sinking * tau
         if sinking > LEAST_SINKING * h and at_end < 0.0 and reach > capacity:
-            b, at = Bracket(0.0, sinking, tau, at_end, 0.0), tau
+            b, at, middle = Bracket(0.0, sinking, tau, at_end, 0.0), tau, end
             for _ in range(ITERATIONS):
                 at = next_guess(b)
-                there = sinking_in(work, j, q, at, f)
+                middle = foot_at(q, at)
+                there = sinking_in(work, j, middle, f)
                 if abs(there) < 0.1 * LEAST_SINKING * h or b.high - b.low < 1e-12:
                     break
                 b = narrowed(b, at, there)
-            sin_at, versin_at = sine_versine(displacement_at(q.theta_b, at))
-            if strip_depth(work, j, displacement_at(q.y_b, at), sin_at, versin_at, f) > capacity:
-                tau = at
+            if strip_depth(work, j, middle.y, middle.sin, middle.versin, f) > capacity:
+                tau, end = at, middle
     return tau
 
 
+class FootMotion(NamedTuple):
+    """Rotation and rise at an instant within a step, and how fast they change, times its length."""
+
+    sin: float
+    versin: float
+    turning: float
+    """Change of the rotation [rad]."""
+    y: float
+    rising: float
+    """Change of the rise [m]."""
+
+
 @inlined
-def sinking_in(work: np.ndarray, j: int, q: Tracks, tau: float, f: HeaveConstants) -> float:
-    """Velocity at which strip j of the foot sinks at the fraction tau of a step, times its length [m]."""
+def foot_at(q: Tracks, tau: float) -> FootMotion:
+    """Rotation and rise at the fraction tau of a step."""
     sin, versin = sine_versine(displacement_at(q.theta_b, tau))
-    lever = field(work, FOOT, j) * (1.0 - versin) - f.c.c_y * sin
-    return lever * slope_at(q.theta_b, tau) - slope_at(q.y_b, tau)
+    return FootMotion(sin, versin, slope_at(q.theta_b, tau), displacement_at(q.y_b, tau), slope_at(q.y_b, tau))
+
+
+@inlined
+def sinking_in(work: np.ndarray, j: int, m: FootMotion, f: HeaveConstants) -> float:
+    """Velocity at which strip j of the foot sinks, times the length of the step [m]."""
+    return (field(work, FOOT, j) * (1.0 - m.versin) - f.c.c_y * m.sin) * m.turning - m.rising
 
 
 @kernel
@@ -284,7 +306,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
 
     Notes
     -----
-    Along x_b alone, and along y_b alone, the energy is convex: a least is found by halving, along either in turn.
+    Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero, in either in turn.
     Along x_b it is between the places where the uppermost and the lowest soil are as they were; along y_b between
     those where all strips carry what they can, which is more than the weight, and where the boulder is out of the soil.
     There may be several: the search starts from both ends along x_b and from the middle.
@@ -297,19 +319,45 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
         bottom = min(bottom, strip_depth(work, j, 0.0, sin, versin, f) - f.q_strip / f.k_strip)
     least = np.inf
     for start in range(3):
-        x, y = left + 0.5 * start * (right - left), 0.0
+        place = Place(left + 0.5 * start * (right - left), 0.0, np.inf)
         for _ in range(TURNS):
             if f.heave > 0.0:
-                low, high = bottom, top
-                for _ in range(HALVINGS):
-                    y = 0.5 * (low + high)
-                    low, high = (y, high) if potential_energy(x, theta, y, work, f).Q_y > 0.0 else (low, y)
-            low, high = left, right
-            for _ in range(HALVINGS):
-                x = 0.5 * (low + high)
-                low, high = (x, high) if potential_energy(x, theta, y, work, f).Q_x > 0.0 else (low, x)
-        least = min(least, potential_energy(x, theta, y, work, f).u)
+                place = eased(place, False, bottom, top, theta, work, f)
+            place = eased(place, True, left, right, theta, work, f)
+        least = min(least, place.energy)
     return least
+
+
+class Place(NamedTuple):
+    """Where the boulder stands at some rotation."""
+
+    x: float
+    """Displacement [m]."""
+    y: float
+    """Rise [m]."""
+    energy: float
+    """Potential energy there [J]."""
+
+
+@kernel
+def eased(
+    place: Place, sideways: bool, low: float, high: float, theta: float, work: np.ndarray, f: HeaveConstants
+) -> Place:
+    """Move along x_b, or else along y_b, between two ends that push inwards, to where the energy is least."""
+    x, y, energy = place
+    weight = f.m_b * G
+    # What pushes at the ends is not known; its size only matters to the first chords.
+    b = Bracket(low, weight, high, -weight, 0.0)
+    for _ in range(ITERATIONS):
+        p = potential_energy(x, theta, y, work, f)
+        push, at, energy = (p.Q_x, x, p.u) if sideways else (p.Q_y, y, p.u)
+        # No place between the ends costs less by more than this, as the energy is convex.
+        if abs(push) * (b.high - b.low) <= PLACED * weight * f.L:
+            break
+        b = narrowed(b, at, push)
+        at = next_guess(b)
+        x, y = (at, y) if sideways else (x, at)
+    return Place(x, y, energy)
 
 
 @kernel

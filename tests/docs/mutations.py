@@ -145,14 +145,14 @@ MUTATIONS = (
     Mutation((133,), _OPINION, "and at_end < 0.0 and reach > capacity", "and at_end > 0.0 and reach > capacity"),
     Mutation((134,), _HEAVE, "return v / math.sqrt(v * v + f.v_s * f.v_s)", "return v / (abs(v) + f.v_s)"),
     Mutation((134,), _HEAVE, "along - omega_b * c.l_n", "along + omega_b * c.l_n"),
-    Mutation((134,), _HEAVE, "SUMS + 4 * PIECES, j, max(F, 0.0)", "SUMS + 4 * PIECES, j, max(-F, 0.0)"),
+    Mutation((134,), _HEAVE, "near += max(F, 0.0)", "near += max(-F, 0.0)"),
     Mutation((134,), _HEAVE, "rub = -f.friction * s.total * slipping", "rub = -f.friction * s.elastic * slipping"),
     Mutation((134,), _HEAVE, "at_rest = 1.0 - math.sin(design.phi)", "at_rest = 1.0"),
     Mutation((134,), _HEAVE, "math.tan(2.0 / 3.0 * design.phi)", "math.tan(design.phi)"),
     Mutation((135,), _HEAVE, "a = f.a_b + 0.5 * f.L * min", "a = f.a_b - 0.5 * f.L * min"),
     Mutation((135,), _HEAVE, "return 6.0 * f.s_0 / f.L", "return 2.0 * f.s_0 / f.L"),
     Mutation(
-        (136,), _HEAVE, "elastic * (depth - 0.5 * elastic / f.k_strip)", "elastic * (depth - elastic / f.k_strip)"
+        (136,), _HEAVE, "elastic * (depth - elastic * (0.5 / f.k_strip))", "elastic * (depth - elastic / f.k_strip)"
     ),
     Mutation(
         (136,), _HEAVE, "weight * (y_b - f.a_b * sin - f.b_b * versin)", "weight * (y_b - f.a_b * sin + f.b_b * versin)"
