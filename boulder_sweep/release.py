@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 import shutil
 import subprocess
 import sys
@@ -20,7 +19,6 @@ from importlib import import_module
 from pathlib import Path
 
 from boulder_kernels import _ahead, source_hash
-from boulder_kernels._arguments import examples
 from boulder_kernels._cache import CACHE_VARIABLE, LEVELS, SHIPPED, SOURCES
 from boulder_sweep.store.files import put_file
 
@@ -80,10 +78,7 @@ def compile_recorded(recorded: Path, target: Path) -> None:
     for file in sorted(recorded.glob(f"*{_ahead.RETURNS}")):
         module, kernel, _ = file.stem.rsplit("-", 2)
         wanted = getattr(import_module(f"boulder_kernels.{module}"), kernel)
-        types = _ahead.described(file)["types"]
-        for of_record in re.findall(r"([\w.]+):", types):
-            import_module(of_record)
-        code, library, kept = wanted.compiler.compiled_ahead(wanted, examples(types), types)
+        code, library, kept = wanted.compiler.compiled_ahead(wanted, _ahead.described(file)["types"])
         if library is None:
             raise RuntimeError(f"{module}.{kernel} cannot be linked by {os.environ.get('CC', 'cc')}")
         _ahead.keep(target / file.stem, code, library, kept)

@@ -16,7 +16,6 @@ from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.locations import Location
-from boulder_sweep.runner.cluster import Cluster
 from boulder_sweep.runner.committer import Committer
 from boulder_sweep.runner.computing import Computation, Computed, Ended, Message, Note
 from boulder_sweep.runner.estimate import (
@@ -30,7 +29,6 @@ from boulder_sweep.runner.estimate import (
 )
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.pool import DASK, start_failure
-from boulder_sweep.runner.remote import ClusterWorkers
 from boulder_sweep.runner.summary import Progress, progress_of
 from boulder_sweep.runner.threads import ThreadWorkers
 from boulder_sweep.store.errors import DoesNotFitError
@@ -39,6 +37,8 @@ from boulder_sweep.store.provenance import cpu_name, file_metadata
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 
 if TYPE_CHECKING:
+    from boulder_sweep.runner.cluster import Cluster
+    from boulder_sweep.runner.remote import ClusterWorkers
     from boulder_sweep.settings import Sweep
 
 Report = Callable[[Progress], None]
@@ -80,6 +80,8 @@ class Run:
         self.jobs = jobs
         try:
             if backend == DASK:
+                from boulder_sweep.runner.cluster import Cluster
+
                 self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler, dashboard), Cluster.close)
                 self.jobs = max(sum(self._signals.call(self._cluster.threads).values()), 1)
                 self.manifest.sessions[-1].jobs = self.jobs
@@ -178,6 +180,8 @@ class Run:
         manifest, size = self._folder.manifest, self._estimate.rows_per_block
         if self._cluster is not None:
             rows = rows_per_task(self._estimate, manifest.rows_per_part)
+            from boulder_sweep.runner.remote import ClusterWorkers
+
             return ClusterWorkers(self._cluster, computation, tasks(manifest.missing(), rows), size, self._folder)
         most = rows_in_progress(size, self.jobs, manifest.rows_per_part)
         ranges = blocks(manifest.missing(), size)

@@ -11,7 +11,6 @@ import warnings
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -27,6 +26,8 @@ from boulder_sweep.store.verify import load_checked, wrong_bytes
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     import pandas as pd
     import pyarrow as pa
 
@@ -208,6 +209,8 @@ class FinishedRows:
         DamagedError
             A part is missing, truncated or changed.
         """
+        from concurrent.futures import ThreadPoolExecutor  # imports logging, which a short run does without
+
         _, damaged = load_checked(self._folder, read_parts=False)
         if damaged:
             raise DamagedError(_damage_text(self._folder, damaged))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 
 from boulder_sweep.locations import Location, RemotePath
@@ -81,6 +80,8 @@ def damaged_parts(folder: Location, parts: Mapping[str, Part], *, read_parts: bo
     check = wrong_content if read_parts else wrong_size
     if len(parts) == 1:  # as when a slow run commits: no thread for that
         return {name: wrong for name, part in parts.items() if (wrong := check(folder / name, part))}
+    from concurrent.futures import ThreadPoolExecutor  # imports logging, which a short run does without
+
     # Checksums are computed without the interpreter's lock, so threads work in parallel.
     with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
         found = pool.map(lambda name: check(folder / name, parts[name]), parts)

@@ -66,7 +66,7 @@ def call(kernel: Any, arguments: tuple[Any, ...]) -> Any:
     types = ",".join([flatten(value, reals, wholes, arrays) for value in arguments])
     native = kernel.natives.get(types)
     if native is None:
-        native = kernel.natives[types] = _found(kernel, types, arguments)
+        native = kernel.natives[types] = _found(kernel, types)
     if native is UNSUITABLE:
         raise UnsuitableError
     out = (ctypes.c_double * native.numbers)()
@@ -86,7 +86,7 @@ def call(kernel: Any, arguments: tuple[Any, ...]) -> Any:
 UNSUITABLE: Any = object()
 
 
-def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
+def _found(kernel: Any, types: str) -> Any:
     """Return a compiled kernel, compiled now if it is not on the disk; `UNSUITABLE` where it cannot be."""
     with _COMPILING:
         name, kept_in = file_name(kernel, types), folder()
@@ -95,7 +95,7 @@ def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
                 with contextlib.suppress(UnusableError):
                     return loaded(place / name)
         try:
-            code, library, kept = kernel.compiler.compiled_ahead(kernel, arguments, types)
+            code, library, kept = kernel.compiler.compiled_ahead(kernel, types)
         except UnsuitableError:
             return UNSUITABLE
         if kept_in is not None:
@@ -106,7 +106,7 @@ def _found(kernel: Any, types: str, arguments: tuple[Any, ...]) -> Any:
                 return loaded(kept_in / name)
         from . import _llvm
 
-        return native_of(_llvm.loaded(code), kept)
+        return native_of(*_llvm.loaded(code, ENTRY), kept)
 
 
 class UnusableError(Exception):
@@ -150,13 +150,14 @@ def loaded(file: Path) -> Native:
     kept, library = described(file.with_suffix(RETURNS)), file.with_suffix(LIBRARY)
     try:
         if library.exists():
-            return native_of(ctypes.CDLL(str(library)), kept)
+            opened = ctypes.CDLL(str(library))
+            return native_of(opened[ENTRY], opened, kept)
         code = file.with_suffix(OBJECT).read_bytes()
     except (OSError, AttributeError) as problem:  # ctypes says so of a library without the function
         raise UnusableError(str(problem)) from problem
     from . import _llvm
 
-    return native_of(_llvm.loaded(code), kept)
+    return native_of(*_llvm.loaded(code, ENTRY), kept)
 
 
 def described(file: Path) -> dict[str, Any]:
@@ -174,11 +175,9 @@ def described(file: Path) -> dict[str, Any]:
     return kept
 
 
-def native_of(library: Any, kept: dict[str, Any]) -> Native:
-    """Return the kernel of a library that has been loaded; `kept` is what was written beside it."""
-    function = library[ENTRY]
-    pointer = ctypes.c_void_p
-    function.argtypes = [pointer] * (5 + kept["arrays"])
+def native_of(function: Any, library: Any, kept: dict[str, Any]) -> Native:
+    """Return the kernel whose function has been loaded with a library; `kept` is what was written beside it."""
+    function.argtypes = [ctypes.c_void_p] * (5 + kept["arrays"])
     function.restype = ctypes.c_int32
     return Native(function, kept["returns"], kept["numbers"], library)
 

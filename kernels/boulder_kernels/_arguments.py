@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-import re
-import sys
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -53,32 +52,6 @@ def flatten(value: Any, reals: list[float], wholes: list[int], arrays: list[np.n
     raise UnsuitableError
 
 
-def examples(types: str) -> tuple[Any, ...]:
-    """Return arguments of the types that `flatten` has given as text, with commas between them; arrays are empty.
-
-    The modules of records must have been imported.
-    """
-    values: list[tuple[Any, list[Any]]] = [(tuple, [])]  # what makes each record that is not closed yet, and its fields
-    for name, end in re.findall(r"([^(),]*)([(),]|$)", types):
-        if end == "(":
-            values.append((record_of(name)._make if name else tuple, []))
-            continue
-        if name:
-            values[-1][1].append(_SIMPLE[name] if name in _SIMPLE else _empty(name))
-        if end == ")":
-            make, fields = values.pop()
-            values[-1][1].append(make(fields))
-    return tuple(values[0][1])
-
-
-_SIMPLE = {REAL: 0.0, WHOLE: 0, TRUTH: False, NOTHING: None}
-
-
-def _empty(code: str) -> np.ndarray:
-    """Return an array without numbers, by the code of what it may hold and its number of dimensions."""
-    return np.empty((0,) * int(code[2:]), next(kind for kind, name in KINDS.items() if name == code[:2]))
-
-
 @functools.cache
 def name_of(kind: Any) -> str:
     """Name by which a type of records is imported; empty for plain tuples."""
@@ -104,7 +77,7 @@ def build(returns: Any, numbers: Any) -> Any:
 def record_of(name: str) -> Any:
     """Return a type of records by its name."""
     module, _, inside = name.partition(":")
-    return getattr(sys.modules[module], inside)
+    return getattr(import_module(module), inside)
 
 
 def function_of(source: str, **names: Any) -> Callable[..., Any]:

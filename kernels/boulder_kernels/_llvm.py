@@ -42,25 +42,12 @@ def keep_only(module: Any, names: Collection[str], machine: Any) -> set[str]:
     return {name for name in called if not name.startswith("llvm.")}
 
 
-class Loaded:
-    """Object code in memory; like a library of ctypes."""
-
-    def __init__(self, engine: Any) -> None:
-        self._engine = engine
-
-    def __getitem__(self, name: str) -> Any:
-        return _Function(self._engine.get_function_address(name))
-
-
-_Function = ctypes.CFUNCTYPE(ctypes.c_int32)
-
-
-def loaded(code: bytes) -> Loaded:
-    """Load object code."""
+def loaded(code: bytes, name: str) -> tuple[Any, Any]:
+    """Load object code; return the function of a name, as of ctypes, and what must stay loaded."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     machine = llvm.Target.from_default_triple().create_target_machine()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    return Loaded(engine)
+    return ctypes.CFUNCTYPE(ctypes.c_int32)(engine.get_function_address(name)), engine

@@ -5,14 +5,16 @@ Imported when the first kernel is compiled, by `boulder_kernels._jit`, which has
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
 import shlex
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import llvmlite.binding
 import numba
@@ -21,15 +23,8 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 from . import _llvm
-from ._arguments import (
-    NOTHING,
-    REAL,
-    TRUTH,
-    WHOLE,
-    UnsuitableError,
-    function_of,
-    name_of,
-)
+from ._ahead import ENTRY
+from ._arguments import NOTHING, REAL, TRUTH, WHOLE, UnsuitableError, function_of, name_of, record_of
 
 NEEDLESS = {
     "WithLifting",
@@ -65,18 +60,6 @@ class KernelCompiler(Compiler):
         return [steps]
 
 
-class InsideCompiler(KernelCompiler):
-    """The same for kernels that other kernels call: optimised code, without machine code."""
-
-    library: type[JITCodeLibrary]
-
-    def define_pipelines(self) -> list[Any]:
-        """Return the steps, whose result has no machine code."""
-        state = self.state
-        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
-        return super().define_pipelines()
-
-
 class _Taken(JITCodeLibrary):
     """Optimised code that is taken into that of others.
 
@@ -95,7 +78,16 @@ class _Taken(JITCodeLibrary):
         self._final_module = code
 
 
-InsideCompiler.library = _Taken
+class InsideCompiler(KernelCompiler):
+    """The same for kernels that other kernels call: optimised code, without machine code."""
+
+    library: type[JITCodeLibrary] = _Taken
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the steps, whose result has no machine code."""
+        state = self.state
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        return super().define_pipelines()
 
 
 class _Raw(_Taken):
@@ -149,19 +141,15 @@ def dispatcher_for_python(function: Callable[..., Any], options: dict[str, Any])
     return numba.njit(pipeline_class=KernelCompiler, **options)(function)
 
 
-def compiled_ahead(
-    kernel: Any, arguments: tuple[Any, ...], described: str
-) -> tuple[bytes, bytes | None, dict[str, Any]]:
+def compiled_ahead(kernel: Any, types: str) -> tuple[bytes, bytes | None, dict[str, Any]]:
     """Compile a kernel with an entry point that takes numbers and addresses.
 
     Parameters
     ----------
     kernel
         The `boulder_kernels._jit.Kernel`.
-    arguments
-        What it is called with; only their types matter.
-    described
-        These types as text.
+    types
+        Types of its arguments, as `boulder_kernels._arguments.flatten` gives them, with commas between them.
 
     Returns
     -------
@@ -177,29 +165,24 @@ def compiled_ahead(
     boulder_kernels._arguments.UnsuitableError
         It returns something other than numbers and records of them, or makes arrays.
     """
-    types = tuple(numba_type(value) for value in arguments)
+    given = call_of(types)
+    signature = tuple(numba.typeof(value) for value in examples(given))
     outermost = dispatcher_of(kernel.py_func, kernel.options, OutermostCompiler)
-    outermost.compile(types)
-    returns = outermost.overloads[types].signature.return_type
+    outermost.compile(signature)
     lines: list[str] = []
-    kept = {"returns": written_out(returns, "found", lines), "numbers": len(lines), "types": described}
-    reals, wholes, arrays = _Counter(), _Counter(), _Counter()
-    records: list[type] = []
-    given = [argument_text(value, reals, wholes, arrays, records) for value in arguments]
-    kept |= {"arrays": arrays.count}
-    pointers = [f"p{number}" for number in range(arrays.count)]
-    source = f"def {ENTRY}(reals_at, wholes_at, {''.join(f'{name}, ' for name in pointers)}out_at):\n"
-    source += f" reals = carray(reals_at, ({reals.count},))\n wholes = carray(wholes_at, ({wholes.count},))\n"
-    source += f" out = carray(out_at, ({len(lines)},))\n found = function({', '.join(given)})\n"
+    returns = written_out(outermost.overloads[signature].signature.return_type, "found", lines)
+    kept = {"returns": returns, "numbers": len(lines), "types": types, "arrays": len(given.arrays)}
+    source = f"def {ENTRY}(reals_at, wholes_at, {''.join(f'{name}, ' for name in given.arrays)}out_at):\n"
+    source += f" reals = carray(reals_at, ({given.reals},))\n wholes = carray(wholes_at, ({given.wholes},))\n"
+    source += f" out = carray(out_at, ({len(lines)},))\n found = function({given.arguments})\n"
     source += "".join(f" out[{place}] = {line}\n" for place, line in enumerate(lines))
-    named = {f"R{number}": record for number, record in enumerate(records)}
-    wrapper = function_of(source, carray=numba.carray, function=outermost, **named)
+    wrapper = function_of(source, carray=numba.carray, function=outermost, **given.records)
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     entry = dispatcher_of(wrapper, options, InsideCompiler)
-    real, whole = numba.types.CPointer(numba.types.float64), numba.types.CPointer(numba.types.int64)
-    signature = (real, whole, *arrays.kinds, real)
-    entry.compile(signature)
-    compiled = entry.overloads[signature]
+    kinds = (np.float64, np.int64, *given.arrays.values(), np.float64)
+    addresses = tuple(numba.types.CPointer(numba.from_dtype(np.dtype(kind))) for kind in kinds)
+    entry.compile(addresses)
+    compiled = entry.overloads[addresses]
     codegen = compiled.library.codegen
     module = _llvm.module_of(compiled.library.get_llvm_str(), compiled.fndesc.llvm_func_name, ENTRY)
     machine = llvmlite.binding.Target.from_default_triple().create_target_machine(
@@ -211,58 +194,58 @@ def compiled_ahead(
     return code, linked(code), kept
 
 
-ENTRY = "entry"
-"""Name of the function in a library."""
 MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "exp", "log", "sin", "cos", "fmod"}
 """Functions of the C library that kernels may call."""
 
 
-class _Counter:
-    """Counts the numbers or arrays of a call."""
+class Call(NamedTuple):
+    """A call of a kernel, written out."""
 
-    def __init__(self) -> None:
-        self.count = 0
-        self.kinds: list[Any] = []
-
-    def next(self) -> int:
-        """Return the number of the next one."""
-        self.count += 1
-        return self.count - 1
-
-
-def numba_type(value: Any) -> Any:
-    """Return Numba's type of an argument."""
-    types = numba.types
-    if isinstance(value, np.ndarray):
-        return types.Array(numba.from_dtype(value.dtype), value.ndim, "C")
-    if isinstance(value, tuple):
-        kinds = [numba_type(one) for one in value]
-        return types.BaseTuple.from_types(kinds, type(value) if hasattr(value, "_fields") else None)
-    if value is None:
-        return types.none
-    if isinstance(value, bool | np.bool_):
-        return types.boolean
-    return types.float64 if isinstance(value, float) else types.int64
+    arguments: str
+    """Expression of them, from ``reals``, ``wholes``, and the names below; ``carray`` is Numba's."""
+    reals: int
+    wholes: int
+    arrays: dict[str, np.dtype[Any]]
+    """By the name of its address, what each array holds."""
+    records: dict[str, Any]
+    """Types of records by name."""
 
 
-def argument_text(value: Any, reals: _Counter, wholes: _Counter, arrays: _Counter, records: list[type]) -> str:
-    """Return the expression of an argument from the numbers of a call, in the order of `flatten`."""
-    if isinstance(value, np.ndarray):
-        shape = "".join(f"wholes[{wholes.next()}], " for _ in value.shape)
-        arrays.kinds.append(numba.types.CPointer(numba.from_dtype(value.dtype)))
-        return f"carray(p{arrays.next()}, ({shape}))"
-    if isinstance(value, tuple):
-        name = ""
-        if hasattr(value, "_fields"):
+def call_of(types: str) -> Call:
+    """Return how a kernel is called, by the types of its arguments as of `compiled_ahead`."""
+    reals, wholes = itertools.count(), itertools.count()
+    arrays: dict[str, np.dtype[Any]] = {}
+    records: dict[str, Any] = {}
+    simple = {
+        REAL: lambda: f"reals[{next(reals)}]",
+        WHOLE: lambda: f"wholes[{next(wholes)}]",
+        TRUTH: lambda: f"(wholes[{next(wholes)}] != 0)",
+        NOTHING: lambda: "None",
+    }
+
+    def written(found: re.Match[str]) -> str:
+        """Return the expression of a number or an array, or the name of a type of records."""
+        kind = found.group()
+        if kind in simple:
+            return simple[kind]()
+        if ":" in kind:
             name = f"R{len(records)}"
-            records.append(type(value))
-        fields = "".join(f"{argument_text(one, reals, wholes, arrays, records)}, " for one in value)
-        return f"{name}({fields})"
-    if value is None:
-        return "None"
-    if isinstance(value, bool | np.bool_):
-        return f"(wholes[{wholes.next()}] != 0)"
-    return f"reals[{reals.next()}]" if isinstance(value, float) else f"wholes[{wholes.next()}]"
+            records[name] = record_of(kind)
+            return name
+        name = f"p{len(arrays)}"
+        arrays[name] = np.dtype(kind[:2])
+        return f"carray({name}, ({''.join(f'{simple[WHOLE]()}, ' for _ in range(int(kind[2:])))}))"
+
+    # A comma ends every tuple, because those of one need it.
+    arguments = re.sub(r"[^(),]+", written, types.replace(")", ",)"))
+    return Call(arguments, next(reals), next(wholes), arrays, records)
+
+
+def examples(call: Call) -> list[Any]:
+    """Return arguments of a call: zeros, and arrays without numbers."""
+    numbers = {"reals": [0.0] * call.reals, "wholes": [0] * call.wholes}
+    made = {"carray": lambda kind, shape: np.empty(shape, kind)}
+    return function_of(f"def call():\n return [{call.arguments}]", **numbers, **made, **call.arrays, **call.records)()
 
 
 def written_out(kind: Any, expression: str, lines: list[str]) -> Any:

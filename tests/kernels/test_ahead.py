@@ -7,13 +7,14 @@ import os
 import shutil
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import _ahead, _cache
-from boulder_kernels._arguments import UnsuitableError, examples, flatten
-from boulder_kernels._numba import numba_type
+from boulder_kernels._arguments import UnsuitableError, flatten
+from boulder_kernels._numba import call_of, examples
 from boulder_kernels.design import constants_of, is_computable
 from boulder_kernels.impact import simulate
 from boulder_kernels.layered import uniform_layers
@@ -91,9 +92,9 @@ def test_types_tell_what_a_kernel_is_called_with(kind: str) -> None:
     """A release compiles from them: examples of the types have the same types, for Numba, too."""
     arguments = (problems()[kind], READINGS, HOW, bk.no_record(), True, 3, np.zeros((2, 3), np.int8))
     types = ",".join([flatten(value, [], [], []) for value in arguments])
-    found = examples(types)
+    found = examples(call_of(types))
     assert ",".join([flatten(value, [], [], []) for value in found]) == types
-    assert [*map(numba_type, found)] == [*map(numba_type, arguments)]
+    assert [*map(numba.typeof, found)] == [*map(numba.typeof, arguments)]
 
 
 def test_no_call_is_refused_that_numba_takes() -> None:

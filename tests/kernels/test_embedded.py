@@ -19,6 +19,7 @@ from boulder_kernels.embedded import (
     CHATTERING_T,
     CHATTERING_THETA,
     CHATTERING_X,
+    LEAST_IF_DOUBTFUL,
     LONG_MOTION,
     ROCKING,
     YIELD_LOCATED,
@@ -99,6 +100,16 @@ def test_at_the_limit_the_time_is_uncertain_too(changes: float, factor: float) -
 
 def test_a_boulder_that_hardly_turns_has_no_large_error_of_its_rotation() -> None:
     assert errors(Ended(theta=1e-9, moved=1.0))[0] == LEAST_ROTATION
+
+
+def test_a_boulder_that_rocks_has_a_least_error_of_its_rotation() -> None:
+    """However short the steps; at the limit it has none."""
+    for status, changes, expected in (
+        (Status.SETTLED, ROCKING + 1.0, LEAST_IF_DOUBTFUL),
+        (Status.SETTLED, float(ROCKING), 1e-12 / ARM),
+        (Status.LIMIT, ROCKING + 1.0, 0.0),
+    ):
+        assert errors(Ended(status, moved=1e-12, changes=changes))[0] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_boulder_that_chatters_has_an_error_of_a_fraction() -> None:
