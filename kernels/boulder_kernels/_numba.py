@@ -179,7 +179,7 @@ def compiled_ahead(kernel: Any, types: str) -> tuple[bytes, bytes | None, dict[s
     wrapper = function_of(source, carray=numba.carray, function=outermost, **given.records)
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     entry = dispatcher_of(wrapper, options, InsideCompiler)
-    kinds = (np.float64, np.int64, *given.arrays.values(), np.float64)
+    kinds: tuple[Any, ...] = (np.float64, np.int64, *given.arrays.values(), np.float64)
     addresses = tuple(numba.types.CPointer(numba.from_dtype(np.dtype(kind))) for kind in kinds)
     entry.compile(addresses)
     compiled = entry.overloads[addresses]
