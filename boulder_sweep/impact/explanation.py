@@ -189,7 +189,7 @@ def model_of(settings: dict[str, Any], control: Control) -> Model:
         unloading=UNLOADINGS[control.unloading],
         second_opinion=tuple(model.get("second_opinion", ())),
         foot=model["foot"],
-        profile=Shape.of_list(model.get("profile", [])).points,
+        profile=Shape.of_model(model).points,
         rock_assumed=model.get("rock_assumed", False),
         **Ground.of_dict(model.get("ground", {})).fields(),
     )

@@ -58,7 +58,7 @@ def quantities(rows: Mapping[str, Any], shape: Shape, ground: Ground) -> dict[st
 def quantities_by(rows: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Return the quantities of designs by the resolved settings of their table, of this or an earlier version."""
     model = settings["model"]
-    return quantities(rows, Shape.of_list(model.get("profile", [])), Ground.of_dict(model.get("ground", {})))
+    return quantities(rows, Shape.of_model(model), Ground.of_dict(model.get("ground", {})))
 
 
 def wedge_slope(phi_deg: np.ndarray) -> np.ndarray:

@@ -92,7 +92,7 @@ def page_data(
     units: str,
 ) -> dict[str, Any]:
     """Return the data of every page; see `boulder_sweep.report.page.assembled`."""
-    ground, shape = Ground.of_dict(settings["model"].get("ground", {})), shape_of(settings)
+    ground, shape = Ground.of_dict(settings["model"].get("ground", {})), Shape.of_model(settings["model"])
     law = settings["model"].get("resistance", RESISTANCES[0])
     simulated = control._replace(elements=min(control.elements, MOST_ELEMENTS))
     simulated = simulated._replace(paired=is_paired(readings, simulated, layered=is_layered(law, ground, shape)))
@@ -152,11 +152,6 @@ def page_data(
         "chosen": [dict(one) for one in chosen],
         "kernel": _packed(KERNEL.read_bytes()),
     }
-
-
-def shape_of(settings: Mapping[str, Any]) -> Shape:
-    """Return the shape of the boulders of resolved settings."""
-    return Shape.of_list(settings["model"].get("profile", []))
 
 
 def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
@@ -349,7 +344,7 @@ def _quantity(value: float, unit: str, system: str) -> str:
 def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str, list[str]]:
     """What a settings file says beside the inputs: more entries of vehicle and soil, and the lines that follow."""
     criterion, model, solver = (settings[name] for name in ("criterion", "model", "solver"))
-    taper = shape_of(settings).taper
+    taper = Shape.of_model(settings["model"]).taper
     soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
     readings = model["preset"]
     if readings == "mixed":

@@ -19,11 +19,11 @@ from boulder_sweep.report.contents import (
     page_data,
     reading_words,
     setting_lines,
-    shape_of,
     table_data,
 )
 from boulder_sweep.report.figures import curves, parts_of, verdict_map
 from boulder_sweep.report.sketch import sketch_of
+from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_settings
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
@@ -153,7 +153,7 @@ def assembled(
         lines=setting_lines(shown_settings(settings, units)),
         readings=reading_words(settings),
         ground=ground_words(settings, units),
-        shape=shape_of(settings).words,
+        shape=Shape.of_model(settings["model"]).words,
         fixed=data["boulder"]["fixed"],
         uncertain="distributions" in settings,
         law=LAW_WORDS.get(settings["model"].get("resistance", ""), ""),

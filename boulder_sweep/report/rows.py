@@ -151,7 +151,7 @@ class Rows:
         if BOULDER_MASS in self.inputs:
             return self.inputs[BOULDER_MASS]
         length, width, height, density = (self.inputs[name] for name in SIZES)
-        return length * width * height * density * Shape.of_list(self.settings["model"].get("profile", [])).filled
+        return length * width * height * density * Shape.of_model(self.settings["model"]).filled
 
     def to_build(self, number: int) -> dict[str, float]:
         """Return what one design takes to build, by the names of `boulder_sweep.judge.quantities.QUANTITIES`."""

@@ -78,7 +78,7 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     ground = Ground.of_dict(settings["model"].get("ground", {}))
     above, roof = height - depth, hood + CAB_M
     bottom = -depth - BELOW
-    points = Shape.of_list(settings["model"].get("profile", [])).points or BOX
+    points = Shape.of_model(settings["model"]).points or BOX
     shares = np.array([(point.height, point.near, point.far) for point in points])
     heights, near, far = (shares * (height, length, length)).T
     struck = float(np.interp(depth + inputs["impact_height_m"], heights, near))

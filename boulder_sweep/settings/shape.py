@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any
@@ -100,6 +101,11 @@ class Shape:
     def of_list(cls, points: list[dict[str, float]]) -> Shape:
         """Return the shape that `as_list` returned; a box of no data."""
         return cls(tuple(ProfilePoint(**point) for point in points))
+
+    @classmethod
+    def of_model(cls, model: Mapping[str, Any]) -> Shape:
+        """Return the shape in the part `model` of resolved settings."""
+        return cls.of_list(model.get("profile", []))
 
     @property
     def words(self) -> str:

@@ -145,7 +145,7 @@ def model_words(settings: Mapping[str, Any], units: str = "si") -> str:
         f"resistance {law}" if law else "",
         UNLOADING_WORDS[unloading] if unloading else "",
         ground_words(settings, units),
-        Shape.of_list(settings["model"].get("profile", [])).words,
+        Shape.of_model(settings["model"]).words,
     )
     return ", ".join(word for word in words if word)
 
