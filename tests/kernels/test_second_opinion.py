@@ -17,12 +17,15 @@ from boulder_kernels.dynamics import contact_displacement, spring_compression
 from boulder_kernels.heave import PIECES, SETS, Base, Form, HeaveConstants, heave_constants, potential_energy, prepare
 from boulder_kernels.second_opinion import (
     CAUTION,
+    PLACED,
     START,
     WORKSPACE,
     HeaveControl,
     HeaveOutcome,
     HeaveRecord,
+    Place,
     Tracks,
+    eased,
     energy_at,
     foot_rises,
     least_energy,
@@ -373,6 +376,29 @@ def test_no_place_costs_less_than_the_least_energy() -> None:
             values = np.append(values, [potential_energy(x, theta, y, work, f).u for x, y in nearby])
             assert least - CAUTION * abs(least) <= values.min()
             assert least > values.min() - 0.5 * np.ptp(values)  # nor is it out of reach
+
+
+@pytest.mark.compiled
+def test_eased_is_where_a_step_either_way_costs_more() -> None:
+    """Along either axis, from any place between the ends: to `PLACED` of the weight times the length."""
+    rng = np.random.default_rng(279)
+    for design in some_designs(6, seed=280):
+        f = heave_constants(design, constants_of(design, bk.corrected(), 0), BOTH, BASE)
+        work = np.full(WORKSPACE, np.nan)
+        prepare(work, f)
+        enough = PLACED * f.m_b * G * design.L
+        for theta in (np.radians(20.0), -np.radians(20.0)):
+            at_top = f.c.l_n * (1.0 - np.cos(theta)) - f.c.z_0 * np.sin(theta)
+            across = sorted((at_top, at_top + design.d * np.sin(theta)))
+            for sideways, (low, high) in ((True, across), (False, (-1.0, 2.0))):
+                start = Place(rng.uniform(*across), rng.uniform(-0.5, 0.5), np.inf)
+                found = eased(start, sideways, low, high, theta, work, f)
+                assert (found.y == start.y) if sideways else (found.x == start.x)
+                ends = np.linspace(low, high, 2001)
+                tried = [(s, found.y) if sideways else (found.x, s) for s in ends]
+                values = [potential_energy(x, theta, y, work, f).u for x, y in tried]
+                assert found.energy == potential_energy(found.x, theta, found.y, work, f).u
+                assert found.energy <= min(values) + enough
 
 
 def test_the_proof_counts_all_energy_and_waits_for_the_truck() -> None:
