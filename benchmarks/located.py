@@ -21,28 +21,30 @@ from boulder_kernels.design import constants_of, design_in
 from boulder_kernels.dormand_prince import STAGES
 from boulder_kernels.flat import field, put
 from boulder_kernels.heave import FOOT, PIECES, HeaveConstants, heave_constants, prepare, strip_depth
-from boulder_kernels.numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
-from boulder_kernels.second_opinion import (
+from boulder_kernels.heave_steps import (
     AXES,
-    FIRST_STEP,
-    LONGEST_STEP,
-    MOST_ATTEMPTS,
     RATES,
-    READINGS,
-    SHORTEST_STEP,
     START,
-    USUAL_BASE,
-    WHOLE,
     WORKSPACE,
-    HeaveControl,
     Tracks,
     attempt,
     contact_change,
     keep,
     press_in,
-    second_opinions,
     track_of,
     write_rate,
+)
+from boulder_kernels.numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
+from boulder_kernels.second_opinion import (
+    FIRST_STEP,
+    LONGEST_STEP,
+    MOST_ATTEMPTS,
+    READINGS,
+    SHORTEST_STEP,
+    USUAL_BASE,
+    WHOLE,
+    HeaveControl,
+    second_opinions,
 )
 from boulder_kernels.table import some_rows
 from boulder_sweep.crash_tests.tables import Table

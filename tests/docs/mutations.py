@@ -24,7 +24,7 @@ _GROUND = "boulder_sweep/soils.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
 
 _PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
-_HEAVE, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "second_opinion"))
+_HEAVE, _STEPS, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "heave_steps", "second_opinion"))
 _OUTLINE, _BESIDE, _OUTLINED = (
     f"kernels/boulder_kernels/{name}.py" for name in ("outline", "outlined", "outlined_soil")
 )
@@ -141,8 +141,8 @@ MUTATIONS = (
         "max(elastic - f.c_strip * (w_b - omega_b * X), 0.0)",
     ),
     Mutation((133,), _HEAVE, "math.exp(math.pi * math.tan(phi))", "math.exp(math.tan(phi))"),
-    Mutation((133,), _OPINION, "field(work, SETS, j) + over", "over"),
-    Mutation((133,), _OPINION, "and at_end < 0.0 and reach > capacity", "and at_end > 0.0 and reach > capacity"),
+    Mutation((133,), _STEPS, "field(work, SETS, j) + over", "over"),
+    Mutation((133,), _STEPS, "and at_end < 0.0 and reach > capacity", "and at_end > 0.0 and reach > capacity"),
     Mutation((134,), _HEAVE, "return v / math.sqrt(v * v + f.v_s * f.v_s)", "return v / (abs(v) + f.v_s)"),
     Mutation((134,), _HEAVE, "along - omega_b * c.l_n", "along + omega_b * c.l_n"),
     Mutation((134,), _HEAVE, "near += max(F, 0.0)", "near += max(-F, 0.0)"),

@@ -15,22 +15,18 @@ from boulder_kernels.dense_output import Track
 from boulder_kernels.design import G, constants_of
 from boulder_kernels.dynamics import contact_displacement, spring_compression
 from boulder_kernels.heave import PIECES, SETS, Base, Form, HeaveConstants, heave_constants, potential_energy, prepare
+from boulder_kernels.heave_steps import START, WORKSPACE, Tracks, foot_rises, press_in
 from boulder_kernels.second_opinion import (
     CAUTION,
     PLACED,
-    START,
-    WORKSPACE,
     HeaveControl,
     HeaveOutcome,
     HeaveRecord,
     Place,
-    Tracks,
     eased,
     energy_at,
-    foot_rises,
     least_energy,
     no_heave_record,
-    press_in,
     second_opinions,
     simulate_heave,
 )
