@@ -159,7 +159,7 @@ def test_the_passes_that_are_lost_are_counted_and_listed_with_their_inputs(sweep
     assert "differs  friction angle φ′: 40 -> 34 deg" in lines
     assert "2 of 2 passes in a.sweep do not pass in b.sweep" in lines
     at = lines.index("  design 5 -> 5: pass -> fail, 17.13 -> 20 deg")
-    assert lines[at + 1] == "    height 11.811 ft"
+    assert lines[at + 1] == "    height 11.81 ft"
 
 
 def test_results_with_nothing_in_common_are_not_compared(sweep, possible_grid):
