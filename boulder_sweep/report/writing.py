@@ -18,7 +18,8 @@ from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import answers_table
 from boulder_sweep.report.printing import print_page
-from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows, thinned
+from boulder_sweep.report.reading import read_rows
+from boulder_sweep.report.rows import MOST_ELEMENTS, thinned
 from boulder_sweep.report.sentences import Named
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from boulder_sweep.settings.fields import BY_NAME, LAYER_TOP, MAX_ELEMENTS, Field
-from boulder_sweep.settings.leaf import LeafError, Mistake, read_single
+from boulder_sweep.settings.leaf import LeafError, Mistake, read_entries, read_single
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,
@@ -83,27 +83,14 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
 
 def _read_layer(node: Node) -> Layer:
     """Read one layer; single values only."""
-    if not isinstance(node, Mapping):
-        raise LeafError([Mistake(node.position, f"a layer must be a block of keys: {', '.join(LAYER_FIELDS)}")])
-    values: dict[str, float] = {}
-    mistakes: list[Mistake] = []
-    for entry in node:
-        field = LAYER_FIELDS.get(entry.key)
-        if field is None:
-            hint = did_you_mean(entry.key, tuple(LAYER_FIELDS))
-            message = f"'{shorten(entry.key)}' is not a key of a layer ({', '.join(LAYER_FIELDS)}){hint}"
-            mistakes.append(Mistake(entry.position, message))
-            continue
-        try:
-            values[_NAMES[entry.key]] = read_single(entry.value, field)
-        except LeafError as error:
-            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
+    values, mistakes = read_entries(node, LAYER_FIELDS, "a layer")
+    assert isinstance(node, Mapping)  # anything else has been refused
     missing = [key for key in LAYER_FIELDS if key not in node.entries and key != "cohesion"]
     if missing:
         mistakes.append(Mistake(node.position, f"the layer lacks {', '.join(missing)}"))
     if mistakes:
         raise LeafError(mistakes)
-    return Layer(**values)
+    return Layer(**{_NAMES[key]: value for key, value in values.items()})
 
 
 def read_profile(node: Node) -> tuple[ProfilePoint, ...]:
@@ -153,22 +140,8 @@ def read_profile(node: Node) -> tuple[ProfilePoint, ...]:
 
 def _read_point(node: Node) -> ProfilePoint:
     """Read one point of a profile."""
-    keys = ", ".join(PROFILE_FIELDS)
-    if not isinstance(node, Mapping):
-        raise _wrong(node, f"a point must be a block of keys: {keys}")
-    values: dict[str, float] = {}
-    mistakes: list[Mistake] = []
-    for entry in node:
-        field = PROFILE_FIELDS.get(entry.key)
-        if field is None:
-            hint = did_you_mean(entry.key, tuple(PROFILE_FIELDS))
-            message = f"'{shorten(entry.key)}' is not a key of a point ({keys}){hint}"
-            mistakes.append(Mistake(entry.position, message))
-            continue
-        try:
-            values[entry.key] = read_single(entry.value, field)
-        except LeafError as error:
-            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
+    values, mistakes = read_entries(node, PROFILE_FIELDS, "a point")
+    assert isinstance(node, Mapping)  # anything else has been refused
     given = set(node.entries)
     if "length" in given and given & {"near", "far"}:
         mistakes.append(Mistake(node.position, "give length, or near and far, not both"))

@@ -115,13 +115,13 @@ def read_single(node: Node, field: Field) -> float:
     return value
 
 
-def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
-    """Return the single values of a block by the names of its fields.
+def read_entries(node: Node, known: dict[str, Field], what: str) -> tuple[dict[str, float], list[Mistake]]:
+    """Return the single values of a block by their keys, and every mistake in it: an unknown key, a wrong value.
 
     Raises
     ------
     LeafError
-        With every mistake in it: no block, an unknown key, a wrong value.
+        It is no block.
     """
     keys = ", ".join(known)
     if not isinstance(node, Mapping) or node.unit is not None:
@@ -135,12 +135,24 @@ def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, floa
             mistakes.append(Mistake(entry.position, f"'{shorten(entry.key)}' is not a key of {what} ({keys}){hint}"))
             continue
         try:
-            values[field.name] = read_single(entry.value, field)
+            values[entry.key] = read_single(entry.value, field)
         except LeafError as error:
             mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
+    return values, mistakes
+
+
+def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
+    """Return the single values of a block by the names of its fields.
+
+    Raises
+    ------
+    LeafError
+        With every mistake in it, see `read_entries`.
+    """
+    values, mistakes = read_entries(node, known, what)
     if mistakes:
         raise LeafError(mistakes)
-    return values
+    return {known[key].name: value for key, value in values.items()}
 
 
 def sample_of(field: Field) -> str:

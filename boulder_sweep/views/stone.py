@@ -126,7 +126,8 @@ class View(NamedTuple):
 def _view_of(shown: Sequence[Standing], grounds_m: Sequence[float]) -> View:
     """Return a view with room for the largest stone; the ground is at these heights over the feet."""
     outlines = [own.outline - (ground_m, 0.0, 0.0) for own, ground_m in zip(shown, grounds_m, strict=True)]
-    (low, _, _), (high, near, far) = (of(np.concatenate(outlines), axis=0) for of in (np.min, np.max))
+    height, *sides = np.concatenate(outlines).T
+    low, high, (near, far) = height.min(), height.max(), (side.max() for side in sides)
     return View(-near - ROOM_M, far + ROOM_M, low - ROOM_M, high + ROOM_M)
 
 
