@@ -60,6 +60,7 @@ Examples:
     is_flag=True,
     help="Count only passes that stand under every second opinion, with --margin.",
 )
+@click.option("--under", type=click.Choice(["all"]), help="Under all laws of the soil's resistance: as --robust.")
 @click.option(
     "--other-readings",
     "both_readings",
@@ -84,6 +85,7 @@ def need(
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
+    under: str | None,
     **question: Any,
 ) -> int:
     """Find the least KEY that passes, for every combination of the other inputs of GRID.
@@ -103,6 +105,7 @@ def need(
     elif at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
     refuse_unwritable(out, picture)
+    question["robust"] |= under is not None
     with working(quiet, kernels_for(sweep), of="designs" if question["probability"] is None else "values") as progress:
         result = find(sweep, **question, progress=progress)
     if as_json:
