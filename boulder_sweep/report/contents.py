@@ -141,6 +141,7 @@ def page_data(
                 "h": finer.h,
                 "locate_yield": float(finer.locate_yield),
                 "paired": float(finer.paired),
+                "event_tolerance": finer.event_tolerance,
                 "step_s": reported_step_s(finer),
             }
             for finer in finer_controls(simulated)

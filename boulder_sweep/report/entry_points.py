@@ -83,17 +83,31 @@ def readings_from(s: np.ndarray) -> Readings:
 def control_from(s: np.ndarray, refined: bool) -> Control:
     """Return the control, which follows the readings, with its step or a third of it."""
     # What yields in plastic soil depends on what it remembers.
-    h, yield_located = s[5], s[11] > 0.0 and s[15] == ELASTIC
-    unloading = int(s[15])
+    h, longest, unloading = s[5], s[13], int(s[15])
+    estimated, stopping, located = s[9] > 0.0, s[10] > 0.0, s[11] > 0.0 and s[15] == ELASTIC
+    elements, paired, last_resort, tolerance = int(s[8]), False, False, s[17]
     return Control(
-        h, s[6], s[7], int(s[8]), s[9] > 0.0, s[10] > 0.0, yield_located, refined, s[13], False, unloading, False
+        h,
+        s[6],
+        s[7],
+        elements,
+        estimated,
+        stopping,
+        located,
+        refined,
+        longest,
+        last_resort,
+        unloading,
+        paired,
+        tolerance,
     )
 
 
 @inlined
 def halved_control_from(s: np.ndarray) -> Control:
     """Return the control of a second solution, `boulder_kernels.table.halved`."""
-    return Control(0.5 * s[5], s[6], s[7], int(s[8]), True, s[10] > 0.0, True, True, s[13], False, ELASTIC, False)
+    h, longest, stopping, tolerance = 0.5 * s[5], s[13], s[10] > 0.0, s[17]
+    return Control(h, s[6], s[7], int(s[8]), True, stopping, True, True, longest, False, ELASTIC, False, tolerance)
 
 
 @inlined

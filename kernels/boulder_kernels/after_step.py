@@ -321,10 +321,10 @@ def at_limit(m: Maxima, t: float, limit: float) -> Maxima:
 
 @inlined
 def enter_modes(
-    modes: Modes, readings: Readings, theta_stop: float, locate_yield: bool, c: Constants
+    modes: Modes, readings: Readings, theta_stop: float, locate_yield: bool, tolerance: float, c: Constants
 ) -> tuple[Switches, GapFactors]:
     """Factors of the right-hand side and of the gaps in new modes."""
-    return switches_of(modes, readings, c), gap_factors(modes, c, theta_stop, locate_yield)
+    return switches_of(modes, readings, c), gap_factors(modes, c, theta_stop, locate_yield, tolerance)
 
 
 @kernel

@@ -47,11 +47,9 @@ NONE = -1
 """In place of an event: there is none."""
 SHORTEN = -2
 """In place of an event: retry the step with a shorter length."""
-TOLERANCE = 1e-3
-"""Precision of the search as a fraction of the step. Forces are continuous at a kink, so the error goes with its
-square; where they jump, Newton's method follows."""
 EDGE_TOLERANCE = 1e-5
-"""The same as printed, where several events lie close together and a motion may graze one of them."""
+"""Precision of the search as a fraction of the step as printed, where several events lie close together and a motion
+may graze one of them."""
 AT_END = 0.3
 """An event that lies before the end of the step by less than this share of the precision is taken to be at the end."""
 NEWTON_TOLERANCE = 1e-6
@@ -60,10 +58,10 @@ JUST_AFTER = 1e-3
 """Fraction of the step, and then its square, at which a search begins whose gap is not positive at the start."""
 AT_ONCE = 1e-5
 """Fraction of a step before which a kink counts as passed."""
-LANDED = 0.99
-"""Fraction of a step behind which a kink does no harm."""
-BEYOND = 1.002
-"""A retried step ends this much behind the kink, so that the kink lies in it and not in the next one."""
+HARMLESS = 10.0
+"""A kink that lies before the end of the step by less than so many times the precision does no harm."""
+BEYOND = 2.0
+"""A retried step ends so many times the precision behind the kink, so that the kink lies in it and not in the next."""
 
 
 @inlined
@@ -101,8 +99,14 @@ def least_gap(gaps: Gaps, weights: Gaps) -> tuple[float, float]:
 
 
 @inlined
+def landed(g: GapFactors) -> float:
+    """Fraction of a step behind which a kink does no harm."""
+    return 1.0 - HARMLESS * g.tolerance
+
+
+@inlined
 def lies_inside(early: float, late: float) -> bool:
-    """Whether a kink is passed between AT_ONCE and LANDED, by its gaps at either: the step is then retried."""
+    """Whether a kink is passed between AT_ONCE and `landed`, by its gaps at either: the step is then retried."""
     return (early > 0.0) & (late < 0.0)
 
 
@@ -122,7 +126,7 @@ def weights_of(end: Gaps, dense: DenseOutput, g: GapFactors, locate_yield: bool,
     top, base = 0.0, 0.0
     if locate_yield:
         early = gaps_at(state_at(dense, AT_ONCE), 0.0, g, c)
-        late = gaps_at(state_at(dense, LANDED), 0.0, g, c)
+        late = gaps_at(state_at(dense, landed(g)), 0.0, g, c)
         top = weight(end.top) if lies_inside(early.top, late.top) else 0.0
         base = weight(end.base) if lies_inside(early.base, late.base) else 0.0
     return Gaps(
@@ -146,7 +150,7 @@ def needs_moment(g: GapFactors) -> bool:
 @inlined
 def tolerance_of(g: GapFactors) -> float:
     """Precision that the search for the first event needs; only as printed a gap depends on omega."""
-    return EDGE_TOLERANCE if g.rotation_omega != 0.0 else TOLERANCE
+    return EDGE_TOLERANCE if g.rotation_omega != 0.0 else g.tolerance
 
 
 @inlined
@@ -284,10 +288,10 @@ def first_event(
     """
     _, event = least_gap(gaps_within(tau, dense, g, switches, c), weights)
     tau = refined(event, tau, b, g, dense) if event >= 0.0 else 1.0
-    kink = ((weights.top > 0.0) | (weights.base > 0.0)) & (tau > AT_ONCE) & (tau < LANDED)
+    kink = ((weights.top > 0.0) | (weights.base > 0.0)) & (tau > AT_ONCE) & (tau < landed(g))
     yields = (event < 0.0) & ((end.top < 0.0) | (end.base < 0.0))
     event = float(SHORTEN) if kink else (float(YIELD_TOP) if yields else event)
-    return event, min(BEYOND * tau, 1.0) if kink else tau
+    return event, min((1.0 + BEYOND * g.tolerance) * tau, 1.0) if kink else tau
 
 
 @kernel

@@ -37,6 +37,9 @@ NEVER = 1e300
 """Gap of an event that cannot happen in the present mode."""
 UNSOUGHT = 2.0
 """In place of the sign of a displacement beyond the ultimate resistance, where its event is not looked for."""
+TOLERANCE = 1e-3
+"""Precision with which an event is located, as a fraction of the step. Forces are continuous at a kink, so the error
+goes with its square; where they jump, Newton's method follows."""
 CONTACT_ROUNDING = 1e-15
 """Compressions below this share of the distance the truck would cover in a second are rounding, which would make a
 truck and a boulder that move together separate and touch again and again."""
@@ -67,6 +70,8 @@ class GapFactors(NamedTuple):
     """The same at the base."""
     limit: float
     """Limit of rotation [rad]."""
+    tolerance: float
+    """Precision with which events are located, as a fraction of the step."""
 
 
 class Gaps(NamedTuple):
@@ -83,7 +88,7 @@ class Gaps(NamedTuple):
 
 
 @inlined
-def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: bool) -> GapFactors:
+def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: bool, tolerance: float) -> GapFactors:
     """Factors of the gaps in the present modes.
 
     Parameters
@@ -96,6 +101,8 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
         Rotation at which the simulation ends [rad].
     locate_yield
         Whether a step is cut where the soil at the top or the base reaches its ultimate resistance.
+    tolerance
+        Precision with which events are located, as a fraction of the step; as printed it is `TOLERANCE`.
     """
     rotation_0 = rotation_abs_M = rotation_theta = rotation_omega = 0.0
     couple_M = couple_abs_M = couple_limit = arm = 0.0
@@ -109,6 +116,7 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
     elif turning == TURNING_BACK:
         rotation_theta = -1.0
     else:
+        tolerance = TOLERANCE
         corner_0, corner_theta = modes.corner * c.theta_corner, -modes.corner
         if turning == FREE:
             rotation_omega = -1.0
@@ -138,6 +146,7 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
         top=top,
         base=base,
         limit=theta_stop,
+        tolerance=tolerance,
     )
 
 

@@ -30,6 +30,7 @@ from .dormand_prince import step
 from .embedded import error_time
 from .energy import Exchanged, add_exchanged, nothing_exchanged
 from .events import NONE, SHORTEN, change_mode, changes_counted, initial_modes, locate_limit
+from .gaps import TOLERANCE
 from .modes import Modes, Switches
 from .onset import first_length
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
@@ -94,6 +95,9 @@ class Control(NamedTuple):
     some. Their simulations go on until the boulder is at rest, and are not ended by a proof before the horizon."""
     paired: bool = False
     """Where errors are estimated: whether every design is solved twice for it, and not only doubtful ones."""
+    event_tolerance: float = TOLERANCE
+    """Precision with which events are located, as a fraction of the step; `boulder_kernels.gaps.TOLERANCE` as
+    printed."""
 
 
 class Record(NamedTuple):
@@ -290,7 +294,7 @@ def simulate_by_steps(
     budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
     h_full = h_touching
     y, modes = initial_state(c), initial_modes(readings, c)
-    switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
+    switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, control.event_tolerance, c)
     k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
     m = no_maxima()
     exchanged = nothing_exchanged()
@@ -359,7 +363,9 @@ def simulate_by_steps(
                 stiffening = False
             rotation_changes += changes_counted(kept.event, begun, modes)
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
-            switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, c)
+            switches, factors = enter_modes(
+                modes, readings, theta_stop, control.locate_yield, control.event_tolerance, c
+            )
             k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
             h_next = h_full = h_touching if modes.touching else h_apart
     return failed(Status.STEP_BUDGET.value)

@@ -212,7 +212,7 @@ def conclude(ws: Any, lane: int, readings: Readings, ending: Ending, locate_yiel
         changes = field(mine, ROTATION_CHANGES, 0) + changes_counted(event, begun, modes)
         put(mine, ROTATION_CHANGES, 0, changes)
         y, modes = change_mode(int(event), y, field(mine, MOMENT, 0), modes, c)
-        switches, factors = enter_modes(modes, readings, g.limit, locate_yield, c)
+        switches, factors = enter_modes(modes, readings, g.limit, locate_yield, g.tolerance, c)
         store(mine, MODES, 0, modes)
         store(mine, SWITCHES, 0, switches)
         store(mine, FACTORS, 0, factors)

@@ -15,8 +15,9 @@ from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, pass
 from .design import Readings, design_in, is_computable
 from .dormand_prince import step
 from .embedded import error_time, step_errors
-from .events import AT_END, TOLERANCE, initial_modes, needs_moment
+from .events import AT_END, initial_modes, needs_moment
 from .flat import field, put
+from .gaps import TOLERANCE
 from .impact import Control, attempt_budget, ending_of, first_step
 from .modes import TURNING_FORWARD, Modes
 from .onset import first_length
@@ -157,7 +158,9 @@ def stand_still(ws: Any, readings: Readings, control: Control) -> None:
     for lane in range(LANES):
         c, h_full = load(ws, CONSTANTS, lane), field(ws, STEP_FULL, lane)
         y, modes = initial_state(c), initial_modes(readings, c)
-        switches, factors = enter_modes(modes, readings, control.theta_limit, control.locate_yield, c)
+        switches, factors = enter_modes(
+            modes, readings, control.theta_limit, control.locate_yield, control.event_tolerance, c
+        )
         store(ws, MODES, lane, modes)
         store(ws, SWITCHES, lane, switches)
         store(ws, FACTORS, lane, factors)
@@ -185,7 +188,9 @@ def take_over_first_steps(ws: Any, readings: Readings, control: Control) -> None
         beyond = AT_END * TOLERANCE * c.C_cos if needs_moment(g) & (k_end.M > 0.0) else 0.0
         passing, end = passes(y, y_end, k_end, g, s, c, beyond)
         turning = Modes(TURNING_FORWARD, True, 1.0, 1.0, 0, 0)
-        following, factors = enter_modes(turning, readings, control.theta_limit, control.locate_yield, c)
+        following, factors = enter_modes(
+            turning, readings, control.theta_limit, control.locate_yield, control.event_tolerance, c
+        )
         m = passed_maxima(load(ws, MAXIMA, lane), 0.0, h, y, y_end, start, end, s)
         fresh = rate_of(y_end, following, c)
         if passing & (h < control.horizon) & (y_end.v_v > 0.0):

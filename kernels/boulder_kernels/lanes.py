@@ -217,10 +217,22 @@ def handle(
 
 
 @kernel
+def is_empty(q: Queue, group: int) -> bool:
+    """Whether all lanes of a group are empty."""
+    empty = True
+    for place in range(group * LANES, (group + 1) * LANES):
+        empty &= q.rows[place] == EMPTY
+    return empty
+
+
+@kernel
 def step_groups(ws: Any, q: Queue) -> int:
     """Attempt a step in all lanes of all groups, accept those that need no more, and list and count the others."""
     count = 0
     for group in range(GROUPS):
+        # The last rows of a table, or the few that need the finest steps, leave a group empty for long.
+        if q.counts[IDLE] >= LANES and is_empty(q, group):
+            continue
         lanes = part(ws, group * SIZE)
         attempt_steps(lanes)
         if take_over_steps(lanes) > 0:

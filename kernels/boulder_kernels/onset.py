@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from ._jit import exact_inlined
 from .design import Constants
-from .events import AT_END, TOLERANCE, needs_moment
-from .gaps import GapFactors
+from .events import AT_END, needs_moment
+from .gaps import TOLERANCE, GapFactors
 from .soil import Kinematics
 from .soil_laws import soil_reaction
 

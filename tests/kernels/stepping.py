@@ -13,6 +13,7 @@ from boulder_kernels.dense_output import dense_output
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import State
 from boulder_kernels.events import SHORTEN, change_mode
+from boulder_kernels.gaps import TOLERANCE
 from boulder_kernels.modes import Modes
 from boulder_kernels.outcomes import compression_at, no_maxima
 
@@ -41,7 +42,7 @@ def with_compression(y: State, u: float, c: bk.Constants) -> State:
 def advance(begin: Start, T: float, steps: int, locate_yield: bool = False) -> tuple[np.ndarray, list[int]]:
     """Follow a motion for T [s] by equal steps, cut at events; return its last state and the events met."""
     c, readings, y, modes = begin
-    switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, c)
+    switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, TOLERANCE, c)
     k = rate_of(y, switches, c)
     t, met = 0.0, []
     h_full = T / steps
@@ -59,7 +60,7 @@ def advance(begin: Start, T: float, steps: int, locate_yield: bool = False) -> t
         if kept.event >= 0:
             met.append(int(kept.event))
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
-            switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, c)
+            switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, TOLERANCE, c)
             k = rate_of(y, switches, c)
     return np.array(y), met
 

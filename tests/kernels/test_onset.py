@@ -9,8 +9,9 @@ from boulder_kernels.after_step import RUNNING, enter_modes, initial_state, pass
 from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import Acceleration
-from boulder_kernels.events import AT_END, TOLERANCE, initial_modes
+from boulder_kernels.events import AT_END, initial_modes
 from boulder_kernels.flat import field
+from boulder_kernels.gaps import TOLERANCE
 from boulder_kernels.lane_steps import start_designs
 from boulder_kernels.lanes import start_again
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
@@ -43,7 +44,7 @@ RWG = design_of(oracle.RWG)
 
 
 def length(h: float, readings: bk.Readings, c: Constants) -> float:
-    factors = enter_modes(initial_modes(readings, c), readings, LIMIT, False, c)[1]
+    factors = enter_modes(initial_modes(readings, c), readings, LIMIT, False, TOLERANCE, c)[1]
     return first_length(h, factors, c)
 
 
@@ -83,7 +84,7 @@ def test_a_step_to_the_onset_ends_just_behind_it() -> None:
     c = constants_of(RWG, CORRECTED, 0)
     modes = initial_modes(CORRECTED, c)
     assert modes.turning == SEATED
-    switches, factors = enter_modes(modes, CORRECTED, LIMIT, False, c)
+    switches, factors = enter_modes(modes, CORRECTED, LIMIT, False, TOLERANCE, c)
     y = initial_state(c)
     k = rate_of(y, switches, c)
     y_end, k_end, _ = step(y, k, onset_of(c), switches, c)
