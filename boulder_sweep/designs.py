@@ -377,6 +377,12 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
     return DesignBlock(0, len(codes), columns, Reasons(codes, REASONS))
 
 
+def some(block: DesignBlock, rows: np.ndarray) -> DesignBlock:
+    """Return some rows of a block by their places, without labels, numbered from 0."""
+    columns = {name: Column(None, column.to_numpy()[rows]) for name, column in block.columns.items()}
+    return DesignBlock(0, len(rows), columns, Reasons(np.asarray(block.reasons.codes)[rows], block.reasons.texts))
+
+
 class _Rows:
     """Places of a range of rows on the axes; of 32 bits where they fit, which divide several times as fast."""
 

@@ -15,7 +15,7 @@ import numpy as np
 from boulder_sweep.answers.keys import Key, sweep_ranges
 from boulder_sweep.answers.questions import Answers, Brackets, replaced
 from boulder_sweep.answers.search import ALWAYS, BEYOND, FAILS, FOUND, HOLDS, NEVER, Search, last_before, search
-from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, taken
+from boulder_sweep.answers.trials import Judges, Open, Remembered, Rows, beyond_reach, taken
 from boulder_sweep.errors import QuestionError
 
 if TYPE_CHECKING:
@@ -102,17 +102,17 @@ class LightestQuestion:
         """Return the other inputs of the rows ``[start, stop)``."""
         return self.open.rows(start, stop)
 
-    def trial(self, rows: Rows, side: str) -> Boulders:
+    def trial(self, rows: Rows, side: str, final: Remembered) -> Boulders:
         """Return the object that tries boulders in some rows, by a side or the scale."""
-        return Boulders(self, rows, side)
+        return Boulders(self, rows, side, final)
 
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
         rows = self.given(start, stop)
-        n = stop - start
+        n, final = stop - start, Remembered(self.judges.final)
         # If the lightest boulder is as long, wide or high as it may be, a search for this side has no way to vary the
         # others at that end; the search for another side has.
-        trials = [self.trial(rows, side) for side in reversed(self.free or [SCALE])]
+        trials = [self.trial(rows, side, final) for side in reversed(self.free or [SCALE])]
         found = [trial.certified(trial.lightest()) for trial in trials]
         best = _lightest(found)
         sizes = {name: _taken((own.sizes[name] for own in found), best) for name in self.searched}
@@ -127,8 +127,8 @@ class LightestQuestion:
             name: _taken((own.block.columns[name].to_numpy() for own in found), best) for name in (*SIDES, DEPTH)
         }
         block = replace(taken(rows, np.arange(n), **columns), labels=self.open.labels(start, stop))
-        simulated = sum(trial.simulated for trial in trials) + n
-        judged = self.judges.final.graded(self.judges.final(block), block)
+        judged = self.judges.final.graded(final(block), block)
+        simulated = sum(trial.simulated for trial in trials) + final.count
         return Answers(block, kind, fails, passes, judged, [None] * n, simulated)
 
 
@@ -150,10 +150,13 @@ class Boulders:
         The other inputs.
     side
         The side that is searched for, given the others and the depth, or `SCALE`.
+    final
+        Judges designs with the accuracy of the sweep; counts its own simulations.
     """
 
-    def __init__(self, asked: LightestQuestion, rows: Rows, side: str) -> None:
+    def __init__(self, asked: LightestQuestion, rows: Rows, side: str, final: Remembered) -> None:
         self.asked, self.judges, self.rows, self.side = asked, asked.judges, rows, side
+        self._final = final
         self.simulated = 0
         low, high = asked.searched[side]
         self.first, self.last = round(low * MILLIMETRES), round(high * MILLIMETRES)
@@ -197,8 +200,8 @@ class Boulders:
     def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
         """Return the predicate of `search`."""
         block = self.block(index, places, others)
-        self.simulated += len(block)
-        judged = (self.judges.coarse if quick else self.judges.final)(block)
+        self.simulated += len(block) if quick else 0
+        judged = self.judges.coarse(block) if quick else self._final(block)
         return np.where(beyond_reach(block, judged), BEYOND, np.where(self.judges.holds(judged), HOLDS, FAILS))
 
     def block(self, index: np.ndarray, places: np.ndarray, others: Sides) -> DesignBlock:
@@ -243,11 +246,13 @@ class Boulders:
         n = len(next(iter(self.rows.values())))
         index = np.arange(n)
         found = self.least(index, others, quick=True)
-        agrees = np.ones(n, dtype=bool)
-        for has, places, holds in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
-            agrees &= ~has | ((self.codes(index, places, others, quick=False) == HOLDS) == holds)
-        if not agrees.all():
-            wrong = np.flatnonzero(~agrees)
+        failing, holding = np.flatnonzero(found.has_fails), np.flatnonzero(found.has_holds)
+        ends = np.concatenate([failing, holding])
+        places = np.concatenate([found.fails[failing], found.holds[holding]])
+        at_ends = {name: values[ends] for name, values in others.items()}
+        holds = self.codes(ends, places, at_ends, quick=False) == HOLDS
+        wrong = np.unique(ends[holds != (np.arange(len(ends)) >= len(failing))])
+        if len(wrong):
             part = self.least(wrong, {name: values[wrong] for name, values in others.items()}, quick=False)
             found = replaced(found, wrong, part)
         return self.found(others, found.shown, found.has_holds, found.fails, found.has_fails)

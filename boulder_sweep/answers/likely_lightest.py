@@ -19,7 +19,7 @@ from boulder_sweep.answers.probability import DRAWN, HALF_WIDTH
 from boulder_sweep.answers.questions import Answers
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import Judges, Rows, beyond_reach, ranges, uncertain_rows
+from boulder_sweep.answers.trials import Judges, Remembered, Rows, beyond_reach, ranges, uncertain_rows
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings.fields import BY_NAME
 
@@ -68,9 +68,9 @@ class LikelyLightestQuestion(LightestQuestion):
         """Return the other inputs of some rows, with the places of named sets that have distributions."""
         return uncertain_rows(self.open.sweep, super().given(start, stop), start, stop)
 
-    def trial(self, rows: Rows, side: str) -> Boulders:
+    def trial(self, rows: Rows, side: str, final: Remembered) -> Boulders:
         """Return the object that tries boulders in some rows."""
-        return LikelyBoulders(self, rows, side)
+        return LikelyBoulders(self, rows, side, final)
 
     def draws(self, rows: Rows) -> Draws:
         """Return what draws the designs of some rows."""
@@ -93,8 +93,8 @@ class LikelyLightestQuestion(LightestQuestion):
 class LikelyBoulders(Boulders):
     """Tries boulders for some rows: whether designs drawn with them pass often enough."""
 
-    def __init__(self, asked: LikelyLightestQuestion, rows: Rows, side: str) -> None:
-        super().__init__(asked, rows, side)
+    def __init__(self, asked: LikelyLightestQuestion, rows: Rows, side: str, final: Remembered) -> None:
+        super().__init__(asked, rows, side, final)
         self.likely, self.draws = asked, asked.draws(rows)
 
     def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:

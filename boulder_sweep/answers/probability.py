@@ -15,8 +15,6 @@ from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import Judges, Rows, beyond_reach, ranges
 
 if TYPE_CHECKING:
-    from boulder_sweep.designs import DesignBlock
-    from boulder_sweep.judge.judged import Judged
     from boulder_sweep.settings import Sweep
 
 DRAWN = 4096
@@ -86,7 +84,7 @@ class ProbabilityTrial(Trial):
         self.asked = asked
         self.draws = Draws(rows, asked.spread, asked.judges, threads(1), asked.variants)
 
-    def contradicted(self, found: Search, block: DesignBlock, judged: Judged) -> np.ndarray:
+    def contradicted(self, found: Search) -> np.ndarray:
         """Return no rows: the designs drawn near a limit are judged with the accuracy of the sweep anyway."""
         return np.empty(0, dtype=np.int64)
 

@@ -10,7 +10,17 @@ import numpy as np
 
 from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_coarse
 from boulder_sweep.answers.search import BEYOND, BLOCKED, CELLS, FAILS, FAR, HOLDS, NEVER, NOT_MONOTONE, Search, search
-from boulder_sweep.answers.trials import Judges, Open, Rows, beyond_reach, ranges, taken, too_low, uncertain_rows
+from boulder_sweep.answers.trials import (
+    Judges,
+    Open,
+    Remembered,
+    Rows,
+    beyond_reach,
+    ranges,
+    taken,
+    too_low,
+    uncertain_rows,
+)
 from boulder_sweep.judge.judged import with_rows
 
 CHECKED_AT_ONCE = 65_536
@@ -119,8 +129,8 @@ class Question:
         trial = self.trial(rows)
         found = search(trial.coarse, first, last, self.cells)
         every = np.arange(stop - start)
+        wrong = trial.contradicted(found)
         block, judged = trial.judged(every, found.shown)
-        wrong = trial.contradicted(found, block, judged)
         if len(wrong):
             ends = first[wrong], last[wrong]
             part = search(lambda index, places: trial.final(wrong[index], places), *ends, self.cells)
@@ -169,6 +179,7 @@ class Trial:
     def __init__(self, key: Key, judges: Judges, rows: Rows) -> None:
         self.key, self.judges, self.rows = key, judges, rows
         self.simulated = 0
+        self._final = Remembered(judges.final)
 
     def coarse(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Predicate of the search, without an error estimate."""
@@ -180,27 +191,23 @@ class Trial:
 
     def judged(self, index: np.ndarray, places: np.ndarray, *, quick: bool = False) -> tuple[DesignBlock, Judged]:
         """Return the designs with these values, and their verdicts."""
-        block = self.block(index, places)
-        self.simulated += len(index)
-        return block, (self.judges.coarse if quick else self.judges.final)(block)
+        block, remembered = self.block(index, places), self._final.count
+        judged = self.judges.coarse(block) if quick else self._final(block)
+        self.simulated += len(index) if quick else self._final.count - remembered
+        return block, judged
 
     def block(self, index: np.ndarray, places: np.ndarray) -> DesignBlock:
         """Return the designs with these values."""
         return taken(self.rows, index, **{self.key.name: self.key.values(places)})
 
-    def contradicted(self, found: Search, block: DesignBlock, judged: Judged) -> np.ndarray:
-        """Return the rows that the accuracy of the sweep does not confirm, shape (m,).
-
-        Parameters
-        ----------
-        found
-            What the quick search found.
-        block, judged
-            The designs at the places shown and their verdicts with the accuracy of the sweep.
-        """
-        wrong = (self.codes(block, judged) == HOLDS) != found.has_holds
+    def contradicted(self, found: Search) -> np.ndarray:
+        """Return the rows of a quick search that the accuracy of the sweep does not confirm, shape (m,)."""
         bracketed = np.flatnonzero(found.has_holds & found.has_fails)
-        wrong[bracketed] |= self.final(bracketed, found.fails[bracketed]) == HOLDS
+        # Both ends together: what needs finer steps fills the lanes better.
+        index = np.concatenate([np.arange(len(found.shown)), bracketed])
+        holds = self.final(index, np.concatenate([found.shown, found.fails[bracketed]])) == HOLDS
+        wrong = holds[: len(found.shown)] != found.has_holds
+        wrong[bracketed] |= holds[len(found.shown) :]
         # Rows that are not monotone have several brackets, all of which must be certified.
         return np.flatnonzero(wrong | (found.kind == NOT_MONOTONE))
 

@@ -180,10 +180,11 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
 
 def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
     """Return whether the accuracy of the sweep confirms both ends of the brackets."""
+    before, behind = np.flatnonzero(found.has_fails), np.flatnonzero(found.has_holds)
+    ends = np.concatenate([before, behind])
+    holds = trial.final(ends, np.concatenate([found.fails[before], found.holds[behind]])) == HOLDS
     agrees = np.ones(len(passes), dtype=bool)
-    for has, places, changed in ((found.has_fails, found.fails, False), (found.has_holds, found.holds, True)):
-        rows = np.flatnonzero(has)
-        agrees[rows] &= (trial.final(rows, places[rows]) == HOLDS) == (passes[rows] != changed)
+    agrees[ends[holds == (passes[ends] == (np.arange(len(ends)) >= len(before)))]] = False
     return agrees
 
 

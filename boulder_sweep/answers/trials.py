@@ -12,10 +12,10 @@ import numpy as np
 
 from boulder_kernels._jit import plain
 from boulder_kernels.settling import proof_is_possible
-from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of
+from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, some
 from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
-from boulder_sweep.judge.judged import PASS, Judged
+from boulder_sweep.judge.judged import PASS, Judged, joined
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.robustness import ROBUST
 from boulder_sweep.settings import fields
@@ -113,6 +113,41 @@ class Judges:
         if self.robust:
             passes &= judged["robustness"] == ROBUST
         return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
+
+
+class Remembered:
+    """Judges designs as an evaluation does, each only once: an answer asks again and again for those of its bracket.
+
+    It keeps what it has judged, so every block of rows has one of its own.
+
+    Parameters
+    ----------
+    evaluation
+        The evaluation.
+
+    Attributes
+    ----------
+    count : int
+        Designs judged so far.
+    """
+
+    def __init__(self, evaluation: Evaluation) -> None:
+        self._evaluation, self.count = evaluation, 0
+        self._places: dict[bytes, int] = {}
+        self._judged: list[Judged] = []
+
+    def __call__(self, block: DesignBlock) -> Judged:
+        """Return the judged rows of a block."""
+        inputs = [column.to_numpy() for column in block.columns.values()]
+        keys = [row.tobytes() for row in np.stack(inputs, axis=1)]
+        new = {key: row for row, key in enumerate(keys) if key not in self._places}
+        if new or not self._judged:
+            self._places |= {key: len(self._places) + count for count, key in enumerate(new)}
+            self._judged.append(self._evaluation(some(block, np.fromiter(new.values(), np.int64, len(new)))))
+            self._judged = [joined(self._judged)]
+            self.count += len(new)
+        places = [self._places[key] for key in keys]
+        return joined([self._judged[0].rows(np.array(places, dtype=np.int64))])
 
 
 def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False, robust: bool = False) -> Judges:
