@@ -17,9 +17,11 @@ import boulder_sweep.answers.need as need_module
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.need_printing import need_lines
-from boulder_sweep.answers.trials import Judges, judges_of
+from boulder_sweep.answers.trials import Judges, Remembered, judges_of
+from boulder_sweep.designs import DesignBlock, some
 from boulder_sweep.errors import PictureError, QuestionError
-from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.evaluation import Evaluation
+from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
@@ -358,3 +360,35 @@ def test_chart_is_drawn(tmp_path: Path) -> None:
 def test_public_name() -> None:
     assert boulder_sweep.need is need
     assert boulder_sweep.Need is Need
+
+
+def test_a_design_is_judged_once_with_the_accuracy_of_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The ends of a bracket are certified, searched again where they must, and reported: by the same judgement."""
+    sweep = site(height="[3, 3.4] m")
+    own = judges_of(sweep)
+    judged: list[bytes] = []
+
+    def counted(evaluation: Evaluation, block: DesignBlock) -> Judged:
+        if evaluation.control.error_estimate:
+            inputs = np.stack([column.to_numpy() for column in block.columns.values()], axis=1)
+            judged.extend(row.tobytes() for row in inputs)
+        return judge(evaluation, block)
+
+    judge = Evaluation.__call__
+    monkeypatch.setattr(Evaluation, "__call__", counted)
+    found = need(sweep, jobs=1)
+    assert own.accuracy.error_estimate
+    assert len(judged) == len(set(judged)) >= len(found)
+
+
+def test_judging_again_gives_the_same_rows() -> None:
+    sweep = site(height="[3, 3.4] m", site="embedment_depth: [2.0, 2.1, 2.2] m")
+    block = sweep.block(0, sweep.n_designs)
+    remembered, direct = Remembered(judges_of(sweep).final), judges_of(sweep).final
+    some_rows, again = some(block, np.array([3, 1, 3])), some(block, np.arange(len(block))[::-1])
+    for asked, count in ((some_rows, 2), (again, len(block)), (some_rows, len(block))):
+        mine, theirs = remembered(asked), direct(asked)
+        assert remembered.count == count
+        assert mine.words == theirs.words
+        for name, values in theirs.columns.items():
+            np.testing.assert_array_equal(mine[name], values)
