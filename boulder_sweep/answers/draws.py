@@ -157,7 +157,7 @@ def _reserve_of(judged: Judged, judges: Judges, block: DesignBlock) -> np.ndarra
     margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
     parts = (
         np.where(np.isnan(margin), -FAST_OVERTURN_S / time, margin),
-        (height - depth - bumper - judges.final.limits.min_overlap) / OVERLAP_M,
+        (height - depth - bumper - judges.final.limits.criterion.min_overlap_m) / OVERLAP_M,
         1.0 - judged["vehicle_crush_m"] / np.maximum(bed, np.finfo(float).tiny),
     )
     # What is not known of a design neither helps nor harms it.

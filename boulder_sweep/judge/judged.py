@@ -16,7 +16,6 @@ from boulder_sweep.columns import AT_REST, OUTCOMES, REASONS, VERDICTS, OutcomeC
 
 PASS, FAIL, UNDECIDED, ERROR = range(len(VERDICTS))
 NO_REASON, NO_CONTACT, OVERTURNS, PENETRATION, HORIZON, NUMERICAL_ERROR, CRUSH, OVERRIDE = range(8)
-FOOT, SHAPE = range(8, len(REASONS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

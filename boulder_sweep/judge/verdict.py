@@ -32,26 +32,10 @@ import numpy as np
 
 import boulder_kernels.verdict as verdicts
 from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
-from boulder_kernels.verdict import RULINGS, VerdictLimits, write_rulings
-from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, Rows
+from boulder_kernels.verdict import OF_CRITERION, RULES, RULINGS, VerdictLimits, write_rulings
+from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, VERDICTS, Rows
 from boulder_sweep.judge.inputs import Designs
-from boulder_sweep.judge.judged import (
-    CRUSH,
-    ERROR,
-    FAIL,
-    FOOT,
-    HORIZON,
-    NO_CONTACT,
-    NO_REASON,
-    NUMERICAL_ERROR,
-    OVERRIDE,
-    OVERTURNS,
-    PASS,
-    PENETRATION,
-    SHAPE,
-    UNDECIDED,
-    Judged,
-)
+from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
 from boulder_sweep.judge.robustness import grades_without_asking, is_studied
 from boulder_sweep.judge.validity import TESTED_ROTATION_DEG, flagged
 from boulder_sweep.settings.model import Criterion, Model
@@ -76,20 +60,8 @@ STATUS_REASONS = {
 """Reason of a row that the kernels could not compute."""
 STEP_REASONS = frozenset(text for status, text in STATUS_REASONS.items() if status != Status.INVALID)
 """Those that a finer time step may resolve."""
-RULES = (
-    (ERROR, NO_REASON),  # which has a reason of its own
-    (FAIL, NO_CONTACT),
-    (FAIL, OVERTURNS),
-    (FAIL, PENETRATION),
-    (UNDECIDED, FOOT),
-    (UNDECIDED, SHAPE),
-    (UNDECIDED, CRUSH),
-    (UNDECIDED, OVERRIDE),
-    (UNDECIDED, HORIZON),
-    (UNDECIDED, NUMERICAL_ERROR),
-    (PASS, NO_REASON),
-)
-"""Verdict and reason of every rule of `boulder_kernels.verdict`, in its order."""
+_VERDICTS = np.array([VERDICTS.index(verdict) for verdict, _ in RULES], dtype=np.int32)
+_REASONS = np.array([REASONS.index(reason) for _, reason in RULES], dtype=np.int32)
 NOT_FINITE = "the computed result is not a finite number"
 
 
@@ -100,8 +72,8 @@ class Limits(NamedTuple):
     """Largest rotation [rad]."""
     rating: str
     """Required penetration rating, one of `RATINGS`."""
-    min_overlap: float = Criterion().min_overlap_m
-    """Least overlap of bumper and boulder [m]."""
+    criterion: Criterion = Criterion()
+    """Further limits, under the names that they have in `boulder_kernels.verdict.VerdictLimits`."""
     calibrated_crush: float = Model().calibrated_crush_m
     """Crush beyond which a row is flagged [m]."""
     tested_rotation: float = math.radians(TESTED_ROTATION_DEG["corrected"])
@@ -208,11 +180,11 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     if not limits.guarded:
         unknown = np.full(len(status), np.nan)
         given = given._replace(theta_error=unknown, x_error=unknown)
-    held = VerdictLimits(limits.rotation, limits.penetration, limits.min_overlap, limits.proved)
+    further = (getattr(limits.criterion, name) for name in OF_CRITERION)
+    held = VerdictLimits(limits.rotation, limits.penetration, float(limits.proved), *further)
     write_rulings(given, sizes, held, rulings)
     rule, overlap, penetration, margin = rulings[0].astype(np.intp), *rulings[1:]
-    verdict = np.array([kind for kind, _ in RULES], dtype=np.int32).take(rule)
-    reason = np.array([why for _, why in RULES], dtype=np.int32).take(rule)
+    verdict, reason = _VERDICTS.take(rule), _REASONS.take(rule)
     failed = rule == verdicts.NOT_COMPUTED
     reasons: tuple[str, ...] = REASONS
     if failed.any():
@@ -255,11 +227,10 @@ def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
     """Return the limits of a sweep; `proved` as of `Limits`."""
     preset = sweep.model.preset
     tested = TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values()))
-    criterion = sweep.criterion
     return Limits(
-        rotation=math.radians(criterion.max_rotation_deg),
-        rating=criterion.rating,
-        min_overlap=criterion.min_overlap_m,
+        rotation=math.radians(sweep.criterion.max_rotation_deg),
+        rating=sweep.criterion.rating,
+        criterion=sweep.criterion,
         calibrated_crush=sweep.model.calibrated_crush_m,
         tested_rotation=math.radians(tested),
         studied=is_studied(sweep),

@@ -16,8 +16,8 @@ from boulder_kernels import verdict as verdicts
 from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
-from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD, VERDICTS
-from boulder_sweep.columns import REASONS as VERDICT_REASONS
+from boulder_kernels.verdict import OF_CRITERION, RULES
+from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
@@ -27,7 +27,7 @@ from boulder_sweep.judge.validity import (
     TESTED_ROTATION_DEG,
     usual_range,
 )
-from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, RULES, STATUS_REASONS, STEP_REASONS
+from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.asked import map_of
 from boulder_sweep.report.build import KERNEL
@@ -247,8 +247,8 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "rotation": rotation,
         "rating": rating,
-        "limits": [rotation, PENETRATION_LIMITS_M[rating], criterion["min_overlap_m"], True],
-        "verdicts": [[VERDICTS[verdict], VERDICT_REASONS[reason]] for verdict, reason in RULES],
+        "limits": [rotation, PENETRATION_LIMITS_M[rating], 1.0, *(criterion[name] for name in OF_CRITERION)],
+        "verdicts": RULES,
         "not_finite": NOT_FINITE,
         "ratings": list(PENETRATION_LIMITS_M.items()),
         "status": {status.name: status.value for status in Status},

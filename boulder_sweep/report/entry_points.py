@@ -35,7 +35,7 @@ from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.table import SAFETY, SAFETY_CONFIRMED, SAFETY_PRINTED, confirm_error, estimate_error
 from boulder_kernels.unloading import plastic_work, recall
-from boulder_kernels.verdict import VerdictLimits, write_rulings
+from boulder_kernels.verdict import VerdictLimits, limits_in, write_rulings
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
@@ -51,6 +51,7 @@ OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
 LIMITS = VerdictLimits._fields
 """Limits of the criterion, in this order; rad, m."""
+LIMITS_COUNT = len(LIMITS)
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
@@ -293,8 +294,7 @@ def rulings(n: int, outcomes_at: Any, sizes_at: Any, limits_at: Any, rulings_at:
     rulings_at
         Where the rulings go, shape (len(RULINGS), n).
     """
-    s = carray(limits_at, (4,))
-    limits = VerdictLimits(s[0], s[1], s[2], s[3] > 0.0)
+    limits = limits_in(carray(limits_at, (LIMITS_COUNT,)))
     table = outcomes_from(carray(outcomes_at, (11, n)))
     write_rulings(table, carray(sizes_at, (7, n)), limits, carray(rulings_at, (4, n)))
 

@@ -13,8 +13,22 @@ import numpy as np
 from ._jit import exact_inlined, exact_kernel
 from .outcomes import OutcomeTable, Status
 
+RULES = (
+    ("error", ""),  # which has a reason of its own
+    ("fail", "no_contact"),
+    ("fail", "overturns"),
+    ("fail", "penetration"),
+    ("undecided", "foot"),
+    ("undecided", "shape"),
+    ("undecided", "crush"),
+    ("undecided", "override"),
+    ("undecided", "horizon"),
+    ("undecided", "error"),
+    ("pass", ""),
+)
+"""Verdict and reason of every rule, the worst first."""
 NOT_COMPUTED, NO_CONTACT, OVERTURNS, PENETRATION = range(4)
-FOOT, SHAPE, CRUSH, OVERRIDE, UNPROVED, NUMERICAL_ERROR, PASSES = range(4, 11)
+FOOT, SHAPE, CRUSH, OVERRIDE, UNPROVED, NUMERICAL_ERROR, PASSES = range(4, len(RULES))
 """The rules. A row is standing, computed and not overturned, from PENETRATION on."""
 
 
@@ -25,10 +39,10 @@ class VerdictLimits(NamedTuple):
     """Largest rotation [rad]."""
     penetration: float
     """Largest penetration [m]."""
-    min_overlap: float
-    """Least overlap of boulder and bumper [m]."""
-    proved: bool
-    """Whether a pass must be proved also where the readings allow no proof."""
+    proved: float
+    """1 where a pass must be proved also where the readings allow no proof, else 0."""
+    min_overlap_m: float
+    """Least overlap of boulder and bumper [m]. It and what follows have the names that they have among the settings."""
 
 
 class Ruling(NamedTuple):
@@ -44,11 +58,19 @@ class Ruling(NamedTuple):
     """Least (limit - value) / limit of rotation and penetration [-]."""
 
 
+OF_CRITERION = VerdictLimits._fields[VerdictLimits._fields.index("min_overlap_m") :]
+"""Limits that are settings of the criterion as they are."""
 RULINGS = Ruling._fields
 """Rows of the array of `write_rulings`."""
 SIZES = ("L", "H", "d", "e_bumper", "bed_offset", "flat_foot", "known_shape")
 """Rows of the array of inputs that it takes; the last two are 1 or 0: whether the foot of the boulder is flat, and
 whether what was simulated has its shape."""
+
+
+@exact_inlined
+def limits_in(values: np.ndarray) -> VerdictLimits:
+    """Return the limits that an array holds, in the order of `VerdictLimits`."""
+    return VerdictLimits(values[0], values[1], values[2], values[3])
 
 
 @exact_inlined
@@ -82,7 +104,7 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
         and np.isfinite(o.t_end[row])
     )
     unproved = status == Status.HORIZON.value or status == Status.OUTWARD.value
-    unproved = unproved or (limits.proved and status == Status.UNPROVABLE.value)
+    unproved = unproved or (limits.proved > 0.0 and status == Status.UNPROVABLE.value)
     # Where only one of two solutions overturns the error is infinite, and nothing is decided.
     reached = (status == Status.LIMIT.value or theta >= limits.rotation) and not np.isinf(o.theta_error[row])
     unsure = limits.rotation - theta < o.theta_error[row] or min(room, bed_offset - crush) < o.x_error[row]
@@ -100,7 +122,7 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
         rule = SHAPE
     elif crush > bed_offset:
         rule = CRUSH
-    elif overlap < limits.min_overlap:
+    elif overlap < limits.min_overlap_m:
         rule = OVERRIDE
     elif unproved:
         rule = UNPROVED

@@ -16,6 +16,7 @@ from boulder_sweep.columns import OUTCOME_COLUMNS, RATINGS, REASONS, VERDICTS
 from boulder_sweep.judge.judged import Judged
 from boulder_sweep.judge.validity import TESTED_ROTATION_DEG
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, Limits, judge, limits_of
+from boulder_sweep.settings.model import Criterion
 from tests.judge.plain import plain_designs
 from tests.runner.grids import grid
 
@@ -162,7 +163,10 @@ def test_a_boulder_that_barely_reaches_the_bumper_does_not_pass(overlap, found):
     row = judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1"))
     assert only(row) == found
     assert row["overlap_m"][0] == pytest.approx(overlap)
-    assert only(judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1", min_overlap=0.0))) == ("pass", "")
+    assert only(judge(outcome(Status.SETTLED), designs, Limits(LIMIT, "P1", Criterion(min_overlap_m=0.0)))) == (
+        "pass",
+        "",
+    )
     overturned = judge(outcome(Status.LIMIT), designs, Limits(LIMIT, "P1"))
     assert only(overturned) == ("fail", "overturns")
 
@@ -171,10 +175,10 @@ def test_limits_are_those_of_the_settings():
     sweep = grid(rotation="15 deg")
     limits = limits_of(sweep)
     assert limits.rotation == pytest.approx(math.radians(15.0))
-    assert (limits.min_overlap, limits.calibrated_crush) == (0.25, 1.0)
+    assert (limits.criterion.min_overlap_m, limits.calibrated_crush) == (0.25, 1.0)
     changes = ["criterion.min_overlap=10 in", "vehicle.calibrated_crush=0.8 m", "model.readings=as_printed"]
     limits = limits_of(boulder_sweep.load(CONFIGS / "rwg.yaml", changes))
-    assert limits.min_overlap == pytest.approx(0.254)
+    assert limits.criterion.min_overlap_m == pytest.approx(0.254)
     assert limits.calibrated_crush == 0.8
     assert math.degrees(limits.tested_rotation) == pytest.approx(TESTED_ROTATION_DEG["as_printed"])
 

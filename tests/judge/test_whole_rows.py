@@ -11,6 +11,7 @@ from boulder_sweep.judge.evaluation import Evaluation, by_kernels
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import HORIZON, OVERRIDE, PASS, UNDECIDED
 from boulder_sweep.judge.verdict import Limits
+from boulder_sweep.settings.model import Criterion
 from docs.studies.coverage import random_table
 from docs.studies.extremes import box_designs
 from tests.judge.plain import plain_designs
@@ -39,7 +40,7 @@ def test_a_boulder_that_barely_touches_the_bumper_is_undecided() -> None:
     assert (row["verdict"], row["reason"]) == ("undecided", "override")
     assert math.isclose(row["overlap_m"], 0.008, abs_tol=1e-9)
     assert row["margin"] is None
-    free = LIMITS._replace(min_overlap=0.0)
+    free = LIMITS._replace(criterion=Criterion(min_overlap_m=0.0))
     assert Evaluation(corrected(), CONTROL, free).judged(plain_designs(d=2.492)).reason[0] != OVERRIDE
 
 

@@ -23,7 +23,7 @@ from boulder_kernels.verdict import (
     write_rulings,
 )
 
-LIMITS = VerdictLimits(rotation=0.35, penetration=1.0, min_overlap=0.25, proved=True)
+LIMITS = VerdictLimits(rotation=0.35, penetration=1.0, proved=1.0, min_overlap_m=0.25)
 STANDS = {
     "status": bk.Status.SETTLED,
     "theta_max": 0.1,
@@ -70,11 +70,11 @@ def ruling(**changed):
         ({"known_shape": 0.0}, SHAPE),
         ({"crush_max": 3.0}, CRUSH),
         ({"d": 2.3}, OVERRIDE),
-        ({"d": 2.3, "min_overlap": 0.1}, PASSES),
+        ({"d": 2.3, "min_overlap_m": 0.1}, PASSES),
         ({"status": bk.Status.HORIZON}, UNPROVED),
         ({"status": bk.Status.OUTWARD}, UNPROVED),
         ({"status": bk.Status.UNPROVABLE}, UNPROVED),
-        ({"status": bk.Status.UNPROVABLE, "proved": False}, PASSES),
+        ({"status": bk.Status.UNPROVABLE, "proved": 0.0}, PASSES),
         ({"theta_error": 0.3}, NUMERICAL_ERROR),
         ({"x_error": 4.0}, NUMERICAL_ERROR),
         ({"theta_error": np.nan, "x_error": np.nan}, PASSES),
