@@ -27,7 +27,7 @@ from boulder_sweep.cli.options import (
     units_option,
 )
 from boulder_sweep.cli.output import say, show
-from boulder_sweep.cli.progress import kernels_for, working
+from boulder_sweep.cli.progress import working
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 from boulder_sweep.text import counted
 
@@ -106,7 +106,7 @@ def need(
         raise click.UsageError("--at and --probability cannot be used together")
     refuse_unwritable(out, picture)
     question["robust"] |= under is not None
-    with working(quiet, kernels_for(sweep), of="designs" if question["probability"] is None else "values") as progress:
+    with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
         result = find(sweep, **question, progress=progress)
     if as_json:
         show(json.dumps(result.to_dict()))
@@ -189,7 +189,7 @@ def uncertainty(
     sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet, units)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
-    with working(quiet, kernels_for(sweep)) as progress:
+    with working(quiet) as progress:
         result = estimate(sweep, **question, progress=progress)
     parts = []
     if doubts:
@@ -263,7 +263,7 @@ def capacity(
     refuse_units_of_json(units, as_json)
     sweep = take_values(load_sweep(grid, overrides, quiet, units), at, quiet, units)
     refuse_unwritable(out)
-    with working(quiet, kernels_for(sweep)) as progress:
+    with working(quiet) as progress:
         result = reserves(sweep, jobs=jobs, progress=progress)
     show(*([json.dumps(result.to_dict())] if as_json else reserve_lines(result, units=units)))
     if out is not None:

@@ -73,7 +73,7 @@ def run(
 ) -> int:
     """Simulate every design of GRID and write the table of verdicts."""
     from boulder_sweep.cli import console
-    from boulder_sweep.cli.progress import Notes, kernels_for, progress
+    from boulder_sweep.cli.progress import Notes, progress
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite cannot be used together")
@@ -96,7 +96,7 @@ def run(
 
     notes = Notes()
     # Who waits for this command does not act on a signal before it has said how to go on.
-    with noted_signals() as signals, signals.deferred(), progress(quiet, notes, kernels_for(sweep)) as shown:
+    with noted_signals() as signals, signals.deferred(), progress(quiet, notes) as shown:
         try:
             summary = run_sweep(
                 sweep,

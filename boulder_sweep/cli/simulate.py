@@ -23,7 +23,7 @@ from boulder_sweep.cli.options import (
     units_option,
 )
 from boulder_sweep.cli.output import say, show
-from boulder_sweep.cli.progress import kernels_for, working
+from boulder_sweep.cli.progress import working
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def simulate(
     from boulder_sweep.settings.shown_units import shown_values
     from boulder_sweep.views.wording import verdict_line
 
-    with working(quiet, kernels_for(sweep, "design")):
+    with working(quiet):
         result = simulate_design(sweep, number)
     # Before anything else: there may be nothing to draw, and a film takes a while.
     row = result.summary()
@@ -111,7 +111,7 @@ def simulate(
     if energy is not None:
         result.plot_energy(energy, units=units)
     if animate is not None:
-        with working(quiet, None, f"drawing {animate}", "frames") as progress:
+        with working(quiet, f"drawing {animate}", "frames") as progress:
             result.animate(animate, progress)
     for file in (plot, trajectory, energy, animate):
         if file is not None and not quiet:
@@ -157,7 +157,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
 
     refuse_unwritable_history(plot, trajectory)
     try:
-        with working(as_json, "design"):
+        with working(as_json):
             explanation = compute_again(out, design_id)
     except IndexError as problem:
         raise click.UsageError(str(problem)) from None

@@ -24,7 +24,7 @@ from boulder_sweep.cli.options import (
     take_values,
 )
 from boulder_sweep.cli.output import say, show
-from boulder_sweep.cli.progress import kernels_for, working
+from boulder_sweep.cli.progress import working
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 
@@ -123,9 +123,9 @@ def _place(
     as_json: bool,
 ) -> int:
     """Find and print the best ways to stand at a site; return the exit code."""
-    from boulder_sweep.answers.placing import boulder_block, placed
+    from boulder_sweep.answers.placing import placed
 
-    said = True
+    said = False
 
     def with_boulder(block: str) -> Sweep:
         """Return the site with a boulder; what is to be said of it is said once."""
@@ -133,13 +133,10 @@ def _place(
         said, silent = True, quiet or said
         return take_values(load_sweep(site, (*overrides, block), silent), at, silent)
 
-    first = next((own for own in (found.standings if chosen is None else (chosen,)) if own.has_foot), None)
-    if first is None:
+    standings = None if chosen is None else (chosen,)
+    if not any(own.has_foot for own in standings or found.standings):
         raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")
-    kernels = kernels_for(with_boulder(boulder_block(found, first)))
-    said = False
-    with working(quiet, kernels, "placing", "ways") as progress:
-        standings = None if chosen is None else (chosen,)
+    with working(quiet, "placing", "ways") as progress:
         result = placed(found, with_boulder, standings, margin=margin, progress=progress)
     if as_json:
         show(json.dumps(result.to_dict()))

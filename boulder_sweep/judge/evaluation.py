@@ -7,7 +7,6 @@ that cannot be computed are not simulated; they come back with their reason.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -228,14 +227,12 @@ class Evaluation:
 
     def warm_up(self) -> None:
         """Load or compile the kernels by simulating one step of a plain design."""
-        begun = time.monotonic()
         springs = PLAIN_SPRINGS if self.second_spring else None
         table = with_soil(PLAIN_DESIGN.table, self.resistance, self.ground, shape=self.shape)
         plain = PLAIN_DESIGN._replace(table=table, springs=springs)
         self.simulate(plain.table, self.readings, self.control._replace(horizon=self.control.h), *plain.laws)
         if self.second_opinion:
             second_opinions(PLAIN_DESIGN.table, HeaveControl(self.limits.rotation, self.control.h))
-        _warm_ups_s.append(time.monotonic() - begun)
 
 
 PLAIN_DESIGN = Designs(
@@ -261,12 +258,6 @@ PLAIN_DESIGN = Designs(
 """One usual design."""
 PLAIN_SPRINGS = SecondSprings(k_2=np.array([9e6]), s_2=np.array([1.0]))
 """A second spring for its vehicle."""
-_warm_ups_s: list[float] = []
-
-
-def warm_up_s() -> float | None:
-    """Return how long the last warm-up of this process took [s]; None where there was none."""
-    return _warm_ups_s[-1] if _warm_ups_s else None
 
 
 def evaluation_of(

@@ -18,6 +18,7 @@ import hashlib
 import json
 import tempfile
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,6 +31,8 @@ ENTRY = "entry"
 """Name of the function in a library."""
 LIBRARY, OBJECT, RETURNS = ".so", ".o", ".json"
 _COMPILING = threading.RLock()
+announce: Callable[[str], contextlib.AbstractContextManager[Any]] = contextlib.nullcontext
+"""Called with the name of a kernel's files when it must be compiled, which is done within what it returns."""
 
 
 class Native(NamedTuple):
@@ -95,7 +98,8 @@ def _found(kernel: Any, types: str) -> Any:
                 with contextlib.suppress(UnusableError):
                     return loaded(place / name)
         try:
-            code, library, kept = kernel.compiler.compiled_ahead(kernel, types)
+            with announce(name):
+                code, library, kept = kernel.compiler.compiled_ahead(kernel, types)
         except UnsuitableError:
             return UNSUITABLE
         if kept_in is not None:
@@ -187,21 +191,3 @@ def folder() -> Path | None:
     if _cache.CACHE_FOLDER is None:
         return None
     return Path(_cache.CACHE_FOLDER) / f"native-{_cache.machine_hash()[:16]}"
-
-
-def is_compiled(kernel: str, types: str = "") -> bool:
-    """Whether a kernel, such as ``lanes.run_lanes``, has been compiled on this machine for some types.
-
-    Parameters
-    ----------
-    kernel
-        Its module and its name.
-    types
-        Part of the types that it was compiled for, as `flatten` gives them.
-    """
-    for place in (_cache.shipped_folder(), folder()):
-        for file in [] if place is None else place.glob(f"{kernel.replace('.', '-')}-*{RETURNS}"):
-            with contextlib.suppress(UnusableError):
-                if types in described(file)["types"]:
-                    return True
-    return False

@@ -55,13 +55,17 @@ def test_a_terminal_gets_a_bar_with_the_time_left(possible_grid):
 COLD_START = """
 import sys
 from pathlib import Path
+from boulder_kernels import _ahead
 from boulder_sweep.cli import main, progress
 from boulder_sweep.judge.evaluation import Evaluation
 from tests.waiting import wait_until
 enough = Path(sys.argv[1])
-progress.cold_start = lambda kernels: "compiling kernels, once on this machine, about 2 s"
+progress._took_s = lambda kernel: 2.0
 progress._remember = lambda *_: None
-Evaluation.warm_up = lambda self: wait_until(enough.exists, "the bar has moved")
+def warm_up(evaluation):
+    with _ahead.announce("lanes-run_lanes-0"):
+        wait_until(enough.exists, "the bar has moved")
+Evaluation.warm_up = warm_up
 main.main(sys.argv[2:])
 """
 

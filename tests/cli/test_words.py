@@ -12,7 +12,6 @@ from boulder_sweep.cli import progress
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.accuracy import Accuracy, Steps
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
-from boulder_sweep.settings import load
 
 
 def test_explain_tells_what_decided_and_how_near(sweep, possible_grid):
@@ -32,9 +31,24 @@ def test_explain_tells_what_decided_and_how_near(sweep, possible_grid):
 
 
 COMPILING = "compiling kernels, once on this machine, about "
+KERNEL = "lanes-run_lanes-0"
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = CONFIGS / "site.yaml"
 ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
+
+
+def after_compiling(kernel):
+    """Return what calls kernels as `boulder_kernels._ahead.call` does, the first one after it has been compiled."""
+    call, begun = _ahead.call, []
+
+    def cold(*given):
+        if not begun:
+            begun.append(kernel)
+            with _ahead.announce(kernel):
+                pass
+        return call(*given)
+
+    return cold
 
 
 @pytest.fixture(scope="module")
@@ -58,13 +72,13 @@ def compiled():
 def test_every_command_that_compiles_says_so_first(compiled, sweep, words, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert COMPILING not in sweep(*words)[2]
-    monkeypatch.setattr("boulder_sweep.cli.progress.cold_start", lambda kernels: f"{COMPILING}7 s")
+    monkeypatch.setattr(_ahead, "call", after_compiling(KERNEL))
     remembered = {}
-    monkeypatch.setattr("boulder_sweep.cli.progress._remember", remembered.__setitem__)
+    monkeypatch.setattr(progress, "_remember", remembered.__setitem__)
     code, _, err = sweep(*words, *(["--overwrite"] if words[0] == "run" else []))
     assert code == 0
-    assert f"{COMPILING}7 s" in err
-    assert list(remembered) == ["design" if words[0] == "simulate" else "table"]
+    assert err.count(f"{COMPILING}20 s") == 1
+    assert list(remembered) == [KERNEL]
 
 
 @pytest.mark.parametrize("words", [("need", SITE, "--least", "phi"), ("uncertainty", SITE)])
@@ -75,57 +89,15 @@ def test_a_wrong_question_is_refused_before_anything_is_compiled(sweep, words, m
     assert not compiled
 
 
-def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(monkeypatch, tmp_path):
-    folder = tmp_path / "kernels-1"
-    folder.mkdir()
-    monkeypatch.setattr("boulder_kernels._cache.CACHE_FOLDER", str(folder))
-    assert progress.cold_start("table") == f"{COMPILING}15 s"
-    progress._remember("table", 12.3)
-    assert progress.cold_start("table") == f"{COMPILING}12 s"
-    assert progress.cold_start("design") == f"{COMPILING}20 s"
-    compiled = _ahead.folder()
-    compiled.mkdir()
-    (compiled / "lanes-run_lanes-0.json").write_text('{"types": "f82,f81,boulder_kernels.lanes:Queue"}')
-    assert progress.cold_start("table") is None
-    assert progress.cold_start("design") is not None
-
-
-def test_compiled_kernels_are_those_that_are_looked_for(compiled):
-    assert progress.cold_start("table") is None
-    assert progress.cold_start("design") is None
-
-
-SPRING = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
-
-
-@pytest.mark.parametrize(
-    ("overrides", "kernels"),
-    [
-        ((), ("table", "design")),
-        (("model.soil={elements: 50}",), ("elements-table", "design")),
-        ((SPRING,), ("springs-table", "springs-design")),
-        (("soil.cohesion=5 kPa",), ("layers-table", "layers-design")),
-        (("soil.slope=10 deg",), ("table", "design")),
-        (("model.unloading=plastic", SPRING), ("plastic-table", "plastic-design")),
-    ],
-)
-def test_kernels_are_named_by_what_the_file_asks_for(overrides, kernels):
-    sweep = load(CONFIGS / "rwg.yaml", overrides)
-    assert (progress.kernels_for(sweep), progress.kernels_for(sweep, "design")) == kernels
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    "override", ["model.soil={elements: 50}", SPRING, "soil.cohesion=5 kPa", "model.unloading=plastic"]
-)
-def test_kernels_of_other_laws_are_announced_until_they_are_compiled(sweep, override, tmp_path):
-    case = (CONFIGS / "rwg.yaml", "--set", override)
-    of_file = load(CONFIGS / "rwg.yaml", [override])
-    assert sweep("run", *case, "-o", tmp_path / "one.sweep")[0] == 0
-    assert sweep("simulate", *case)[0] == 0
-    assert progress.cold_start(progress.kernels_for(of_file)) is None
-    assert progress.cold_start(progress.kernels_for(of_file, "design")) is None
-    assert COMPILING not in sweep("run", *case, "-o", tmp_path / "two.sweep")[2]
+def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(sweep, monkeypatch, tmp_path):
+    """By the kernel that it begins with, beside the folders of all versions of the kernels."""
+    monkeypatch.setattr("boulder_kernels._cache.CACHE_FOLDER", str(tmp_path / "kernels-1"))
+    (tmp_path / f"{KERNEL}-and-more-in-seconds").write_text("12.3")
+    monkeypatch.setattr(_ahead, "call", after_compiling(KERNEL))
+    assert f"{COMPILING}12 s" in sweep("simulate", SITE, *ONE)[2]
+    assert float((tmp_path / f"{KERNEL}-and-more-in-seconds").read_text()) < 12.3
+    monkeypatch.setattr(_ahead, "call", after_compiling("another"))
+    assert f"{COMPILING}20 s" in sweep("simulate", SITE, *ONE)[2]
 
 
 def test_a_run_ends_with_how_to_read_its_table(sweep, possible_grid):
