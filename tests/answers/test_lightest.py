@@ -13,7 +13,7 @@ import boulder_sweep
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import Boulders, LightestQuestion
 from boulder_sweep.answers.need import need
-from boulder_sweep.answers.trials import judges_of
+from boulder_sweep.answers.trials import Remembered, judges_of
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import PASS
@@ -73,7 +73,7 @@ def test_the_deepest_embedment_tried_overlaps_enough_by_the_sums_of_the_verdict(
     sweep = site(height="[1.6, 4.0] m", site="embedment_depth: [0.1, 4.0] m")
     sweep = dataclasses.replace(sweep, criterion=dataclasses.replace(sweep.criterion, min_overlap_m=least))
     asked = LightestQuestion(sweep, key_of("mass"), judges_of(sweep))
-    trial = Boulders(asked, asked.open.rows(0, 1), "boulder_height_m")
+    trial = Boulders(asked, asked.open.rows(0, 1), "boulder_height_m", Remembered(judges_of(sweep).final))
     height = np.arange(1600, 4001) / 1000
     depth = trial.depth(np.zeros(len(height), dtype=int), height, np.ones(len(height)))
     overlap = height - depth - 0.5

@@ -95,7 +95,8 @@ def test_what_goes_on_after_a_signal_is_undone(silent, monkeypatch):
         with pytest.raises(Interrupted):
             start()
     silent.speaks.set()
-    wait_until(lambda: "rm_file" in silent.asked and not location_of(OUT).names(), "the folder is released")
+    # First the probe is removed, then the lock.
+    wait_until(lambda: silent.asked.count("rm_file") == 2 and not location_of(OUT).names(), "the folder is released")
     assert start().rows == ROWS
 
 
