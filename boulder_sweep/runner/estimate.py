@@ -26,7 +26,7 @@ LARGEST_BLOCK = 32_768
 """Rows; larger blocks gain nothing and use more memory."""
 BLOCK_S = 0.1
 """Work of one block [s]: long compared with handing it out, short enough for Ctrl-C to act at once."""
-FULL_BLOCK, FULL_BLOCK_S = 256, 1.0
+FULL_BLOCK, FULL_BLOCK_S = 256, 0.2
 """Rows up to which a block may take so long [s]: those of them that need finer steps fill the lanes together."""
 TASK_S = 2.0
 """Work of one task of a cluster [s]: long compared with scheduling it, short enough to lose little with a worker."""

@@ -16,7 +16,6 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner import sweeper
 from boulder_sweep.runner.estimate import (
-    FULL_BLOCK,
     LARGEST_BLOCK,
     Estimate,
     Sample,
@@ -63,7 +62,7 @@ def test_blocks_cover_every_row_once_in_order_and_stay_within_their_range(length
 def test_blocks_are_short_and_there_is_one_for_every_worker(seconds, rows, jobs):
     size = rows_per_block(seconds, rows, jobs)
     assert 1 <= size <= LARGEST_BLOCK
-    assert size == 1 or size * seconds <= (1.0 if size <= FULL_BLOCK else 0.2)
+    assert size == 1 or size * seconds <= 0.2
     assert size == 1 or rows / size >= jobs
 
 
