@@ -127,12 +127,13 @@ def verdict_counts(judged: Judged) -> dict[str, int]:
     passing = judged.verdict == PASS
     grade, standing = judged["robustness"][passing], judged["stands_under"][passing]
     found.pop("pass", None)
-    pairs, numbers = np.unique(np.stack((grade, standing)), axis=1, return_counts=True)
-    for place, under, number in zip(*pairs.tolist(), numbers.tolist(), strict=True):
-        word = GRADES[place]
-        laws = STANDINGS[under].split(";")[1:] if word == "sensitive" and under >= 0 else []
+    pairs = np.bincount((grade.astype(np.int64) + 1) * (len(STANDINGS) + 1) + standing + 1)  # -1 is none
+    for code in np.flatnonzero(pairs):
+        place, under = divmod(int(code), len(STANDINGS) + 1)
+        word = GRADES[place - 1]
+        laws = STANDINGS[under - 1].split(";")[1:] if word == "sensitive" and under else []
         key = f"pass/{word}" + (f" (stands under {' and '.join(laws)})" if laws else "")
-        found[key] = found.get(key, 0) + number
+        found[key] = found.get(key, 0) + int(pairs[code])
     return dict(sorted((key, count) for key, count in found.items() if count))
 
 

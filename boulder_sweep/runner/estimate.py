@@ -11,6 +11,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.runner.threads import COMMIT_EVERY_S
@@ -19,7 +21,6 @@ from boulder_sweep.store.writer import ROWS_PER_PART
 from boulder_sweep.text import size_text
 
 if TYPE_CHECKING:
-    from boulder_sweep.designs import DesignBlock
     from boulder_sweep.settings import Sweep
 
 LARGEST_BLOCK = 32_768
@@ -30,15 +31,16 @@ FULL_BLOCK, FULL_BLOCK_S = 256, 0.2
 """Rows up to which a block may take so long [s]: those of them that need finer steps fill the lanes together."""
 TASK_S = 2.0
 """Work of one task of a cluster [s]: long compared with scheduling it, short enough to lose little with a worker."""
-_SAMPLE_S = 0.1
-_FIRST_SIZES = (1, 8, 64)
-"""Rows at places all over the table, for a first guess of the time per row."""
-_PIECES, _LARGEST_PIECE = (6, 24), 1024
-"""Pieces of equal size all over the table, computed after that, from the fewest of a small table to the most;"""
-_SHORT_PIECE = 256
-"""of at least so many rows each, because short pieces take more time and more bytes per row than the whole table."""
+_SAMPLE_S = (0.1, 0.5)
+"""Time of the largest sample [s]: up to the first, or `_SHARE` of the whole table's time up to the second."""
 _SHARE = 0.05
-"""Share of a table that is sampled, up to the pieces above: the run computes these rows again."""
+"""Share of a table that is sampled, within the next limits: the run computes these rows again."""
+_SAMPLE_ROWS = (1536, 8192)
+"""Rows of the largest sample: fewer take more time and more bytes per row than the whole table."""
+_STRETCHES = 24
+"""Places all over the table from which a sample takes consecutive rows, equally many from each."""
+_GROWTH = 8
+"""Each sample has up to so many times the rows of the one before, as far as their time allows."""
 _BYTES_IN_PROGRESS = 400
 """Memory per row between being handed out and being written: inputs, outcomes and encoding."""
 _LEAST_BYTES, _LEAST_BYTES_OF_CONTACT = 1, 24
@@ -121,23 +123,22 @@ class Estimate:
 
 def take_sample(
     evaluation: Evaluation,
-    make_block: Callable[[int, int], DesignBlock],
-    rows: int,
+    sweep: Sweep,
     metadata: Mapping[bytes, bytes],
     work_clock: Callable[[], float] = time.thread_time,
 ) -> Sample:
     """Compute a few rows spread over the table and measure the time; the kernels must be warm.
 
+    Samples grow from one row to the largest that is affordable, and that one counts: it is computed like a block of
+    the run, so that what a block costs besides its rows, and lanes that are not full, weigh as little as they will.
     The time is that of the processor: while other programs keep it busy, blocks must not become shorter.
 
     Parameters
     ----------
     evaluation
         How designs are simulated and judged.
-    make_block
-        Gives the inputs of some rows.
-    rows
-        Rows of the whole table.
+    sweep
+        The designs.
     metadata
         For the metadata of a part.
     work_clock
@@ -147,47 +148,40 @@ def take_sample(
 
     from boulder_sweep.store.schema import encode, part_table, table_schema
 
-    beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
-
-    def computed(place: float, size: int) -> tuple[float, pa.Table | None]:
-        """Compute some rows at a place between 0 and 1 of the table; return the time and what would be written."""
-        start = int(place * (rows - size))
+    rows = sweep.n_designs
+    fewest, most = _SAMPLE_ROWS
+    largest = min(rows, max(fewest, min(int(_SHARE * rows), most)))
+    seconds_per_row, table, size = 0.0, None, 1
+    while True:
         begun = work_clock()
         try:
-            block = make_block(start, start + size)
+            block = sweep.plan.selection(_spread_rows(rows, size))
             judged = evaluation(block)
         except Exception:  # the run itself will retry and name the rows
-            return 0.0, None
-        return work_clock() - begun, part_table(block, judged, metadata)
-
-    tried = 0.0
-    per_row: dict[int, float] = {}
-    for number, wanted in enumerate(_FIRST_SIZES):
-        size = min(wanted, rows)
-        seconds, _ = computed(number * _GOLDEN % 1.0, size)
-        tried += seconds
-        # If single rows take long, few are enough; otherwise the largest piece is the best guess, as blocks cost time.
-        per_row[size] = max(seconds / size, per_row.get(size, 0.0))
-        if tried > _SAMPLE_S or size == rows:
             break
-    fewest, most = _PIECES
-    pieces = min(max(int(_SHARE * rows) // _SHORT_PIECE, fewest), most)
-    by_time = int(_SAMPLE_S / pieces / max(per_row[max(per_row)], 1e-9))
-    by_share = max(_SHORT_PIECE, int(_SHARE * rows / pieces))
-    size = max(1, min(by_time, by_share, _LARGEST_PIECE, rows))
-    spent, tables = 0.0, []
-    for number in range(pieces):
-        seconds, table = computed((0.5 + number * _GOLDEN) % 1.0, size)
-        if table is not None:
-            spent += seconds
-            tables.append(table)
-        if spent > 2 * _SAMPLE_S or len(tables) * size >= rows:
+        seconds_per_row = (work_clock() - begun) / len(block)
+        table = part_table(block, judged, metadata)
+        least, longest = _SAMPLE_S
+        affordable = max(least, min(_SHARE * rows * seconds_per_row, longest)) / max(seconds_per_row, 1e-9)
+        larger = int(min(_GROWTH * size, affordable, largest))
+        if larger < min(2 * size, largest) or larger <= size:
             break
-    if not tables:
+        size = larger
+    if table is None:
         return _GUESS
-    together = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
-    written = max(len(encode(together)) - beside_rows, 0)
-    return Sample(spent / len(together), written / len(together), beside_rows)
+    beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
+    written = max(len(encode(table)) - beside_rows, 0)
+    return Sample(seconds_per_row, written / len(table), beside_rows)
+
+
+def _spread_rows(rows: int, count: int) -> np.ndarray:
+    """Return numbers of about so many rows, ascending, int64: short stretches from places all over a table."""
+    if count >= rows:
+        return np.arange(rows, dtype=np.int64)
+    stretch = -(-count // _STRETCHES)
+    places = (0.5 + _GOLDEN * np.arange(-(-count // stretch))) % 1.0
+    starts = (places * (rows - stretch)).astype(np.int64)
+    return np.unique(starts[:, np.newaxis] + np.arange(stretch))
 
 
 def estimated(

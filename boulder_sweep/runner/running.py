@@ -165,7 +165,7 @@ class Run:
         self._evaluation.warm_up()
         rows = self._sweep.n_designs
         return estimated(
-            take_sample(self._evaluation, self._sweep.block, rows, self._metadata),
+            take_sample(self._evaluation, self._sweep, self._metadata),
             rows=rows,
             rows_to_compute=rows - self._rows_before,
             jobs=self.jobs,

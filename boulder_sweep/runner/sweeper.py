@@ -224,7 +224,7 @@ def estimate(
         firmness_of(sweep).to_dict(),
     )
     return estimated(
-        take_sample(evaluation, sweep.block, sweep.n_designs, metadata),
+        take_sample(evaluation, sweep, metadata),
         rows=sweep.n_designs,
         rows_to_compute=sweep.n_designs - rows_there,
         jobs=jobs or available_cores(),

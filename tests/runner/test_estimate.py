@@ -93,7 +93,7 @@ def test_sizes_for_people():
 
 def test_a_sample_sees_time_and_bytes():
     sweep = grid()
-    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), plausible), sweep.block, sweep.n_designs, {})
+    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), plausible), sweep, {})
     assert sample.seconds_per_row > 0
     assert 10 < sample.bytes_per_row < 500
     assert sample.bytes_per_part > 1000
@@ -105,7 +105,7 @@ def test_a_sample_survives_rows_that_raise():
     def broken(table, readings, control):
         raise ValueError("no")
 
-    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), broken), sweep.block, sweep.n_designs, {})
+    sample = take_sample(evaluation_of(sweep, accuracy_of(sweep), broken), sweep, {})
     assert sample.seconds_per_row > 0
 
 
@@ -126,7 +126,7 @@ class Clock:
     def sample(self, sweep):
         """Take a sample by this clock."""
         evaluation = evaluation_of(sweep, accuracy_of(sweep), self.simulate)
-        return take_sample(evaluation, sweep.block, sweep.n_designs, {}, lambda: self.now)
+        return take_sample(evaluation, sweep, {}, lambda: self.now)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.5, 0.7, 0.9])
@@ -159,7 +159,7 @@ def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
         **({"width": "{from: 1 m, to: 2 m, count: 50}"} if wide else {"height": "{from: 2 m, to: 3 m, count: 80}"})
     )
     evaluation = evaluation_of(sweep, accuracy_of(sweep), plausible)
-    sample = take_sample(evaluation, sweep.block, sweep.n_designs, {})
+    sample = take_sample(evaluation, sweep, {})
     block = sweep.block(0, sweep.n_designs)
     written = len(encode(part_table(block, evaluation(block), {})))
     assert 0.75 < (sample.bytes_per_row * sweep.n_designs + sample.bytes_per_part) / written < 1.33
