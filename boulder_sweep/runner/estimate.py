@@ -25,10 +25,9 @@ if TYPE_CHECKING:
 
 LARGEST_BLOCK = 32_768
 """Rows; larger blocks gain nothing and use more memory."""
-BLOCK_S = 0.1
-"""Work of one block [s]: long compared with handing it out, short enough for Ctrl-C to act at once."""
-FULL_BLOCK, FULL_BLOCK_S = 256, 0.2
-"""Rows up to which a block may take so long [s]: those of them that need finer steps fill the lanes together."""
+BLOCK_S = 0.2
+"""Work of one block [s]: so long that its few rows that need finer steps fill lanes, and short enough for Ctrl-C to act
+at once."""
 TASK_S = 2.0
 """Work of one task of a cluster [s]: long compared with scheduling it, short enough to lose little with a worker."""
 _SAMPLE_S = (0.1, 0.5)
@@ -232,8 +231,7 @@ def estimated(
 
 def rows_per_block(seconds_per_row: float, rows: int, jobs: int) -> int:
     """Return the rows per block: enough work each, and enough blocks for every worker."""
-    in_a_second = 1.0 / max(seconds_per_row, 1e-9)
-    by_time = int(max(BLOCK_S * in_a_second, min(FULL_BLOCK, FULL_BLOCK_S * in_a_second)))
+    by_time = int(BLOCK_S / max(seconds_per_row, 1e-9))
     by_share = -(-rows // (4 * jobs))
     return max(1, min(by_time, by_share, LARGEST_BLOCK))
 
