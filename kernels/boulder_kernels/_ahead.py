@@ -151,32 +151,18 @@ def loaded(file: Path) -> Native:
     UnusableError
         One of its files is not there, or not whole.
     """
-    kept, library = described(file.with_suffix(RETURNS)), file.with_suffix(LIBRARY)
+    library = file.with_suffix(LIBRARY)
     try:
+        kept: dict[str, Any] = json.loads(file.with_suffix(RETURNS).read_text())
         if library.exists():
             opened = ctypes.CDLL(str(library))
             return native_of(opened[ENTRY], opened, kept)
         code = file.with_suffix(OBJECT).read_bytes()
-    except (OSError, AttributeError) as problem:  # ctypes says so of a library without the function
+    except (OSError, ValueError, AttributeError) as problem:  # the last is what a library without the function raises
         raise UnusableError(str(problem)) from problem
     from . import _llvm
 
     return native_of(*_llvm.loaded(code, ENTRY), kept)
-
-
-def described(file: Path) -> dict[str, Any]:
-    """Return what was written beside a compiled kernel.
-
-    Raises
-    ------
-    UnusableError
-        It is not there, or not whole.
-    """
-    try:
-        kept: dict[str, Any] = json.loads(file.read_text())
-    except (OSError, ValueError) as problem:
-        raise UnusableError(str(problem)) from problem
-    return kept
 
 
 def native_of(function: Any, library: Any, kept: dict[str, Any]) -> Native:

@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-KINDS: dict[np.dtype[Any], str] = {
-    np.dtype(np.float64): "f8",
-    np.dtype(np.int64): "i8",
-    np.dtype(np.int8): "i1",
-    np.dtype(np.bool_): "b1",
-}
+KINDS = {np.dtype(code): code for code in ("f8", "i8", "i1", "b1")}
 """Numbers that an array may hold."""
 REAL, WHOLE, TRUTH, NOTHING = "f", "i", "b", "n"
 _SCALARS = {float: REAL, np.float64: REAL, int: WHOLE, np.int64: WHOLE, bool: TRUTH, np.bool_: TRUTH}

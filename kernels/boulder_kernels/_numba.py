@@ -266,10 +266,7 @@ def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
     if not isinstance(kind, types.BaseTuple):
         raise UnsuitableError(str(kind))
     name = name_of(kind.instance_class) if isinstance(kind, types.BaseNamedTuple) else ""
-    parts = (
-        [f"{expression}.{field}" for field in kind.fields] if name else [f"{expression}[{i}]" for i in range(len(kind))]
-    )
-    return [name, [written_out(one, part, lines) for one, part in zip(kind.types, parts, strict=True)]]
+    return [name, [written_out(one, f"{expression}[{place}]", lines) for place, one in enumerate(kind.types)]]
 
 
 def linked(code: bytes) -> bytes | None:
