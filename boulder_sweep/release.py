@@ -9,6 +9,7 @@ of the last ten years.
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import shutil
@@ -34,6 +35,7 @@ VARIANTS: tuple[tuple[str, ...], ...] = (
     (ELEMENTS,),
     (WET, ELEMENTS),
     (ELEMENTS, "model.unloading=plastic_with_gap"),
+    ("boulder.taper=0.8",),
 )
 """Settings for which kernels of their own are compiled."""
 TARGETS = {"x86-64-v4": ("x86-64-v4", "-prefer-256-bit"), "aarch64": ("generic", "")}
@@ -45,7 +47,8 @@ GLIBC = "2.17"
 def record(folder: Path) -> Path:
     """Compile what the commands need for this machine, in a folder, and return the folder of the compiled kernels."""
     environment = os.environ | {CACHE_VARIABLE: f"{folder}/cache"}
-    commands = [["need", str(CONFIGS / "site.yaml"), "--margin", "25%"]]
+    stone = [str(CONFIGS / "quarry_stone.yaml"), "--set", "soil.friction_angle=40 deg"]
+    commands = [["need", str(CONFIGS / "site.yaml"), "--margin", "25%"], ["need", *stone], ["simulate", *stone]]
     for overrides in VARIANTS:
         case = [str(CONFIGS / "rwg.yaml"), *(word for override in overrides for word in ("--set", override))]
         commands += [["run", *case, "-o", f"{folder}/table", "--overwrite"], ["simulate", *case]]
@@ -78,7 +81,7 @@ def compile_recorded(recorded: Path, target: Path) -> None:
     for file in sorted(recorded.glob(f"*{_ahead.RETURNS}")):
         module, kernel, _ = file.stem.rsplit("-", 2)
         wanted = getattr(import_module(f"boulder_kernels.{module}"), kernel)
-        code, library, kept = wanted.compiler.compiled_ahead(wanted, _ahead.described(file)["types"])
+        code, library, kept = wanted.compiler.compiled_ahead(wanted, json.loads(file.read_text())["types"])
         if library is None:
             raise RuntimeError(f"{module}.{kernel} cannot be linked by {os.environ.get('CC', 'cc')}")
         _ahead.keep(target / file.stem, code, library, kept)

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from boulder_sweep.judge.accuracy import Accuracy
     from boulder_sweep.settings import Sweep
 
+OUTLINES_IN_LANES = 100_000
+"""Number of designs from which a boulder of several pieces goes through lanes: twice as fast, but compiling them for
+eight pieces takes a minute and a half longer, and few late rows leave lanes idle."""
 LONGEST_HORIZON = 10.0
 """A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 
@@ -290,6 +293,7 @@ def known_control(recorded: Mapping[str, Any]) -> Control:
 
 def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
     """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate."""
+    shape = sweep.model.shape
     return Control(
         h=accuracy.steps.step_s,
         horizon=float(sweep.solver.horizon_s),
@@ -300,4 +304,5 @@ def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
         longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
         unloading=UNLOADINGS.index(sweep.model.unloading),
         paired=accuracy.paired,
+        side_by_side=shape.is_box or len(shape.points) == 2 or sweep.n_designs >= OUTLINES_IN_LANES,
     )

@@ -98,6 +98,8 @@ class Control(NamedTuple):
     event_tolerance: float = TOLERANCE
     """Precision with which events are located, as a fraction of the step; `boulder_kernels.gaps.TOLERANCE` as
     printed."""
+    side_by_side: bool = True
+    """Whether designs that may go through lanes side by side do, or one after another. The two round differently."""
 
 
 class Record(NamedTuple):

@@ -285,7 +285,7 @@ def simulate_once(
     stacked = None if springs is None else np.stack(springs)
     layers: np.ndarray | None = getattr(table, "layers", None)
     outlines: np.ndarray | None = getattr(table, "outlines", None)
-    side_by_side = springs is None and control.elements == 0 and control.stop_at_limit
+    side_by_side = control.side_by_side and springs is None and control.elements == 0 and control.stop_at_limit
     if control.last_resort and layers is None:
         out = empty_outcomes(designs.shape[1])
         run_last_resort(designs, stacked, readings, control, no_record(), out)
@@ -293,6 +293,8 @@ def simulate_once(
     given = given_to_lanes(designs, layers, outlines) if side_by_side else None
     if given is not None:
         out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)
+    elif not designs.shape[1]:
+        out = empty_outcomes(0)
     else:
         soil = None
         if layers is not None:

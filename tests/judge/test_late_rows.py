@@ -14,7 +14,7 @@ from boulder_sweep.judge.evaluation import by_kernels, control_of, evaluation_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, FAIL, NUMERICAL_ERROR, PASS, UNDECIDED
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.judge.refinement import AGREEING, FACTOR
+from boulder_sweep.judge.refinement import AGREEING, FACTOR, HALF
 
 SHALLOW = Path(__file__).parent / "late_designs.csv"
 """Boulders that rock for seconds. An independent integration by steps of 0.1 ms (`benchmarks.late`) finds: the first
@@ -96,7 +96,7 @@ def test_a_late_pass_needs_a_finer_solution_that_agrees(tmp_path: Path) -> None:
     found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1)}, asked)
     assert found.verdict[0] == PASS
     assert len(asked) == 1 + AGREEING
-    assert np.allclose(np.divide(asked[1:], asked[:-1]), FACTOR)
+    assert np.allclose(np.divide(asked[1:], asked[:-1]), HALF)
 
 
 def test_there_are_finer_steps_however_many_soil_elements(tmp_path: Path) -> None:
@@ -128,26 +128,26 @@ REFUSED = (Status.WEAK_DAMPER, 0.0)
 
 def test_a_late_row_of_the_last_resort_needs_finer_ones_that_agree(tmp_path: Path) -> None:
     asked: list[float] = []
-    found = judged_by(tmp_path, dict.fromkeys(range(5), REFUSED) | {5: (Status.SETTLED, 0.1)}, asked)
+    found = judged_by(tmp_path, dict.fromkeys(range(6), REFUSED) | {6: (Status.SETTLED, 0.1)}, asked)
     assert found.verdict[0] == PASS
-    assert len(asked) == 6 + AGREEING
-    assert np.allclose(np.divide(asked[6:], asked[5:-1]), FACTOR)
+    assert len(asked) == 7 + AGREEING
+    assert np.allclose(np.divide(asked[7:], asked[6:-1]), FACTOR)
 
 
 def test_the_last_resort_is_tried_once_where_it_refuses(tmp_path: Path) -> None:
     asked: list[float] = []
     found = judged_by(tmp_path, {0: REFUSED}, asked)
     assert found.verdict[0] == ERROR
-    assert len(asked) == 6
+    assert len(asked) == 7
 
 
 def test_a_last_resort_whose_steps_are_hardly_shorter_confirms_nothing(tmp_path: Path) -> None:
     asked: list[float] = []
-    peaks = {0: 0.1, 1: 0.11, 2: 0.12, 5: 0.12}
-    ends = {level: (Status.SETTLED, peak) for level, peak in peaks.items()} | dict.fromkeys((3, 4), REFUSED)
+    peaks = {0: 0.1, 1: 0.11, 2: 0.115, 3: 0.12, 6: 0.12}
+    ends = {level: (Status.SETTLED, peak) for level, peak in peaks.items()} | dict.fromkeys((4, 5), REFUSED)
     found = judged_by(tmp_path, ends, asked)
     assert found.verdict[0] == PASS
-    assert np.allclose(asked[2:], [7.5e-4, 7.5e-4 * FACTOR, 7.5e-4 * FACTOR**2, 5e-4 * FACTOR, 5e-4 * FACTOR**2])
+    assert np.allclose(asked[3:], [7.5e-4, 7.5e-4 * FACTOR, 7.5e-4 * FACTOR**2, 5e-4 * FACTOR, 5e-4 * FACTOR**2])
 
 
 def test_a_late_row_on_which_no_two_solutions_agree_is_undecided(tmp_path: Path) -> None:

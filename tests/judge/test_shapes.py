@@ -12,6 +12,8 @@ import boulder_sweep
 from boulder_kernels import Control, corrected, simulate_table
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.explanation import explain
+from boulder_sweep.judge.evaluation import OUTLINES_IN_LANES, control_of
+from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import Shape, tapered
@@ -51,6 +53,19 @@ def table_of(sweep: Sweep, out: Path) -> pd.DataFrame:
 def test_a_box_by_another_name_has_the_bits_of_a_box(tmp_path, entry):
     box, other = table_of(load(RWG), tmp_path / "box"), table_of(shaped(tmp_path, entry), tmp_path / "other")
     pd.testing.assert_frame_equal(other, box, check_exact=True)
+
+
+@pytest.mark.parametrize(
+    ("entry", "angles", "side_by_side"),
+    [
+        ("taper: 0.8", 2, True),
+        (f"profile: {LEANING}", OUTLINES_IN_LANES - 1, False),
+        (f"profile: {LEANING}", OUTLINES_IN_LANES, True),
+    ],
+)
+def test_lanes_are_for_many_designs_of_several_pieces(tmp_path, entry, angles, side_by_side):
+    sweep = shaped(tmp_path, entry, f"soil.friction_angle={{from: 36 deg, to: 44 deg, count: {angles}}}")
+    assert control_of(sweep, accuracy_of(sweep)).side_by_side == side_by_side
 
 
 @pytest.mark.parametrize("entry", ["taper: 0.8", "taper: 1.25", f"profile: {LEANING}"])

@@ -132,6 +132,14 @@ def test_more_pieces_than_lanes_take_are_simulated_one_by_one() -> None:
     assert_same(simulate_table(table, READINGS, HOW), one_by_one(table, READINGS, HOW))
 
 
+@pytest.mark.compiled
+def test_designs_are_simulated_one_by_one_where_that_is_asked_for() -> None:
+    table = outlined(random_designs(10, seed=196), crooked)
+    apart = HOW._replace(side_by_side=False)
+    assert_same(simulate_table(table, READINGS, apart), one_by_one(table, READINGS, apart))
+    assert not len(simulate_table(some_rows(table, np.arange(0)), READINGS, apart).status)
+
+
 def test_a_taper_is_solved_once_for_its_error() -> None:
     """All of its soil yields at one displacement; beside more pieces, and with cohesion, it does not."""
     designs = random_designs(3, seed=196)
