@@ -308,13 +308,10 @@ def _question(
     chance = share(probability, "--probability")
     if not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
-    # These import scipy.stats.
+    from boulder_sweep.answers.probability import LikelyLightestQuestion, ProbabilityQuestion  # imports scipy.stats
+
     if key.name == BOULDER_MASS.name:
-        from boulder_sweep.answers.likely_lightest import LikelyLightestQuestion
-
         return LikelyLightestQuestion(sweep, key, judges, chance, seed, variants)
-    from boulder_sweep.answers.probability import ProbabilityQuestion
-
     return ProbabilityQuestion(sweep, key, between, judges, chance, seed, variants)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,9 +23,6 @@ from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import completed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.store.reader import FinishedRows, read_row
-
-if TYPE_CHECKING:
-    pass
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boulder_sweep import need, uncertainty
-from boulder_sweep.answers import likely_lightest
+from boulder_sweep.answers import probability
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import load_text
 
@@ -69,7 +69,7 @@ def test_nothing_that_passes_often_enough():
 
 
 def test_rows_do_not_depend_on_how_many_designs_are_drawn_at_once(found, monkeypatch):
-    monkeypatch.setattr(likely_lightest, "AT_ONCE", 4096)
+    monkeypatch.setattr(probability, "AT_ONCE", 4096)
     again = need(read(TEXT), "mass", probability=0.9)
     assert again.frame.passes_at[0] == found.frame.passes_at[0]
 
