@@ -144,6 +144,15 @@ def test_a_sample_sees_how_many_designs_cost_nothing(share, slow_axis):
     assert clock.now < 0.35
 
 
+@pytest.mark.parametrize("per_row", [5e-6, 1e-3])
+def test_what_a_block_costs_besides_its_rows_hardly_counts(per_row):
+    """Samples of some hundred quick rows would take them for five times as slow, and make blocks as short."""
+    sweep = grid_of(1, subgrade="{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 1000000}")
+    clock = Clock(0.0, seconds_per_row=per_row, seconds_per_block=3e-3)
+    assert per_row <= clock.sample(sweep).seconds_per_row < 1.1 * per_row
+    assert clock.now < 0.7
+
+
 def test_a_sample_of_slow_designs_behind_quick_ones_stays_short():
     sweep = grid_of(1, subgrade="{from: 0.5 MN/m^3, to: 199.5 MN/m^3, count: 100000}")
     for seconds in (1e-3, 0.05):
