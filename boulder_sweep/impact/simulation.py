@@ -21,19 +21,9 @@ from boulder_kernels import (
     no_record,
 )
 from boulder_kernels.design import design_at
-from boulder_kernels.embedded import step_errors
+from boulder_kernels.error_estimates import SAFETY, SAFETY_PRINTED, estimate_errors, step_errors
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
-from boulder_kernels.table import (
-    SAFETY,
-    SAFETY_PRINTED,
-    estimate_errors,
-    halved,
-    is_layered,
-    is_paired,
-    problem_at,
-    simulate_impact,
-    step_of_solution,
-)
+from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
 from boulder_sweep.columns import AT_REST, BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
 from boulder_sweep.judge.evaluation import evaluation_of, readings_of

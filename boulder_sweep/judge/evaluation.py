@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 OUTLINES_IN_LANES = 100_000
-"""Number of designs from which a boulder of several pieces goes through lanes: twice as fast, but compiling them for
-eight pieces takes a minute and a half longer, and few late rows leave lanes idle."""
+"""Below so many designs boulders of several pieces are simulated one after another: lanes are twice as fast, but take a
+minute and a half longer to compile for eight pieces, and are mostly idle where few rows are late."""
 LONGEST_HORIZON = 10.0
 """A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 

@@ -1,11 +1,11 @@
 """Finer steps for the rows that need them: refused for their time steps, undecided for their error, or late.
 
-Designs whose estimated error may be wrong have a second solution already, see `boulder_kernels.embedded`.
+Designs whose estimated error may be wrong have a second solution already, see `boulder_kernels.error_estimates`.
 
 A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking amplifies
 every error: both solutions from which the error is estimated can follow the same wrong branch, where the estimate does
-not see it. So a late row passes or overturns only if `AGREEING` others agree with it, each with steps `HALF` as long as
-those before, or shorter, over the whole motion; until they do it is simulated again by finer steps, and is undecided
+not see it. So a late row passes or overturns only if `AGREEING` others agree with it, each with steps at most half as
+long as those before over the whole motion; until they do it is simulated again by finer steps, and is undecided
 where even the finest differ.
 
 What is still refused by the finest steps is simulated by `boulder_kernels.last_resort`, whose late rows need finer
@@ -26,9 +26,9 @@ from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, OVERTURNS, PASS, Judged, with_rows
 from boulder_sweep.judge.verdict import STEP_REASONS
 
-HALF, FACTOR = 0.5, 0.25
-"""Each time the step is shortened by the second factor; by the first where that may confirm a late row, as it does for
-nearly all of them. Quarter steps there take four times as long, and changed no verdict of 90,000 shallow boulders."""
+FIRST_FACTOR, FACTOR = 0.5, 0.25
+"""The step is shortened by the first factor `AGREEING` times, which confirms nearly all late rows, then by the second.
+With the second alone late rows take twice as long, and no verdict of 90,000 shallow boulders changes."""
 LAST_RESORT_STEPS = 2_000
 """Steps to the horizon of the last attempt, where nothing asks for shorter ones."""
 MOST_STEPS = 20_000
@@ -65,7 +65,7 @@ def finer_controls(control: Control) -> Iterator[Control]:
     finer = control._replace(locate_yield=True, paired=True, event_tolerance=EVENT_TOLERANCE)
     confirming = AGREEING if control.error_estimate else 0
     while h > finest or confirming > 0:
-        h *= HALF if confirming > 0 else FACTOR
+        h *= FIRST_FACTOR if confirming > 0 else FACTOR
         confirming -= 1
         yield finer._replace(h=h)
     if control.elements == 0:
@@ -109,7 +109,7 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: np.ndarray) -> np.ndarr
         Solutions whose steps differ by a factor of two or more, each with its estimated errors.
     v_0
         Speeds of impact [m/s]: an error of the displacement is one of the time, too, see
-        `boulder_kernels.table.estimate_errors`.
+        `boulder_kernels.error_estimates.estimate_errors`.
     """
     limit = coarse.status == Status.LIMIT
     alike = limit == (fine.status == Status.LIMIT)
@@ -142,7 +142,7 @@ class RowStates:
     def wanted(self, control: Control) -> np.ndarray:
         """Return the numbers of the rows that a solution by some control may decide or confirm."""
         # The last resort begins with longer steps than the usual ones end with.
-        is_finer = control.h <= HALF * self._compared_s
+        is_finer = control.h <= FIRST_FACTOR * self._compared_s
         may_decide = is_open(self.judged, control) & ~self._given_up
         return np.flatnonzero(may_decide | ((self.unconfirmed > 0) & is_finer))
 

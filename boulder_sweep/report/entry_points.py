@@ -25,7 +25,14 @@ from boulder_kernels import (
 )
 from boulder_kernels._jit import array_kernel, inlined, when_compiling
 from boulder_kernels.design import design_in
-from boulder_kernels.embedded import step_errors
+from boulder_kernels.error_estimates import (
+    SAFETY,
+    SAFETY_CONFIRMED,
+    SAFETY_PRINTED,
+    confirm_error,
+    estimate_error,
+    step_errors,
+)
 from boulder_kernels.impact import STEP_RATIO
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
@@ -33,7 +40,6 @@ from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import LAST, PLASTIC_WITH_GAP, Memory, memory_of
 from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
-from boulder_kernels.table import SAFETY, SAFETY_CONFIRMED, SAFETY_PRINTED, confirm_error, estimate_error
 from boulder_kernels.unloading import plastic_work, recall
 from boulder_kernels.verdict import VerdictLimits, limits_in, write_rulings
 

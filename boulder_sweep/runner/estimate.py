@@ -7,6 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -147,30 +148,33 @@ def take_sample(
 
     from boulder_sweep.store.schema import encode, part_table, table_schema
 
-    rows = sweep.n_designs
-    fewest, most = _SAMPLE_ROWS
-    largest = min(rows, max(fewest, min(int(_SHARE * rows), most)))
+    with suppress(Exception):  # what is computed first also loads what it needs, which takes time of its own
+        evaluation(sweep.plan.selection(_spread_rows(sweep.n_designs, 1)))
     seconds_per_row, table, size = 0.0, None, 1
-    while True:
+    while size:
         begun = work_clock()
         try:
-            block = sweep.plan.selection(_spread_rows(rows, size))
+            block = sweep.plan.selection(_spread_rows(sweep.n_designs, size))
             judged = evaluation(block)
-        except Exception:  # the run itself will retry and name the rows
+        except Exception:  # the run itself will retry and name the rows; the sample before counts
             break
         seconds_per_row = (work_clock() - begun) / len(block)
         table = part_table(block, judged, metadata)
-        least, longest = _SAMPLE_S
-        affordable = max(least, min(_SHARE * rows * seconds_per_row, longest)) / max(seconds_per_row, 1e-9)
-        larger = int(min(_GROWTH * size, affordable, largest))
-        if larger < min(2 * size, largest) or larger <= size:
-            break
-        size = larger
+        size = _larger_sample(size, seconds_per_row, sweep.n_designs)
     if table is None:
         return _GUESS
     beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
     written = max(len(encode(table)) - beside_rows, 0)
     return Sample(seconds_per_row, written / len(table), beside_rows)
+
+
+def _larger_sample(size: int, seconds_per_row: float, rows: int) -> int:
+    """Return the rows of the sample after one of some size; 0 where not even twice as many are affordable."""
+    (fewest, most), (least, longest) = _SAMPLE_ROWS, _SAMPLE_S
+    largest = min(rows, max(fewest, min(int(_SHARE * rows), most)))
+    affordable = max(least, min(_SHARE * rows * seconds_per_row, longest)) / max(seconds_per_row, 1e-9)
+    larger = int(min(_GROWTH * size, affordable, largest))
+    return larger if larger >= min(2 * size, largest) and larger > size else 0
 
 
 def _spread_rows(rows: int, count: int) -> np.ndarray:

@@ -25,7 +25,7 @@ from docs.studies.coverage import (
 DESIGNS = 20_000
 """Of each family."""
 SEED = 7
-"""Of the random numbers: not one of those by which `boulder_kernels.embedded` was chosen."""
+"""Of the random numbers: not one of those by which `boulder_kernels.error_estimates` was chosen."""
 
 
 def wild_families(count: int, seed: int) -> dict[str, DesignTable]:

@@ -27,8 +27,8 @@ from .after_step import (
 from .dense_output import DenseOutput, dense_output, state_at
 from .design import Constants, Design, Readings, is_computable
 from .dormand_prince import step
-from .embedded import error_time
 from .energy import Exchanged, add_exchanged, nothing_exchanged
+from .error_estimates import error_time
 from .events import NONE, SHORTEN, change_mode, changes_counted, initial_modes, locate_limit
 from .gaps import TOLERANCE
 from .modes import Modes, Switches

@@ -14,7 +14,7 @@ from ._jit import inlined, kernel
 from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
 from .design import Readings, design_in, is_computable
 from .dormand_prince import step
-from .embedded import error_time, step_errors
+from .error_estimates import error_time, step_errors
 from .events import AT_END, initial_modes, needs_moment
 from .flat import field, put
 from .gaps import TOLERANCE

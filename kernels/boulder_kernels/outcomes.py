@@ -99,7 +99,7 @@ class Outcome(NamedTuple):
     attempts: int
     """Steps tried."""
     moved: float
-    """Error of the displacements by those of all steps [m], see `boulder_kernels.embedded`."""
+    """Error of the displacements by those of all steps [m], see `boulder_kernels.error_estimates`."""
     omega_b: float
     """Rate of rotation in the end [rad/s]."""
     rotation_changes: float

@@ -9,7 +9,15 @@ import numpy as np
 from ._jit import array_kernel, kernel, plain, unless_none
 from .design import DesignTable, Readings, design_at, design_in
 from .dynamics import State
-from .embedded import step_errors
+from .error_estimates import (
+    SAFETY,
+    SAFETY_CONFIRMED,
+    SAFETY_PRINTED,
+    add_rest_error,
+    confirm_errors,
+    estimate_errors,
+    step_errors,
+)
 from .impact import (
     STEP_RATIO,
     Control,
@@ -27,7 +35,6 @@ from .layered import LAYERED, PRESSURE, OutlinedTable, filled_layers, lanes_coun
 from .outcomes import (
     COARSER,
     FINER,
-    LEAST_ROTATION,
     NONE_NEEDED,
     PAIR,
     SECOND,
@@ -47,17 +54,6 @@ from .settling import proof_is_possible
 from .soil_laws import SoilProfile, constants_in, empty_soil, profile_of
 from .unloading import rest_of
 from .workspace import LayeredLanes, OutlinedLanes, TaperedLanes
-
-SAFETY = 1.5
-"""Factor from the difference of two solutions to the error that is reported: it makes the estimate hold for 99 % and
-more of all designs, and for those that are not stopped at the limit of rotation alone."""
-SAFETY_PRINTED = 5.0
-"""The same where the restoring moment is read as printed: two of its jumps can come and go within a step of either
-solution, and both then miss them alike."""
-SAFETY_CONFIRMED = 4.0
-"""The same where a doubtful design is solved again by half the step."""
-LEAST_CONFIRMED_RAD, LEAST_CONFIRMED_M = 1e-8, 2e-7
-"""Least error of a design that has a second solution."""
 
 
 @array_kernel
@@ -303,96 +299,6 @@ def simulate_once(
     return outcome_table(out, step_of_solution(control)), out[SECOND]
 
 
-@kernel
-def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
-    """Estimate the numerical error of one design; see `estimate_errors`."""
-    limit = Status.LIMIT.value
-    if np.isnan(fine.theta_max[row]):
-        return
-    if np.isnan(coarse.theta_max[row]) or (coarse.status[row] == limit) != (fine.status[row] == limit):
-        fine.theta_error[row] = fine.x_error[row] = np.inf
-        return
-    arm = max(table.d[row], 0.5 * table.H[row])
-    turn = abs(coarse.theta_max[row] - fine.theta_max[row])
-    x = max(abs(coarse.x_b_max[row] - fine.x_b_max[row]), abs(coarse.x_v_max[row] - fine.x_v_max[row]))
-    x = max(x, arm * turn)
-    if fine.status[row] == limit:
-        x = max(x, table.v_0[row] * abs(coarse.t_limit[row] - fine.t_limit[row]))
-        fine.theta_error[row] = 0.0
-    else:
-        fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
-    x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
-    fine.x_error[row] = safety * x
-
-
-@kernel
-def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float) -> None:
-    """Estimate the numerical errors of a table from a coarser solution of it.
-
-    Parameters
-    ----------
-    coarse, fine
-        Solutions with a step and with a third of it; the estimates go into the finer.
-    table
-        The designs.
-    safety
-        Factor from the difference of the two to the estimate.
-
-    Notes
-    -----
-    The difference of two solutions is nearly the error of the coarser, many times that of the finer. It can be small
-    by chance, where two errors cross zero, but hardly in all that is reported at once. So the largest difference
-    counts: displacements and angles compared over the embedment depth, or half the height of the boulder where that is
-    more, and times over the speed of impact. A boulder that hardly turns owes its rotation no more than that rotation
-    itself to an error of the truck (LEAST_ROTATION where it is less), however small the boulder: beyond it only the
-    difference of the rotations counts.
-    Where only one of the two reached the limit of rotation, or failed, no estimate could be trusted: the error is
-    infinite. Where both did, the rotation is the limit itself.
-    """
-    for row in range(fine.status.size):
-        estimate_error(coarse, fine, table, safety, row)
-
-
-@kernel
-def confirm_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
-    """Estimate the numerical error of one design that needs two solutions; see `confirm_errors`."""
-    if np.isnan(fine.theta_max[row]):
-        return
-    theta, x = fine.theta_error[row], fine.x_error[row]
-    estimate_error(coarse, fine, table, safety, row)
-    fine.theta_error[row] = max(fine.theta_error[row], theta, LEAST_CONFIRMED_RAD)
-    fine.x_error[row] = max(fine.x_error[row], x, LEAST_CONFIRMED_M)
-
-
-@kernel
-def confirm_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float) -> None:
-    """Estimate the numerical errors of designs that need two solutions: that of the steps, or the difference if larger.
-
-    Parameters
-    ----------
-    coarse, fine
-        The solutions, with the errors of their steps; the estimates go into the finer.
-    table, safety
-        As of `estimate_errors`.
-    """
-    for row in range(fine.status.size):
-        confirm_error(coarse, fine, table, safety, row)
-
-
-def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
-    """Add the numerical error to the doubt of where boulders come to rest.
-
-    Parameters
-    ----------
-    coarse, fine
-        `OutcomesAtRest` by a step and by a third of it; the error goes into the finer.
-    safety
-        Factor from the difference of the two to the error.
-    """
-    differing = np.maximum(abs(coarse.theta_rest - fine.theta_rest), abs(coarse.swing_back - fine.swing_back))
-    fine.rest_error[:] += safety * differing
-
-
 def is_layered(table: Any) -> bool:
     """Return whether the soil of a table may yield at one depth after another, other than in uniform soil."""
     return isinstance(table, LAYERED) and not (
@@ -468,7 +374,7 @@ def simulate_table(
     readings
         Which formulas are read as printed.
     control
-        Step, horizon, limit, soil. Every outcome has the error of its steps, see `boulder_kernels.embedded`. With
+        Step, horizon, limit, soil. Every outcome has the error of its steps (`boulder_kernels.error_estimates`). With
         ``error_estimate`` designs are simulated by a third of the step, and some a second time: by half of that, and
         are reported by it, or by the step itself. Where `is_paired` says so, every design is simulated with the step
         and with a third of it, and the finer result is reported.

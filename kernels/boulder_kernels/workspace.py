@@ -143,7 +143,7 @@ ATTENTION = _place("attention")
 """1.0 where a step cannot simply be accepted."""
 ATTEMPTS_LEFT = _place("attempts_left")
 ERROR = _place("error")
-"""Sum of the errors of the steps so far [m/s], see `boulder_kernels.embedded`."""
+"""Sum of the errors of the steps so far [m/s], see `boulder_kernels.error_estimates`."""
 ROTATION_CHANGES = _place("rotation_changes")
 """How often the mode of rotation has changed."""
 STEP_ERROR = _place("step_error")

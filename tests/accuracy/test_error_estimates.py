@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from boulder_kernels import OutcomeTable, Status, simulate_table
-from boulder_kernels.table import estimate_errors
+from boulder_kernels.error_estimates import estimate_errors
 from boulder_sweep.judge.verdict import Limits, judge
 from docs.studies.coverage import coverages, grid_table, random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows

@@ -14,7 +14,7 @@ from boulder_sweep.judge.evaluation import by_kernels, control_of, evaluation_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, FAIL, NUMERICAL_ERROR, PASS, UNDECIDED
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.judge.refinement import AGREEING, FACTOR, HALF
+from boulder_sweep.judge.refinement import AGREEING, FACTOR, FIRST_FACTOR
 
 SHALLOW = Path(__file__).parent / "late_designs.csv"
 """Boulders that rock for seconds. An independent integration by steps of 0.1 ms (`benchmarks.late`) finds: the first
@@ -96,7 +96,7 @@ def test_a_late_pass_needs_a_finer_solution_that_agrees(tmp_path: Path) -> None:
     found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1)}, asked)
     assert found.verdict[0] == PASS
     assert len(asked) == 1 + AGREEING
-    assert np.allclose(np.divide(asked[1:], asked[:-1]), HALF)
+    assert np.allclose(np.divide(asked[1:], asked[:-1]), FIRST_FACTOR)
 
 
 def test_there_are_finer_steps_however_many_soil_elements(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.refinement import (
     AGREEING,
     FACTOR,
-    HALF,
+    FIRST_FACTOR,
     LAST_RESORT_STEPS,
     MOST_STEPS,
     finer_controls,
@@ -36,7 +36,7 @@ def test_steps_get_shorter_down_to_the_budget() -> None:
     controls = list(finer_controls(CONTROL))
     finer, (last, *confirming) = controls[: -1 - AGREEING], controls[-1 - AGREEING :]
     steps = [control.h for control in finer]
-    factors = [HALF] * AGREEING + [FACTOR] * (len(steps) - AGREEING)
+    factors = [FIRST_FACTOR] * AGREEING + [FACTOR] * (len(steps) - AGREEING)
     assert np.allclose(np.divide(steps, [CONTROL.h, *steps[:-1]]), factors, rtol=1e-12), "late rows compare such steps"
     assert FACTOR < steps[-1] * MOST_STEPS / CONTROL.horizon <= 1.0
     assert all(control.locate_yield and not control.last_resort for control in finer)

@@ -17,12 +17,13 @@ from boulder_kernels import _ahead, _cache
 from boulder_kernels._arguments import UnsuitableError, flatten
 from boulder_kernels._numba import call_of, examples
 from boulder_kernels.design import constants_of, is_computable
+from boulder_kernels.error_estimates import estimate_errors
 from boulder_kernels.impact import simulate
 from boulder_kernels.layered import uniform_layers
 from boulder_kernels.numerics import sine_versine
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.soil_laws import profile_of
-from boulder_kernels.table import estimate_errors, problem_at, run_rows
+from boulder_kernels.table import problem_at, run_rows
 
 from .samples import control, random_designs, table_of
 

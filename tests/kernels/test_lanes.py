@@ -9,7 +9,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import Design, OutcomeTable, Status
-from boulder_kernels.embedded import step_errors
+from boulder_kernels.error_estimates import step_errors
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.workspace import LANES
 

@@ -7,7 +7,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import OutcomeTable, Status
-from boulder_kernels.embedded import step_errors
+from boulder_kernels.error_estimates import step_errors
 from boulder_kernels.layered import COUNTS, LayeredTable, filled_layers, lanes_count
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.soil_laws import soil_potential

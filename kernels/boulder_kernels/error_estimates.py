@@ -1,4 +1,4 @@
-"""The numerical error of one solution, and whether a second one should confirm it.
+"""The numerical error: of one solution, by that of its steps, and of two, by their difference.
 
 Dormand and Prince's method has a solution of fourth order embedded in that of fifth; their difference is known in every
 step at little cost. Summed over all steps it is an error of the speed, and the error of a displacement is that times
@@ -10,14 +10,18 @@ adds. Designs to which this may happen are *doubtful* and are solved a second ti
 happen but a verdict depends on it, near the limit, a coarser solution confirms the first. Beyond the horizon the
 difference of the two is the error: the sum would grow without end, and further solutions are compared there anyway,
 see `boulder_sweep.judge.refinement`. The numbers below were chosen with one set of random designs and tested with
-others, see `docs/studies/wild.py`.
+others, see `docs/studies/wild.py`. Which design is solved twice, and how, is said in `boulder_kernels.table`.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from ._jit import kernel
-from .design import Design
-from .outcomes import COARSER, FINER, LEAST_ROTATION, NONE_NEEDED, PAIR, Outcome, Status, StepErrors
+from .design import Design, DesignTable
+from .outcomes import COARSER, FINER, LEAST_ROTATION, NONE_NEEDED, PAIR, Outcome, OutcomeTable, Status, StepErrors
 
 YIELD_PASSED = 1.2e-3
 """Error time, times the length of the steps, where steps pass the instant at which the soil yields [s^2]."""
@@ -49,6 +53,16 @@ NEAR_LIMIT, MANY_ERRORS = 0.017453292519943295, 100.0
 so many errors, by a finer one."""
 GRAZING = 0.01
 """Speed at an arm as long as the boulder is deep, over that of the impact, below which the limit is just reached."""
+SAFETY = 1.5
+"""Factor from the difference of two solutions to the error that is reported: it makes the estimate hold for 99 % and
+more of all designs, and for those that are not stopped at the limit of rotation alone."""
+SAFETY_PRINTED = 5.0
+"""The same where the restoring moment is read as printed: two of its jumps can come and go within a step of either
+solution, and both then miss them alike."""
+SAFETY_CONFIRMED = 4.0
+"""The same where a doubtful design is solved again by half the step."""
+LEAST_CONFIRMED_RAD, LEAST_CONFIRMED_M = 1e-8, 2e-7
+"""Least error of a design that has a second solution."""
 
 
 @kernel
@@ -110,3 +124,93 @@ def step_errors(o: Outcome, design: Design, theta_limit: float, horizon: float) 
     else:
         second = COARSER if not stopped and room < NEAR_LIMIT else NONE_NEEDED
     return StepErrors(theta, x, second)
+
+
+@kernel
+def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
+    """Estimate the numerical error of one design; see `estimate_errors`."""
+    limit = Status.LIMIT.value
+    if np.isnan(fine.theta_max[row]):
+        return
+    if np.isnan(coarse.theta_max[row]) or (coarse.status[row] == limit) != (fine.status[row] == limit):
+        fine.theta_error[row] = fine.x_error[row] = np.inf
+        return
+    arm = max(table.d[row], 0.5 * table.H[row])
+    turn = abs(coarse.theta_max[row] - fine.theta_max[row])
+    x = max(abs(coarse.x_b_max[row] - fine.x_b_max[row]), abs(coarse.x_v_max[row] - fine.x_v_max[row]))
+    x = max(x, arm * turn)
+    if fine.status[row] == limit:
+        x = max(x, table.v_0[row] * abs(coarse.t_limit[row] - fine.t_limit[row]))
+        fine.theta_error[row] = 0.0
+    else:
+        fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
+    x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
+    fine.x_error[row] = safety * x
+
+
+@kernel
+def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float) -> None:
+    """Estimate the numerical errors of a table from a coarser solution of it.
+
+    Parameters
+    ----------
+    coarse, fine
+        Solutions with a step and with a third of it; the estimates go into the finer.
+    table
+        The designs.
+    safety
+        Factor from the difference of the two to the estimate.
+
+    Notes
+    -----
+    The difference of two solutions is nearly the error of the coarser, many times that of the finer. It can be small
+    by chance, where two errors cross zero, but hardly in all that is reported at once. So the largest difference
+    counts: displacements and angles compared over the embedment depth, or half the height of the boulder where that is
+    more, and times over the speed of impact. A boulder that hardly turns owes its rotation no more than that rotation
+    itself to an error of the truck (LEAST_ROTATION where it is less), however small the boulder: beyond it only the
+    difference of the rotations counts.
+    Where only one of the two reached the limit of rotation, or failed, no estimate could be trusted: the error is
+    infinite. Where both did, the rotation is the limit itself.
+    """
+    for row in range(fine.status.size):
+        estimate_error(coarse, fine, table, safety, row)
+
+
+@kernel
+def confirm_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
+    """Estimate the numerical error of one design that needs two solutions; see `confirm_errors`."""
+    if np.isnan(fine.theta_max[row]):
+        return
+    theta, x = fine.theta_error[row], fine.x_error[row]
+    estimate_error(coarse, fine, table, safety, row)
+    fine.theta_error[row] = max(fine.theta_error[row], theta, LEAST_CONFIRMED_RAD)
+    fine.x_error[row] = max(fine.x_error[row], x, LEAST_CONFIRMED_M)
+
+
+@kernel
+def confirm_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float) -> None:
+    """Estimate the numerical errors of designs that need two solutions: that of the steps, or the difference if larger.
+
+    Parameters
+    ----------
+    coarse, fine
+        The solutions, with the errors of their steps; the estimates go into the finer.
+    table, safety
+        As of `estimate_errors`.
+    """
+    for row in range(fine.status.size):
+        confirm_error(coarse, fine, table, safety, row)
+
+
+def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
+    """Add the numerical error to the doubt of where boulders come to rest.
+
+    Parameters
+    ----------
+    coarse, fine
+        `OutcomesAtRest` by a step and by a third of it; the error goes into the finer.
+    safety
+        Factor from the difference of the two to the error.
+    """
+    differing = np.maximum(abs(coarse.theta_rest - fine.theta_rest), abs(coarse.swing_back - fine.swing_back))
+    fine.rest_error[:] += safety * differing

@@ -12,32 +12,26 @@ import boulder_kernels as bk
 from boulder_kernels import Status
 from boulder_kernels.design import error_arm
 from boulder_kernels.dormand_prince import ERROR
-from boulder_kernels.embedded import (
+from boulder_kernels.error_estimates import (
     AT_LIMIT,
     AT_LIMIT_AFTER_CHANGES,
     CHATTERING,
     CHATTERING_T,
     CHATTERING_THETA,
     CHATTERING_X,
+    LEAST_CONFIRMED_M,
     LEAST_IF_DOUBTFUL,
     LONG_MOTION,
     ROCKING,
+    SAFETY,
+    SAFETY_CONFIRMED,
     YIELD_LOCATED,
     YIELD_PASSED,
     error_time,
     step_errors,
 )
 from boulder_kernels.outcomes import COARSER, FINER, LEAST_ROTATION, NONE_NEEDED, PAIR, no_maxima
-from boulder_kernels.table import (
-    LEAST_CONFIRMED_M,
-    SAFETY,
-    SAFETY_CONFIRMED,
-    halved,
-    is_paired,
-    simulate_checked,
-    simulate_once,
-    step_of_solution,
-)
+from boulder_kernels.table import halved, is_paired, simulate_checked, simulate_once, step_of_solution
 from tests import oracle
 
 from .samples import control, design_of, random_designs, table_of
