@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.control import STEP_RATIO
 
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, first, sample
 from .literal import literal_table

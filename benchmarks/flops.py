@@ -125,8 +125,15 @@ def _count() -> tuple[Operations, Operations]:
     from boulder_kernels import design, soil
     from boulder_kernels.design import design_at
     from boulder_kernels.dormand_prince import step
-    from boulder_kernels.dynamics import Acceleration, State, acceleration
-    from boulder_kernels.modes import TURNING_FORWARD, Modes, Switches, switches_of
+    from boulder_kernels.dynamics import (
+        TURNING_FORWARD,
+        Acceleration,
+        Modes,
+        State,
+        Switches,
+        acceleration,
+        switches_of,
+    )
 
     from .designs import sample
 

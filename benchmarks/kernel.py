@@ -16,8 +16,7 @@ import boulder_kernels as bk
 from boulder_kernels import lanes
 from boulder_kernels.design import design_at
 from boulder_kernels.layered import COUNTS, TO, filled_layers, uniform_layers
-from boulder_kernels.outline import HEIGHT
-from boulder_kernels.outlined import given_beside
+from boulder_kernels.outlined import HEIGHT, given_beside
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics
 from boulder_kernels.table import some_rows

@@ -13,9 +13,8 @@ import numba
 import numpy as np
 
 from boulder_kernels import Constants, DesignTable, Readings
-from boulder_kernels.dense_output import Track, displacement_at, slope_at, track
 from boulder_kernels.design import constants_of, design_in
-from boulder_kernels.dormand_prince import STAGES, A
+from boulder_kernels.dormand_prince import STAGES, A, Track, displacement_at, slope_at, track
 from boulder_kernels.dynamics import (
     Acceleration,
     State,

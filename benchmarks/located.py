@@ -16,10 +16,8 @@ import numpy as np
 
 from boulder_kernels import DesignTable
 from boulder_kernels._jit import inlined, kernel
-from boulder_kernels.dense_output import displacement_at, slope_at, turning_point
 from boulder_kernels.design import constants_of, design_in
-from boulder_kernels.dormand_prince import STAGES
-from boulder_kernels.flat import field, put
+from boulder_kernels.dormand_prince import STAGES, displacement_at, slope_at, turning_point
 from boulder_kernels.heave import FOOT, PIECES, HeaveConstants, heave_constants, prepare, strip_depth
 from boulder_kernels.heave_steps import (
     AXES,
@@ -34,7 +32,7 @@ from boulder_kernels.heave_steps import (
     track_of,
     write_rate,
 )
-from boulder_kernels.numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
+from boulder_kernels.numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 from boulder_kernels.second_opinion import (
     FIRST_STEP,
     LONGEST_STEP,

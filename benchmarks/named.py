@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.control import STEP_RATIO
 from boulder_kernels.table import is_paired
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
 

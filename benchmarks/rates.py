@@ -12,7 +12,7 @@ import threading
 import time
 
 import boulder_kernels as bk
-from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.control import STEP_RATIO
 
 from .accuracy import control, reference_of
 from .designs import DESIGNS, sample

@@ -103,7 +103,7 @@ def test_modules_are_imported_by_name_in_few_places_only() -> None:
     of arguments that are known as text."""
     found = {module for module, file in MODULES.items() if "import_module(" in file.read_text(encoding="utf-8")}
     product = {"boulder_sweep", "boulder_sweep.drawing", "boulder_sweep.release", "boulder_sweep.runner.cluster"}
-    assert found == product | {"boulder_kernels._arguments"}
+    assert found == product | {"boulder_kernels._ahead"}
 
 
 def test_drawing_imports_views_only() -> None:

@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Constants, Design, Readings, Record, SecondSpring
-from boulder_kernels.dynamics import Acceleration
-from boulder_kernels.energy import Stored
-from boulder_kernels.layered import SoilLayers
-from boulder_kernels.modes import (
+from boulder_kernels.dynamics import (
     FREE,
     HELD,
     LIMITED_BACK,
@@ -19,11 +16,13 @@ from boulder_kernels.modes import (
     SEATED,
     TURNING_BACK,
     TURNING_FORWARD,
+    Acceleration,
 )
+from boulder_kernels.layered import SoilLayers
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import PlasticConstants, at_sample
-from boulder_kernels.samples import evaluate_samples
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
+from boulder_kernels.time_history import Stored, evaluate_samples
 
 MODE_NAMES = {
     SEATED: "seated",

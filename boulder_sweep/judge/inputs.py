@@ -8,7 +8,7 @@ import numpy as np
 
 from boulder_kernels import DesignTable, SecondSprings
 from boulder_kernels.layered import OutlinedTable
-from boulder_kernels.outline import FAR, HEIGHT, NEAR
+from boulder_kernels.outlined import FAR, HEIGHT, NEAR
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import LEAST_SOLIDITY, SECOND_SPRING, solidity_of
 from boulder_sweep.settings.model import RESISTANCES, Ground

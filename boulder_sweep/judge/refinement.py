@@ -8,8 +8,8 @@ not see it. So a late row passes or overturns only if `AGREEING` others agree wi
 long as those before over the whole motion; until they do it is simulated again by finer steps, and is undecided
 where even the finest differ.
 
-What is still refused by the finest steps is simulated by `boulder_kernels.last_resort`, whose late rows need finer
-solutions of the same kind.
+What is still refused by the finest steps is simulated by `boulder_kernels.impact.simulate_last_resort`, whose late rows
+need finer solutions of the same kind.
 """
 
 from __future__ import annotations

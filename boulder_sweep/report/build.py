@@ -29,7 +29,7 @@ PORTABLE = {
     "NUMBA_SLP_VECTORIZE": "0",
 }
 """Numba settings under which the LLVM code does not depend on this machine's processor."""
-MATHEMATICS = {"sqrt", "tan", "atan2", "hypot"}
+MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "sin", "cos"}
 """C library functions that the kernels call."""
 
 
@@ -60,7 +60,7 @@ def intermediate_code() -> str:
     """
     import numba
 
-    from boulder_kernels._llvm import module_of
+    from boulder_kernels._numba import module_of
     from boulder_sweep.report import entry_points
 
     if {name: os.environ.get(name) for name in PORTABLE} != PORTABLE:
@@ -92,7 +92,7 @@ def _keep_only(module: Any, names: Collection[str]) -> None:
     """
     import llvmlite.binding as llvm
 
-    from boulder_kernels._llvm import keep_only
+    from boulder_kernels._numba import keep_only
 
     strange = keep_only(module, names, llvm.Target.from_triple(TRIPLE).create_target_machine()) - MATHEMATICS
     structures = [line for line in str(module).splitlines() if re.search(r"alloca [\[{].*\bptr\b", line)]

@@ -1,7 +1,7 @@
 """What the page calls: the kernels behind three functions over pointers to doubles.
 
-WebAssembly has no named tuples, so designs and settings are passed as plain numbers in a fixed order, which only this
-module knows. `outcomes` does the work of ``sweep run``, one design after another instead of in lanes, `rulings`
+WebAssembly has no named tuples, so designs, soils and settings are passed as plain numbers in a fixed order, which only
+this module knows. `outcomes` does the work of ``sweep run``, one design after another instead of in lanes, `rulings`
 that of its verdicts, and `history` that of ``sweep simulate``.
 """
 
@@ -24,6 +24,7 @@ from boulder_kernels import (
     simulate,
 )
 from boulder_kernels._jit import array_kernel, inlined, when_compiling
+from boulder_kernels.control import STEP_RATIO
 from boulder_kernels.design import design_in
 from boulder_kernels.error_estimates import (
     SAFETY,
@@ -33,13 +34,13 @@ from boulder_kernels.error_estimates import (
     estimate_error,
     step_errors,
 )
-from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.ground import Ground, put_soil
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import LAST, PLASTIC_WITH_GAP, Memory, memory_of
-from boulder_kernels.samples import sample_of, state_of
 from boulder_kernels.soil_laws import SoilProfile, constants_in
+from boulder_kernels.time_history import sample_of, state_of
 from boulder_kernels.unloading import plastic_work, recall
 from boulder_kernels.verdict import VerdictLimits, limits_in, write_rulings
 
@@ -67,7 +68,13 @@ HISTORY = (
 """Columns of a time history, in this order; m, rad, N, J. The parts of the energy as in `EnergyLedger`."""
 ENERGY = HISTORY.index("vehicle_kinetic")
 """Index of the first energy."""
-EXPORTS = {"outcomes": "pipipipppp", "rulings": "ipppp", "history": "ppipippippppppp"}
+GROUND = (*Ground._fields[:-1], "layered", "slices")
+"""What lies around the boulders, in this order, the deeper layers apart; SI, rad, kPa. The last two are arguments of
+`boulder_kernels.ground.put_soil`."""
+GROUND_COUNT = len(GROUND)
+BELOW = 5
+"""Numbers of a deeper layer."""
+EXPORTS = {"outcomes": "pippipipippppp", "rulings": "ipppp", "history": "pppipipipppippppppp"}
 """The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number."""
 carray: Any = None
 """`numba.carray`, which is there when kernels are compiled: a report is written without Numba."""
@@ -127,6 +134,32 @@ def table_from(t: np.ndarray) -> DesignTable:
 def outcomes_from(t: np.ndarray) -> OutcomeTable:
     """Return the rows of an array as the columns of a table."""
     return OutcomeTable(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], t[9], t[10])
+
+
+@array_kernel
+def put_soils(
+    designs: np.ndarray,
+    ground_at: Any,
+    below_at: Any,
+    deeper: int,
+    profile: np.ndarray,
+    layers: np.ndarray,
+    outlines: np.ndarray,
+) -> None:
+    """Write what the soil as it lies makes of designs, see `boulder_kernels.ground.put_soil`.
+
+    Parameters
+    ----------
+    designs
+        Inputs, shape (len(DESIGN), n).
+    ground_at, below_at, deeper
+        Numbers in the order of GROUND, deeper layers, shape (deeper, BELOW), and their number.
+    profile, layers, outlines
+        As of `put_soil`.
+    """
+    g = carray(ground_at, (GROUND_COUNT,))
+    ground = Ground(int(g[0]), g[1], g[2], g[3], carray(below_at, (deeper, BELOW)))
+    put_soil(table_from(designs), ground, g[4] > 0.0, int(g[5]), profile, layers, outlines)
 
 
 LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
@@ -217,10 +250,14 @@ def solve(
 def outcomes(
     designs_at: Any,
     n: int,
+    ground_at: Any,
+    below_at: Any,
+    deeper: int,
+    profile_at: Any,
+    points: int,
     layers_at: Any,
     m: int,
     outlines_at: Any,
-    points: int,
     soil_at: Any,
     settings_at: Any,
     fine_at: Any,
@@ -231,17 +268,21 @@ def outcomes(
     Parameters
     ----------
     designs_at
-        Inputs, shape (len(DESIGN), n).
+        Inputs, shape (len(DESIGN), n); K_epsilon is written over, see `put_soils`.
     n
         Number of designs.
+    ground_at, below_at, deeper
+        The soil as it lies, as of `put_soils`.
+    profile_at
+        Profile of the boulders, shape (points, 4).
+    points
+        Number of its points; 0 for boxes.
     layers_at
-        Layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`.
+        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`.
     m
         Number of layers; 0 for a uniform elastic soil beside boxes.
     outlines_at
-        Outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outline`.
-    points
-        Number of points of an outline; 0 for boxes.
+        Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outlined`.
     soil_at
         Room for the soil of one design: for its layers, LAYER_ROOM m numbers, for its pieces beside an outline,
         PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + MEMORY_ROOM.
@@ -256,6 +297,7 @@ def outcomes(
     readings, estimated, way = readings_from(s), s[9] > 0.0, int(s[PAIRED_AT])
     designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (11, n)), carray(coarse_at, (11, n))
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
+    put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
     nothing = carray(coarse_at, (0,))
     record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
     table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
@@ -351,10 +393,14 @@ def write_history(
 @array_kernel
 def history(
     design_from: Any,
+    ground_at: Any,
+    below_at: Any,
+    deeper: int,
+    profile_at: Any,
+    points: int,
     layers_at: Any,
     m: int,
     outline_at: Any,
-    points: int,
     soil_at: Any,
     settings_at: Any,
     n: int,
@@ -371,9 +417,10 @@ def history(
     Parameters
     ----------
     design_from
-        Inputs, shape (len(DESIGN),).
-    layers_at, m, outline_at, points, soil_at
-        Layers of its soil, its outline, and room for the soil, as of `outcomes`; with soil elements for n samples, too.
+        Inputs, shape (len(DESIGN),); K_epsilon is written over.
+    ground_at, below_at, deeper, profile_at, points, layers_at, m, outline_at, soil_at
+        The soil as it lies and room for what follows from it, as of `outcomes` for one design; with soil elements the
+        last is room for n samples, too.
     settings_at
         Settings, shape (len(SETTINGS),).
     n
@@ -390,13 +437,15 @@ def history(
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, control = readings_from(s), control_from(s, s[9] > 0.0)
     given = carray(design_from, (17, 1))
+    all_layers, outlines = carray(layers_at, (1, m, 6)), carray(outline_at, (1, points, 4))
+    put_soils(given, ground_at, below_at, deeper, carray(profile_at, (points, 4)), all_layers, outlines)
     design, second = design_in(given, 0), SecondSpring(given[15, 0], given[16, 0])
     out, modes = carray(history_at, (18, n)), carray(modes_at, (2, n))
     exchanged, offset = carray(exchanged_at, (n, 4)), carray(offset_at, (n,))
     record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
     out[:] = np.nan
     record.states[:] = np.nan
-    layers, outline = carray(layers_at, (1, m, 6))[0], carray(outline_at, (1, points, 4))[0]
+    layers, outline = all_layers[0], outlines[0]
     centre, elements = carray(centre_at, (2,)), control.elements
     samples, kept = carray(soil_at, (n, 2 * elements + 1)), n * (2 * elements + 1)
     room = carray(soil_at, (kept + ELEMENT_ROOM * elements + MEMORY_ROOM,))[kept:]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_kernels import OutcomeTable, Status
-from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.control import STEP_RATIO
 from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from boulder_kernels import (
     simulate_design,
     simulate_table,
 )
-from boulder_kernels.impact import STEP_RATIO
+from boulder_kernels.control import STEP_RATIO
 from boulder_sweep.views.figures import BLUE, GREY, ORANGE, figure
 from docs.studies.coverage import HORIZON_S, LIMIT, random_table
 

@@ -7,12 +7,14 @@ subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, 
 
 from ._cache import source_hash
 from ._jit import when_compiling
+from .control import Control
 from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected
-from .impact import Control, Problem, Record, no_record, simulate, simulate_design
+from .impact import Problem, simulate, simulate_design
 from .outcomes import SIMULATED, Maxima, Outcome, OutcomesAtRest, OutcomeTable, Status
 from .plastic import ELASTIC, PLASTIC, PLASTIC_WITH_GAP
 from .second_spring import SecondSpring, SecondSprings
 from .table import simulate_table
+from .time_history import Record, no_record
 
 __all__ = [
     "ELASTIC",

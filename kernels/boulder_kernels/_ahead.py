@@ -14,18 +14,19 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import functools
 import hashlib
 import json
 import tempfile
 import threading
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import _cache
-from ._arguments import UnsuitableError, build, flatten
 
 ENTRY = "entry"
 """Name of the function in a library."""
@@ -35,13 +36,85 @@ announce: Callable[[str], contextlib.AbstractContextManager[Any]] = contextlib.n
 """Called with the name of a kernel's files when it must be compiled, which is done within what it returns."""
 
 
+KINDS = {np.dtype(code): code for code in ("f8", "i8", "i1", "b1")}
+"""Numbers that an array may hold."""
+REAL, WHOLE, TRUTH, NOTHING = "f", "i", "b", "n"
+_SCALARS = {float: REAL, np.float64: REAL, int: WHOLE, np.int64: WHOLE, bool: TRUTH, np.bool_: TRUTH}
+
+
+class UnsuitableError(Exception):
+    """A call, or a kernel, that is left to Numba's dispatcher."""
+
+
+def flatten(value: Any, reals: list[float], wholes: list[int], arrays: list[np.ndarray]) -> str:
+    """Append the numbers and arrays of an argument to lists, and return its type as text.
+
+    Raises
+    ------
+    UnsuitableError
+        It is, or holds, something else.
+    """
+    kind = type(value)
+    letter = _SCALARS.get(kind)
+    if letter is not None:
+        (reals if letter == REAL else wholes).append(value)
+        return letter
+    if value is None:
+        return NOTHING
+    if kind is np.ndarray:
+        code = KINDS.get(value.dtype)
+        if code is None or value.ndim == 0 or not value.flags.c_contiguous:
+            raise UnsuitableError
+        wholes.extend(value.shape)
+        arrays.append(value)
+        return f"{code}{value.ndim}"
+    if isinstance(value, tuple):
+        record: Any = kind
+        return f"{name_of(record)}({','.join([flatten(one, reals, wholes, arrays) for one in value])})"
+    raise UnsuitableError
+
+
+@functools.cache
+def name_of(kind: Any) -> str:
+    """Name by which a type of records is imported; empty for plain tuples."""
+    return f"{kind.__module__}:{kind.__qualname__}" if hasattr(kind, "_fields") else ""
+
+
+def build(returns: Any, numbers: Any) -> Any:
+    """Return the value that a kernel returned, from its numbers one after another."""
+    if returns == REAL:
+        return next(numbers)
+    if returns == WHOLE:
+        return int(next(numbers))
+    if returns == TRUTH:
+        return next(numbers) != 0.0
+    if returns == NOTHING:
+        return None
+    name, fields = returns
+    values = [build(field, numbers) for field in fields]
+    return record_of(name)(*values) if name else tuple(values)
+
+
+@functools.cache
+def record_of(name: str) -> Any:
+    """Return a type of records by its name."""
+    module, _, inside = name.partition(":")
+    return getattr(import_module(module), inside)
+
+
+def function_of(source: str, **names: Any) -> Callable[..., Any]:
+    """Return the function that a source text defines, with the names it refers to: for what `overload` writes out."""
+    exec(source, names)
+    return names[source[len("def ") : source.index("(")]]
+
+
 class Native(NamedTuple):
     """A compiled kernel."""
 
     call: Any
     """The function, of ctypes."""
     returns: Any
-    """What comes back: a letter of `boulder_kernels._arguments`, or the name of a record and what its fields are."""
+    """What comes back: a letter as of `flatten`, or the name of a record and what its fields are."""
     numbers: int
     """How many numbers that is."""
     library: Any
@@ -108,9 +181,7 @@ def _found(kernel: Any, types: str) -> Any:
                 kept_in.mkdir(mode=0o700, exist_ok=True)
                 keep(kept_in / name, code, library, kept)
                 return loaded(kept_in / name)
-        from . import _llvm
-
-        return native_of(*_llvm.loaded(code, ENTRY), kept)
+        return native_of(*object_loaded(code), kept)
 
 
 class UnusableError(Exception):
@@ -160,9 +231,20 @@ def loaded(file: Path) -> Native:
         code = file.with_suffix(OBJECT).read_bytes()
     except (OSError, ValueError, AttributeError) as problem:  # the last is what a library without the function raises
         raise UnusableError(str(problem)) from problem
-    from . import _llvm
+    return native_of(*object_loaded(code), kept)
 
-    return native_of(*_llvm.loaded(code, ENTRY), kept)
+
+def object_loaded(code: bytes) -> tuple[Any, Any]:
+    """Load object code; return its function, as of ctypes, and what must stay loaded."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    machine = llvm.Target.from_default_triple().create_target_machine()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return ctypes.CFUNCTYPE(ctypes.c_int32)(engine.get_function_address(ENTRY)), engine
 
 
 def native_of(function: Any, library: Any, kept: dict[str, Any]) -> Native:

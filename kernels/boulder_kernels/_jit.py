@@ -11,7 +11,7 @@ that is called has been compiled ahead, a process does without it.
 ``fastmath={"contract", "nsz"}``
     Fused multiply-add, and the sign of zero does not matter. Nothing may assume that NaN or infinity never
     occur: a state that has become non-finite must be seen and reported. Nor may sums be reordered, so that a design
-    gives the same bits wherever in a block, and with whatever vectors, it is computed (see `boulder_kernels.flat`).
+    gives the same bits wherever in a block, and with whatever vectors, it is computed (see `boulder_kernels.numerics`).
 ``_nrt``
     Off but for what makes arrays: kernels borrow those that they are given, and do not count references to them.
     The counters are atomic, and cost a fifth of the time of short simulations.
@@ -35,7 +35,7 @@ from types import ModuleType
 from typing import Any
 
 from . import _ahead
-from ._arguments import UnsuitableError, function_of
+from ._ahead import UnsuitableError, function_of
 from ._cache import source_hash
 
 __all__ = [

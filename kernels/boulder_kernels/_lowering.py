@@ -17,8 +17,8 @@ from numba.extending import lower_builtin, type_callable
 from numba.np import arrayobj
 
 from .design import Constants, Design, design_in
-from .flat import WIDTH, field, partial_sums, put
 from .layered import LayeredConstants
+from .numerics import WIDTH, field, partial_sums, put
 from .workspace import (
     CONSTANTS,
     KNOWN,

@@ -12,7 +12,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,9 +22,7 @@ import numpy as np
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-from . import _llvm
-from ._ahead import ENTRY
-from ._arguments import NOTHING, REAL, TRUTH, WHOLE, UnsuitableError, function_of, name_of, record_of
+from ._ahead import ENTRY, NOTHING, REAL, TRUTH, WHOLE, UnsuitableError, function_of, name_of, record_of
 
 NEEDLESS = {
     "WithLifting",
@@ -43,6 +41,8 @@ NEEDLESS = {
 """Steps of Numba's compiler that kernels do without, by name."""
 REPEATED = "DeadBranchPrune"
 """A step that Numba takes three times; the last one finds everything that the others do."""
+COUNTING = re.compile(r"^(define .*@NRT_(?:incref|decref)\(.*)$[\s\S]*?^\}$", re.MULTILINE)
+"""Functions that count references: arrays are only views of the caller's memory, and nothing need be counted."""
 ENVIRONMENT = "_ZN08NumbaEnv"
 """What the names begin with of the variables by which compiled functions find Python's objects."""
 
@@ -149,7 +149,7 @@ def compiled_ahead(kernel: Any, types: str) -> tuple[bytes, bytes | None, dict[s
     kernel
         The `boulder_kernels._jit.Kernel`.
     types
-        Types of its arguments, as `boulder_kernels._arguments.flatten` gives them, with commas between them.
+        Types of its arguments, as `boulder_kernels._ahead.flatten` gives them, with commas between them.
 
     Returns
     -------
@@ -162,7 +162,7 @@ def compiled_ahead(kernel: Any, types: str) -> tuple[bytes, bytes | None, dict[s
 
     Raises
     ------
-    boulder_kernels._arguments.UnsuitableError
+    boulder_kernels._ahead.UnsuitableError
         It returns something other than numbers and records of them, or makes arrays.
     """
     given = call_of(types)
@@ -184,11 +184,11 @@ def compiled_ahead(kernel: Any, types: str) -> tuple[bytes, bytes | None, dict[s
     entry.compile(addresses)
     compiled = entry.overloads[addresses]
     codegen = compiled.library.codegen
-    module = _llvm.module_of(compiled.library.get_llvm_str(), compiled.fndesc.llvm_func_name, ENTRY)
+    module = module_of(compiled.library.get_llvm_str(), compiled.fndesc.llvm_func_name, ENTRY)
     machine = llvmlite.binding.Target.from_default_triple().create_target_machine(
         cpu=codegen._get_host_cpu_name(), features=codegen._get_host_cpu_features(), opt=3, reloc="pic"
     )
-    if strange := _llvm.keep_only(module, [ENTRY], machine) - MATHEMATICS:
+    if strange := keep_only(module, [ENTRY], machine) - MATHEMATICS:
         raise UnsuitableError(str(strange))
     code = machine.emit_object(module)
     return code, linked(code), kept
@@ -196,6 +196,35 @@ def compiled_ahead(kernel: Any, types: str) -> tuple[bytes, bytes | None, dict[s
 
 MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "exp", "log", "sin", "cos", "fmod"}
 """Functions of the C library that kernels may call."""
+
+
+def module_of(code: str, function: str, name: str) -> Any:
+    """Return LLVM code as a module in which a function has another name, and no references are counted."""
+    module = llvmlite.binding.parse_assembly(COUNTING.sub(r"\1\n ret void\n}", code))
+    module.get_function(function).name = name
+    return module
+
+
+def keep_only(module: Any, names: Collection[str], machine: Any) -> set[str]:
+    """Remove everything that the named functions do not need from a module.
+
+    Returns
+    -------
+    set of str
+        Functions that it calls and does not define, LLVM's own left out.
+    """
+    for function in module.functions:
+        if not function.is_declaration and function.name not in names:
+            function.linkage = "internal"
+    for variable in module.global_variables:
+        variable.linkage = "internal"
+    passes = llvmlite.binding.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.add_strip_dead_prototype_pass()
+    options = llvmlite.binding.create_pipeline_tuning_options(speed_level=3)
+    passes.run(module, llvmlite.binding.create_pass_builder(machine, options))
+    called = {function.name for function in module.functions if function.is_declaration}
+    return {name for name in called if not name.startswith("llvm.")}
 
 
 class Call(NamedTuple):
@@ -253,7 +282,7 @@ def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
 
     Raises
     ------
-    boulder_kernels._arguments.UnsuitableError
+    boulder_kernels._ahead.UnsuitableError
         It holds something other than numbers.
     """
     types: Any = numba.types

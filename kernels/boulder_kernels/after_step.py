@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .dense_output import DenseOutput, state_at
+from .control import MOST_STEPS, STEP_RATIO, Control
 from .design import Constants, Readings
-from .dynamics import Acceleration, State, acceleration, signed_arm
+from .dormand_prince import DenseOutput, state_at
+from .dynamics import Acceleration, Modes, State, Switches, signed_arm, switches_of
 from .events import (
     begin_search,
     first_event,
@@ -24,11 +25,11 @@ from .events import (
     turns_beyond,
     weights_of,
 )
-from .gaps import LIMIT, GapFactors, gap_factors, gaps_at, gaps_of
-from .modes import Modes, Switches, switches_of
+from .modes import LIMIT, GapFactors, gap_factors, gaps_at, gaps_of
 from .numerics import ITERATIONS, sine_versine
 from .outcomes import Compression, Maxima, Status, compression_of, grown, highest, updated_maxima
-from .settling import barrier_energy, boulder_energy, inside_maxima, stays_below
+from .plastic import ELASTIC
+from .settling import barrier_energy, boulder_energy, inside_maxima, proof_is_possible, stays_below
 from .soil import soil_kinematics
 
 RUNNING = -1
@@ -80,12 +81,6 @@ class Ending(NamedTuple):
 def is_finite(y: State) -> bool:
     """Whether no component of a state is NaN or infinite."""
     return bool(np.isfinite(y.x_b + y.v_b + y.theta_b + y.omega_b + y.x_v + y.v_v))
-
-
-@inlined
-def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
-    """Acceleration at a state."""
-    return acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c)
 
 
 @inlined
@@ -331,3 +326,14 @@ def enter_modes(
 def initial_state(c: Constants) -> State:
     """State at the first touch."""
     return State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
+
+
+@kernel
+def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
+    """What ends the simulation of a design by steps of a given length [s]; no design takes more than MOST_STEPS."""
+    most = (STEP_RATIO if control.refined else 1.0) * MOST_STEPS * h_full
+    longest = control.horizon
+    if control.stop_at_limit:
+        longest = max(longest, min(control.longest_horizon, most))
+    stopping = control.stop_at_limit and control.unloading == ELASTIC
+    return Ending(control.theta_limit, control.horizon, longest, stopping, proof_is_possible(readings))

@@ -11,13 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .dense_output import Track, displacement_at, slope_at, track
 from .design import Constants, error_arm
-from .dormand_prince import AA, ERROR, STAGES, A, C
+from .dormand_prince import AA, ERROR, STAGES, A, C, Track, displacement_at, slope_at, track
 from .dynamics import contact_displacement, spring_compression
-from .flat import field, put
 from .heave import FOOT, PIECES, ROOM, SETS, HeaveConstants, accelerations, forces, strip_depth
-from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
+from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 
 AXES = 4
 """Displacements: x_b, theta_b, y_b, x_v."""

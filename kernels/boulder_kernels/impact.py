@@ -1,4 +1,16 @@
-"""One impact from the first touch to its end: the reference that every faster path is held against."""
+"""One impact from the first touch to its end: the reference that every faster path is held against.
+
+**As a last resort** designs that need more steps than are allowed are simulated all the same, as long as a stated
+number of steps lasts. Three things make such designs affordable.
+
+1. They are given a number of steps (`MOST_STEPS`), not a number up to the horizon: many are decided long before it.
+2. The stiff truck asks for short steps only while it touches; released, it coasts.
+3. A spring that relaxes against its damper faster than the steps can follow passes on the force of the damper, however
+   stiff it is: F = c_v times the speed of crush, with an error of the order of the relaxation time c_v/k_v over that of
+   the impact. So a softer spring stands for it, which relaxes within a step, and at least `DAMPED` times as fast as the
+   damper slows the masses. A third of the step comes with a spring three times as stiff, so the estimated error covers
+   the spring.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +23,10 @@ from ._jit import inlined, kernel
 from .after_step import (
     RUNNING,
     Decided,
-    Ending,
     Kept,
     at_limit,
     decide,
+    ending_of,
     enter_modes,
     initial_state,
     is_finite,
@@ -22,19 +34,28 @@ from .after_step import (
     kept_up_to,
     passed_maxima,
     passes,
-    rate_of,
 )
-from .dense_output import DenseOutput, dense_output, state_at
-from .design import Constants, Design, Readings, is_computable
-from .dormand_prince import step
-from .energy import Exchanged, add_exchanged, nothing_exchanged
+from .control import (
+    ACCEPTED,
+    MOST_STEPS,
+    RETRY,
+    STEP_RATIO,
+    Control,
+    Rates,
+    attempt_budget,
+    first_length,
+    first_step,
+    rates_of,
+    stable_step,
+)
+from .design import Constants, Design, Readings, constants_of, is_computable
+from .dormand_prince import dense_output, step
+from .dynamics import rate_of
 from .error_estimates import error_time
-from .events import NONE, SHORTEN, change_mode, changes_counted, initial_modes, locate_limit
-from .gaps import TOLERANCE
-from .modes import Modes, Switches
-from .onset import first_length
+from .events import NONE, SHORTEN, locate_limit
+from .modes import change_mode, changes_counted, initial_modes
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
-from .plastic import ELASTIC, memory_of
+from .plastic import memory_of
 from .second_spring import (
     STIFFENS,
     SecondSpring,
@@ -45,160 +66,22 @@ from .second_spring import (
     provable_so_far,
     reached,
     stiffest,
+    times,
+    with_spring,
 )
-from .settling import NO_PROOF, boulder_energy, proof_is_possible
+from .settling import NO_PROOF, boulder_energy
 from .soil_laws import constants_in
-from .stability import ACCEPTED, MOST_STEPS, RETRY, rates_of, refusal, stable_step
-from .unloading import forget, note, rate_after, remember, until_rest
+from .time_history import Record, add_exchanged, nothing_exchanged, write_samples
+from .unloading import forget, rate_after, remember, until_rest
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
-ATTEMPTS_PER_STEP = 4
-ATTEMPTS_SPARE = 10_000
-"""A simulation gives up after ATTEMPTS_PER_STEP attempts per nominal step, plus this many for events."""
-
-
-STEP_RATIO = 3.0
-"""Step of the coarser of the two solutions that an error is estimated from, over that of the finer."""
-
-
-class Control(NamedTuple):
-    """How a simulation is run."""
-
-    h: float
-    """Step [s]; shortened where a design needs it, see `boulder_kernels.stability`."""
-    horizon: float
-    """Simulated time [s], unless a design ends before or has reason to go on."""
-    theta_limit: float
-    """Limit of rotation [rad]."""
-    elements: int
-    """Number N of soil elements; 0 for the closed form."""
-    error_estimate: bool
-    """Whether the estimated error of a design is confirmed by a second solution where one could be wrong, see
-    `boulder_kernels.table.simulate_table`. Without, it is that of the steps of one solution."""
-    stop_at_limit: bool = True
-    """Whether the simulation ends where the rotation reaches its limit."""
-    locate_yield: bool = False
-    """Whether steps also end where the soil reaches its ultimate resistance. The force has a kink there: a step that
-    runs across it is of third order only. Locating it restores the fifth, and pays for errors below about 1e-4 deg."""
-    refined: bool = False
-    """Whether the step of every design is divided by `STEP_RATIO`, after any shortening: the finer of the two
-    solutions that the error is estimated from."""
-    longest_horizon: float = 0.0
-    """Simulated time [s] up to which a design goes on that reaches the horizon without proof that it stays below its
-    limits; not beyond the horizon where it is shorter, or where nothing stops at the limit."""
-    last_resort: bool = False
-    """Whether a design that needs more steps than are allowed is simulated all the same, see
-    `boulder_kernels.last_resort`."""
-    unloading: int = ELASTIC
-    """How the soil unloads: ELASTIC, or PLASTIC or PLASTIC_WITH_GAP by plastic elements, of which there must be
-    some. Their simulations go on until the boulder is at rest, and are not ended by a proof before the horizon."""
-    paired: bool = False
-    """Where errors are estimated: whether every design is solved twice for it, and not only doubtful ones."""
-    event_tolerance: float = TOLERANCE
-    """Precision with which events are located, as a fraction of the step; `boulder_kernels.gaps.TOLERANCE` as
-    printed."""
-    side_by_side: bool = True
-    """Whether designs that may go through lanes side by side do, or one after another. The two round differently."""
-
-
-class Record(NamedTuple):
-    """Where a simulation writes its time history; empty arrays for none."""
-
-    times: np.ndarray
-    """Times asked for [s], ascending, shape (n,)."""
-    states: np.ndarray
-    """State at each, shape (n, 6), order of `State`; rows beyond the end of the simulation stay as they are."""
-    turning: np.ndarray
-    """Mode of rotation at each, int8, shape (n,)."""
-    touching: np.ndarray
-    """Whether the truck touched, bool, shape (n,)."""
-    exchanged: np.ndarray
-    """Energy exchanged up to each [J], shape (n, 4), order of `Exchanged`."""
-    offset: np.ndarray = np.empty(0)
-    """Offset u_0 of the vehicle's spring at each [m], shape (n,), see `boulder_kernels.second_spring`; may be empty."""
-
-
-def no_record() -> Record:
-    """Return a record that keeps nothing."""
-    return Record(
-        np.empty(0, np.float64),
-        np.empty((0, 6), np.float64),
-        np.empty(0, np.int8),
-        np.empty(0, np.bool_),
-        np.empty((0, 4), np.float64),
-        np.empty(0, np.float64),
-    )
-
-
-@kernel
-def write_samples(
-    record: Record,
-    written: int,
-    t: float,
-    h: float,
-    tau_end: float,
-    dense: DenseOutput,
-    modes: Modes,
-    switches: Switches,
-    c: Constants,
-    exchanged: Exchanged,
-) -> int:
-    """Write the samples that lie in a step, and return how many have been written in all."""
-    t_end = t + tau_end * h
-    while written < record.times.size and record.times[written] <= t_end:
-        tau = (record.times[written] - t) / h
-        y = state_at(dense, tau)
-        states = record.states[written]
-        states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
-        states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
-        note(written, memory_of(c))
-        record.turning[written] = modes.turning
-        record.touching[written] = modes.touching
-        so_far = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
-        sums = record.exchanged[written]
-        sums[0], sums[1], sums[2], sums[3] = (
-            so_far.drag,
-            so_far.damper,
-            so_far.restoring,
-            so_far.pull,
-        )
-        if record.offset.size > 0:
-            record.offset[written] = c.u_0
-        written += 1
-    return written
 
 
 @kernel
 def failed(status: int) -> Outcome:
     """Outcome of a design that was not simulated, or not to its end."""
     return Outcome(status, undefined_maxima(), np.nan, np.nan, 0, np.nan, np.nan, 0.0)
-
-
-@kernel
-def attempt_budget(h: float, horizon: float) -> float:
-    """Attempts after which a simulation with time step h [s] gives up before its horizon [s]."""
-    return ATTEMPTS_PER_STEP * horizon / h + ATTEMPTS_SPARE
-
-
-@inlined
-def first_step(control: Control, theta_stop: float, c: Constants) -> tuple[float, int]:
-    """Step of a design [s], and the status it is refused with or ACCEPTED."""
-    rates = rates_of(theta_stop, c)
-    h = min(control.h, stable_step(rates))
-    status = refusal(h, control.h, control.horizon, rates)
-    return h / STEP_RATIO if control.refined else h, status
-
-
-@kernel
-def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
-    """What ends the simulation of a design by steps of a given length [s]; no design takes more than MOST_STEPS."""
-    most = (STEP_RATIO if control.refined else 1.0) * MOST_STEPS * h_full
-    longest = control.horizon
-    if control.stop_at_limit:
-        longest = max(longest, min(control.longest_horizon, most))
-    stopping = control.stop_at_limit and control.unloading == ELASTIC
-    return Ending(control.theta_limit, control.horizon, longest, stopping, proof_is_possible(readings))
 
 
 class Problem(NamedTuple):
@@ -371,3 +254,58 @@ def simulate_by_steps(
             k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
             h_next = h_full = h_touching if modes.touching else h_apart
     return failed(Status.STEP_BUDGET.value)
+
+
+DAMPED = 16.0
+"""Least rate of relaxation over that at which the damper slows the masses, of the spring that stands for a stiffer
+one."""
+RESOLVED = 0.5
+"""Step while the truck touches, over the longest that is stable: a short blow is to be followed, not only survived."""
+NO_SPRING = 1e-12
+"""Factor on a spring that leaves nothing of its rates."""
+
+
+@kernel
+def spring_to_follow(r: Rates, control: Control) -> float:
+    """Factor on a spring that leaves it no faster than the steps can follow."""
+    slowing = r.truck / r.relaxation  # c_v over the masses
+    fastest = (STEP_RATIO if control.refined else 1.0) * max(1.0 / control.h, DAMPED * slowing)
+    return min(1.0, fastest / r.relaxation)
+
+
+@kernel
+def longest_step(theta_limit: float, c: Constants) -> float:
+    """Longest step that is stable up to a rotation [s]."""
+    return stable_step(rates_of(theta_limit, c))
+
+
+@kernel
+def simulate_last_resort(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
+    """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
+
+    Of two springs each is made softer only as far as it is too stiff to follow.
+
+    Parameters
+    ----------
+    problem
+        Design and vehicle; the soil is the uniform elastic soil of the design.
+    readings, control, record
+        As of `boulder_kernels.impact.simulate`; the record keeps nothing.
+    """
+    design, second = problem.design, problem.second
+    c = constants_of(design, readings, control.elements)
+    if misses(design) or not is_computable(c) or not is_second_spring(c, second):
+        return simulate(problem, readings, control, record)
+    _, status = first_step(control, control.theta_limit, stiffest(c, second))
+    if status == ACCEPTED:
+        return simulate(problem, readings, control, record)
+    c = stiffest(c, second)
+    factor = spring_to_follow(rates_of(control.theta_limit, c), control)
+    softer = times(second, factor)
+    c = constants_of(with_spring(design, min(1.0, factor * (c.k_v / design.k_v))), readings, control.elements)
+    apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)
+    ratio = STEP_RATIO if control.refined else 1.0
+    h = min(control.h, RESOLVED * longest_step(control.theta_limit, stiffest(c, softer))) / ratio
+    h_apart = min(control.h, longest_step(control.theta_limit, apart)) / ratio if readings.separation_released else h
+    found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record, softer)
+    return failed(status) if found.status == Status.STEP_BUDGET.value else found

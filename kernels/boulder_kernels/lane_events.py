@@ -10,15 +10,14 @@ from __future__ import annotations
 from typing import Any
 
 from ._jit import inlined, kernel
-from .after_step import RUNNING, Ending, Kept, at_limit, decide, enter_modes, is_finite, kept_up_to, rate_of
-from .dense_output import DenseOutput, dense_output
+from .after_step import RUNNING, Ending, Kept, at_limit, decide, enter_modes, is_finite, kept_up_to
 from .design import Readings
+from .dormand_prince import DenseOutput, dense_output
+from .dynamics import rate_of
 from .events import (
     NONE,
     SHORTEN,
     begin_search,
-    change_mode,
-    changes_counted,
     first_event,
     gaps_within,
     go_on_searching,
@@ -28,9 +27,8 @@ from .events import (
     turns_beyond,
     weights_of,
 )
-from .flat import field, put
-from .gaps import LIMIT, gaps_at
-from .numerics import ITERATIONS
+from .modes import LIMIT, change_mode, changes_counted, gaps_at
+from .numerics import ITERATIONS, field, put
 from .outcomes import Status, compression_at
 from .workspace import (
     ATTEMPTS_LEFT,

@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 
 from ._jit import inlined, kernel
-from .after_step import RUNNING, enter_modes, initial_state, passed_maxima, passes, rate_of
+from .after_step import RUNNING, ending_of, enter_modes, initial_state, passed_maxima, passes
+from .control import ACCEPTED, Control, attempt_budget, first_length, first_step
 from .design import Readings, design_in, is_computable
 from .dormand_prince import step
+from .dynamics import TURNING_FORWARD, Modes, rate_of
 from .error_estimates import error_time, step_errors
-from .events import AT_END, initial_modes, needs_moment
-from .flat import field, put
-from .gaps import TOLERANCE
-from .impact import Control, attempt_budget, ending_of, first_step
-from .modes import TURNING_FORWARD, Modes
-from .onset import first_length
+from .modes import AT_END, TOLERANCE, initial_modes, needs_moment
+from .numerics import field, put
 from .outcomes import (
     STATUS,
     Outcome,
@@ -30,7 +28,6 @@ from .outcomes import (
     write_outcome,
 )
 from .settling import NO_PROOF, boulder_energy
-from .stability import ACCEPTED
 from .workspace import (
     ATTEMPTS_LEFT,
     ATTENTION,

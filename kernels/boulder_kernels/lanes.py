@@ -15,14 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .after_step import RUNNING
+from .after_step import RUNNING, ending_of
+from .control import MOST_STEPS, RETRY, Control
 from .design import Readings
-from .flat import field, put
-from .impact import Control, ending_of
 from .lane_events import conclude, start_steps, work_out
 from .lane_steps import attempt_steps, start_designs, take_over_steps, write_lane
+from .numerics import field, put
 from .outcomes import STATUS, Status, empty_outcomes
-from .stability import MOST_STEPS, RETRY
 from .workspace import (
     ATTENTION,
     EVENT_SIZE,

@@ -131,7 +131,7 @@ LayeredTable = _record("LayeredTable", (*DesignTable._fields, "layers"))
 """Many designs in soils of layers: the fields of `DesignTable`, and ``layers`` of shape (n, M, 6)."""
 OutlinedTable = _record("OutlinedTable", (*LayeredTable._fields, "outlines"))
 """Many designs of boulders that are no boxes: the fields of `LayeredTable`, and ``outlines`` of shape (n, P, 4), see
-`boulder_kernels.outline`."""
+`boulder_kernels.outlined`."""
 LAYERED = (LayeredTable, OutlinedTable)
 """Tables that hold layers."""
 

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import function_of, inlined, kernel, overload
-from .flat import WIDTH, add, field, partial_sums, total
 from .layered import FewLayers, Layer, SoilElements, SoilLayers, SoilSums
+from .numerics import WIDTH, add, field, partial_sums, total
 from .soil import TINY, Kinematics, Potential, Reaction
 
 

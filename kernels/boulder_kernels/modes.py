@@ -1,92 +1,356 @@
-"""The modes of a motion: what is held fixed during a step and changes only where a step ends.
+"""Changes of the modes of a motion: how far it is from each of them, and the modes that follow.
 
-The forces are smooth but for a few switches: the truck touches or has come off; the boulder is seated on its base,
-or turns one way or the other, and the couple of its weight jumps with it. Switched inside the right-hand side, a
-jump makes the integrator first order, because the negative stage weights of Dormand and Prince push the state
-over it and back. So the switches are modes: frozen within a step, the right-hand side is smooth, and the step is
-cut at the instant at which the mode changes.
-
-One linear form serves every reading. With M the moment of soil and truck, the restoring moment is
-
-    M_R = a M + b (C_cos cos(theta) + w sin(theta))
-
-and only a, b and w change with the mode.
+Each event has a gap, positive as long as the present mode holds. A gap that is negative at the end of a step puts
+the event inside it. Every gap is a sum of a few quantities of the state with factors that depend on the mode only, so
+that a loop over lanes in different modes needs no branch.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from ._jit import inlined
+from ._jit import inlined, kernel
 from .design import Constants, Readings
+from .dynamics import (
+    FREE,
+    HELD,
+    LAST_OF_GRAVITY,
+    LIMITED_BACK,
+    LIMITED_FORWARD,
+    SEATED,
+    TURNING_BACK,
+    TURNING_FORWARD,
+    Modes,
+    State,
+    contact_displacement,
+    holding_moment,
+    signed_arm,
+    spring_compression,
+)
+from .numerics import sine_versine
+from .soil import soil_kinematics
 
-SEATED = 0
-"""Gravity reading: theta_b = 0 and at rest; the weight balances the other moments."""
-TURNING_FORWARD = 1
-"""Gravity reading: theta_b > 0."""
-TURNING_BACK = 2
-"""Gravity reading: theta_b < 0."""
-LAST_OF_GRAVITY = TURNING_BACK
-"""Modes up to this one are of the gravity reading."""
-HELD = 3
-"""Printed reading, omega > 0, or come to rest: the restoring moment equals the net moment (Eq 39)."""
-LIMITED_FORWARD = 4
-"""Printed reading, omega > 0: net moment over the limit, restoring moment at it (Eq 37)."""
-LIMITED_BACK = 5
-"""Printed reading, omega > 0: net moment below minus the limit."""
-FREE = 6
-"""Printed reading, omega < 0: no restoring moment (Eq 38)."""
+CONTACT = 0
+"""Truck and boulder separate, or touch again."""
+ROTATION = 1
+"""The boulder leaves or finds its base, or (printed reading) turns back."""
+COUPLE = 2
+"""Printed reading: the net moment passes the limit of the restoring moment."""
+CORNER = 3
+"""Printed reading: the corner passes under the centre of mass, sin(gamma_N + theta_b) changes its sign."""
+ARM = 4
+"""Printed reading: the corner passes beside the centre of mass, cos(gamma_N + theta_b) changes its sign."""
+YIELD_TOP = 5
+"""The soil at the soil line reaches its ultimate resistance, or falls below it."""
+YIELD_BASE = 6
+"""The same at the base of the boulder."""
+LIMIT = 7
+"""The rotation reaches the limit."""
+
+NEVER = 1e300
+"""Gap of an event that cannot happen in the present mode."""
+UNSOUGHT = 2.0
+"""In place of the sign of a displacement beyond the ultimate resistance, where its event is not looked for."""
+TOLERANCE = 1e-3
+"""Precision with which an event is located, as a fraction of the step. Forces are continuous at a kink, so the error
+goes with its square; where they jump, Newton's method follows."""
+AT_END = 0.3
+"""An event that lies before the end of the step by less than this share of the precision is taken to be at the end."""
+CONTACT_ROUNDING = 1e-15
+"""Compressions below this share of the distance the truck would cover in a second are rounding, which would make a
+truck and a boulder that move together separate and touch again and again."""
 
 
-class Modes(NamedTuple):
-    """The switches of one step."""
+class GapFactors(NamedTuple):
+    """What the gaps of a mode are made of; all of them are constant while the mode lasts."""
 
-    turning: int
-    """One of the modes of rotation above."""
-    touching: bool
-    """Whether truck and boulder touch."""
-    corner: float
-    """Printed reading: sign of sin(gamma_N + theta_b) (Eqs 37, 39); 1 otherwise."""
+    contact: float
+    """Of the compression u: 1 where the truck touches, -1 where it has come off."""
+    rotation_0: float
+    rotation_abs_M: float
+    """Of the modulus of the net moment M."""
+    rotation_theta: float
+    rotation_omega: float
+    couple_M: float
+    """Of M."""
+    couple_abs_M: float
+    couple_limit: float
+    """Of the limit of the restoring moment; 0 where the event cannot happen."""
+    corner_0: float
+    corner_theta: float
     arm: float
-    """Printed reading: sign of -cos(gamma_N + theta_b), whose modulus Eq 37 is limited by; 1 otherwise."""
-    yielded_top: int
-    """Soil at the soil line: 0 below its ultimate resistance, 1 at it forwards, -1 backwards."""
-    yielded_base: int
-    """The same at the base of the boulder."""
+    """Of the signed arm of the weight; 0 where the event cannot happen."""
+    top: float
+    """Of the displacement at the soil line: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
+    base: float
+    """The same at the base."""
+    limit: float
+    """Limit of rotation [rad]."""
+    tolerance: float
+    """Precision with which events are located, as a fraction of the step."""
 
 
-class Switches(NamedTuple):
-    """The modes as factors of the right-hand side."""
+class Gaps(NamedTuple):
+    """Distance of the state from each event, positive while the mode holds; indexed by the constants above."""
 
-    net: float
-    """1 + a: share of the net moment of soil and truck that accelerates the boulder."""
+    contact: float
+    rotation: float
     couple: float
-    """b: sign of the couple."""
-    couple_sin: float
-    """w: coefficient of sin(theta_b) in the couple [N m]."""
-    k_contact: float
-    """Spring of the contact, k_v or 0 [N/m]."""
-    k_truck: float
-    """Spring over mass that decelerates the truck, k_v/m_v or 0 [1/s^2]."""
+    corner: float
+    arm: float
+    top: float
+    base: float
+    limit: float
 
 
 @inlined
-def switches_of(modes: Modes, readings: Readings, c: Constants) -> Switches:
-    """Factors of the right-hand side for the modes of a step (Eqs 37-39, 47)."""
-    net, couple, couple_sin = 1.0, 0.0, 0.0
+def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: bool, tolerance: float) -> GapFactors:
+    """Factors of the gaps in the present modes.
+
+    Parameters
+    ----------
+    modes
+        The present modes.
+    c
+        Constants of the design.
+    theta_stop
+        Rotation at which the simulation ends [rad].
+    locate_yield
+        Whether a step is cut where the soil at the top or the base reaches its ultimate resistance.
+    tolerance
+        Precision with which events are located, as a fraction of the step; as printed it is `TOLERANCE`.
+    """
+    rotation_0 = rotation_abs_M = rotation_theta = rotation_omega = 0.0
+    couple_M = couple_abs_M = couple_limit = arm = 0.0
+    corner_0, corner_theta = NEVER, 0.0
+    contact = 1.0 if modes.touching else -1.0
     turning = modes.turning
     if turning == SEATED:
-        net = 0.0
+        rotation_0, rotation_abs_M = c.C_cos, -1.0
     elif turning == TURNING_FORWARD:
-        couple, couple_sin = -1.0, c.C_sin
+        rotation_theta = 1.0
     elif turning == TURNING_BACK:
-        couple, couple_sin = 1.0, -c.C_sin
-    elif turning == HELD:
-        net = 1.0 - modes.corner
-    elif turning == LIMITED_FORWARD:
-        couple, couple_sin = -modes.corner * modes.arm, c.C_sin
-    elif turning == LIMITED_BACK:
-        couple, couple_sin = modes.corner * modes.arm, c.C_sin
-    k_contact = c.k_v if modes.touching else 0.0
-    k_truck = c.k_m if modes.touching or not readings.separation_released else 0.0
-    return Switches(net, couple, couple_sin, k_contact, k_truck)
+        rotation_theta = -1.0
+    else:
+        tolerance = TOLERANCE
+        corner_0, corner_theta = modes.corner * c.theta_corner, -modes.corner
+        if turning == FREE:
+            rotation_omega = -1.0
+        else:
+            rotation_omega = 1.0
+            arm, couple_limit = modes.arm, -1.0
+            if turning == HELD:
+                couple_abs_M, couple_limit = -1.0, 1.0
+            elif turning == LIMITED_FORWARD:
+                couple_M = 1.0
+            else:
+                couple_M = -1.0
+    top = float(modes.yielded_top) if locate_yield else UNSOUGHT
+    base = float(modes.yielded_base) if locate_yield else UNSOUGHT
+    return GapFactors(
+        contact=contact,
+        rotation_0=rotation_0,
+        rotation_abs_M=rotation_abs_M,
+        rotation_theta=rotation_theta,
+        rotation_omega=rotation_omega,
+        couple_M=couple_M,
+        couple_abs_M=couple_abs_M,
+        couple_limit=couple_limit,
+        corner_0=corner_0,
+        corner_theta=corner_theta,
+        arm=arm,
+        top=top,
+        base=base,
+        limit=theta_stop,
+        tolerance=tolerance,
+    )
+
+
+@inlined
+def yield_gap(displacement: float, sign: float, c: Constants) -> float:
+    """Gap of the soil's ultimate resistance where it is displaced [m], by the sign as of `GapFactors`."""
+    gap = c.x_yield - abs(displacement) if sign == 0.0 else sign * displacement - c.x_yield
+    return NEVER if sign == UNSOUGHT else gap
+
+
+@inlined
+def gaps_of(
+    A: float,
+    slope_x: float,
+    theta_b: float,
+    omega_b: float,
+    u: float,
+    M: float,
+    arm: float,
+    g: GapFactors,
+    c: Constants,
+) -> Gaps:
+    """Gaps of all events.
+
+    Parameters
+    ----------
+    A, slope_x
+        Displacement of the soil at the soil line and its decrease down to the base [m].
+    theta_b, omega_b
+        Rotation [rad] and angular velocity [rad/s].
+    u
+        Compression of the vehicle's spring [m].
+    M
+        Net moment of soil and truck [N m].
+    arm
+        Signed arm of the weight, as of `signed_arm` [N m].
+    g, c
+        Factors of the present modes, and constants of the design.
+    """
+    couple = g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm)
+    return Gaps(
+        CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v) + g.contact * u,
+        g.rotation_0 + g.rotation_abs_M * abs(M) + g.rotation_theta * theta_b + g.rotation_omega * omega_b,
+        couple if g.couple_limit != 0.0 else NEVER,
+        g.corner_0 + g.corner_theta * theta_b,
+        g.arm * arm if g.arm != 0.0 else NEVER,
+        yield_gap(A, g.top, c),
+        yield_gap(A - slope_x, g.base, c),
+        g.limit - abs(theta_b),
+    )
+
+
+@inlined
+def gaps_at(y: State, M: float, g: GapFactors, c: Constants) -> Gaps:
+    """Gaps of all events at a state with net moment M [N m]."""
+    sin, versin = sine_versine(y.theta_b)
+    u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+    return gaps_of(k.A, k.slope_x, y.theta_b, y.omega_b, u, M, signed_arm(sin, versin, c), g, c)
+
+
+SEATING_ANGLE = 1e-9
+"""A boulder that would swing through less than this [rad] about its base is taken to have come to rest."""
+
+
+@kernel
+def mode_at_rest(M: float, corner: float, sin: float, versin: float, c: Constants) -> int:
+    """Printed reading: mode of a boulder whose angular velocity has come to zero (Eqs 37-39).
+
+    Parameters
+    ----------
+    M
+        Net moment of soil and truck [N m].
+    corner
+        Sign of sin(gamma_N + theta_b).
+    sin, versin
+        sin(theta_b) and 1 - cos(theta_b).
+    c
+        Constants of the design.
+
+    Notes
+    -----
+    At omega = 0 the printed moment jumps, and the equations have no solution in the classical sense while the net
+    moment is within the limit. Integrated literally, the boulder arrives at an omega just over zero, where Eq 39
+    cancels every other moment up to the limit of Eq 37, whichever way it points. So it stays until the net moment is
+    over the limit, forwards or back. Where the corner has passed under the centre of mass, Eq 39 drives the boulder on
+    instead of holding it: it moves the way the net moment points.
+    """
+    limit = holding_moment(sin, versin, c)
+    if limit < M:
+        return LIMITED_FORWARD
+    if -limit > M or (corner < 0.0 and M < 0.0):
+        return FREE
+    return HELD
+
+
+@kernel
+def initial_modes(readings: Readings, c: Constants) -> Modes:
+    """Modes at the instant of impact.
+
+    The truck touches and the boulder is seated. Under the printed rule the first moment decides: a blow over the
+    centre of mass turns the boulder forward, and Eq 39 holds it; one below turns it back, and Eq 38 lets it go.
+    """
+    if readings.restoring_gravity:
+        turning = SEATED
+    else:
+        turning = HELD if c.h >= 0.0 else FREE
+    return Modes(turning, True, 1.0, 1.0, 0, 0)
+
+
+@inlined
+def yield_mode(displacement: float, c: Constants) -> int:
+    """Mode of the soil at a displacement [m]: 0 below its ultimate resistance, 1 at it forwards, -1 backwards."""
+    if abs(displacement) <= c.x_yield:
+        return 0
+    return 1 if displacement > 0.0 else -1
+
+
+@inlined
+def changes_counted(event: float, begun: float, modes: Modes) -> float:
+    """Return 1.0 if an event changes how a boulder rocks, else 0.0.
+
+    Parameters
+    ----------
+    event
+        The event a step was cut at.
+    begun
+        Start of the step [s]. That a boulder begins to turn in the first step does not count.
+    modes
+        Modes before; those of printed readings do not count.
+    """
+    return 1.0 if event == ROTATION and begun > 0.0 and modes.turning <= LAST_OF_GRAVITY else 0.0
+
+
+@inlined
+def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> tuple[State, Modes]:
+    """Cross an event: the modes that follow, and the state with its crossing made exact.
+
+    Parameters
+    ----------
+    event
+        Which event was reached.
+    y
+        State there.
+    M
+        Net moment of soil and truck there [N m]; asked for by the events ROTATION and COUPLE only.
+    modes
+        Modes before.
+    c
+        Constants of the design.
+    """
+    turning, touching = modes.turning, modes.touching
+    corner, arm = modes.corner, modes.arm
+    top, base = modes.yielded_top, modes.yielded_base
+    theta_b, omega_b = y.theta_b, y.omega_b
+    sin, versin = sine_versine(theta_b)
+    if event == CONTACT:
+        touching = not touching
+    elif event == ROTATION:
+        if turning == SEATED:
+            turning = TURNING_FORWARD if M > 0.0 else TURNING_BACK
+        elif turning == TURNING_FORWARD or turning == TURNING_BACK:
+            theta_b = 0.0
+            if 0.5 * c.J_eff * omega_b * omega_b < (c.C_cos - abs(M)) * SEATING_ANGLE:
+                turning, omega_b = SEATED, 0.0
+            else:
+                turning = TURNING_FORWARD if omega_b > 0.0 else TURNING_BACK
+        else:
+            omega_b = 0.0
+            turning = mode_at_rest(M, corner, sin, versin, c)
+    elif event == COUPLE:
+        if turning == HELD:
+            # Pushed back from rest it does not brake, it turns back: Eq 38 lets it go.
+            turning = LIMITED_FORWARD if M > 0.0 else LIMITED_BACK if omega_b > 0.0 else FREE
+        else:
+            turning = HELD
+    elif event == CORNER:
+        corner = -corner
+    elif event == ARM:
+        arm = -arm
+    elif event == YIELD_TOP or event == YIELD_BASE:
+        # Both, since all of the soil yields at once under a boulder that has not turned.
+        k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
+        top, base = yield_mode(k.A, c), yield_mode(k.A - k.slope_x, c)
+    return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(turning, touching, corner, arm, top, base)
+
+
+@inlined
+def needs_moment(g: GapFactors) -> bool:
+    """Whether the gap of the event ROTATION depends on the net moment."""
+    return g.rotation_abs_M != 0.0

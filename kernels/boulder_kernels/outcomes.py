@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .dense_output import DenseOutput, displacement_at, state_at, turning_point
 from .design import Constants
-from .dynamics import State, contact_displacement, contact_lever, spring_compression
-from .modes import Switches
+from .dormand_prince import DenseOutput, displacement_at, state_at, turning_point
+from .dynamics import State, Switches, contact_displacement, contact_lever, spring_compression
 from .numerics import sine_versine
 
 

@@ -1,8 +1,13 @@
-"""What the soil beside a boulder is whose width varies over its height (Eq 145), and how its weight leans (Eq 144).
+"""Boulders that are no boxes: their outline, the soil beside it (Eqs 141 to 145), and how their weight leans (Eq 144).
 
-At the ratio r = alpha/d of the depth a slice presses and brakes as one of a box, times its own width over that of the
-design. The soil is N elements or, in their limit, pieces of one soil and of linear width: a layer, cut where the
-outline has a point. They are arrays beside the constants of the design or, in lanes, numbers;
+**The outline** gives width and length over the height, piecewise linear. At a height z over the foot the boulder is
+w(z) wide, and reaches near(z) towards the vehicle and far(z) away from it, counted from the middle of its foot. Volume,
+centre, moment of inertia and the soil beside it are integrals of polynomials over the pieces between the points of the
+outline. Gauss's rule of three points is exact up to the fifth degree, which none of them exceeds.
+
+**The soil.** At the ratio r = alpha/d of the depth a slice presses and brakes as one of a box, times its own width over
+that of the design. The soil is N elements or, in their limit, pieces of one soil and of linear width: a layer, cut
+where the outline has a point. They are arrays beside the constants of the design or, in lanes, numbers;
 `boulder_kernels.outlined_soil` works out what they press.
 
 Beside the width all keep what the weight of a boulder adds whose centre does not lie over the middle of its foot, the
@@ -12,6 +17,7 @@ moment -D cos(theta) (Eq 144): the restoring couple of a box has equal arms eith
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -36,7 +42,80 @@ from .layered import (
     layer_of,
     nothing_lumped,
 )
-from .outline import HEIGHT, NODES, WEIGHTS, WIDTH, at_height, body_of_outline, on_piece, piece_at, slope_of
+
+HEIGHT, WIDTH, NEAR, FAR = range(4)
+"""Columns of an outline, shape (P, 4), from the foot to the top: height over the foot, ascending from 0 to H, width,
+and reach towards the vehicle and away from it [m]. Between its points it is linear."""
+
+NODES = (0.5 - 0.5 * math.sqrt(0.6), 0.5, 0.5 + 0.5 * math.sqrt(0.6))
+WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+"""Gauss's rule of three points on 0 ... 1."""
+
+
+@exact_inlined
+def piece_at(outline: np.ndarray, z: float) -> int:
+    """Return the number of the piece of an outline that a height [m] lies in, at a point of the outline the lower."""
+    i = 0
+    while i < len(outline) - 2 and outline[i + 1, HEIGHT] < z:
+        i += 1
+    return i
+
+
+@exact_inlined
+def slope_of(outline: np.ndarray, i: int, column: int) -> float:
+    """Return by how much a column of an outline grows with the height on its piece i [-]."""
+    return (outline[i + 1, column] - outline[i, column]) / (outline[i + 1, HEIGHT] - outline[i, HEIGHT])
+
+
+@exact_inlined
+def on_piece(outline: np.ndarray, i: int, column: int, z: float) -> float:
+    """Return a column of an outline at a height z [m] on its piece i [m]."""
+    return outline[i, column] + slope_of(outline, i, column) * (z - outline[i, HEIGHT])
+
+
+@exact_inlined
+def at_height(outline: np.ndarray, column: int, z: float) -> float:
+    """Return a column of an outline at a height z [m]; beyond its top that at the top [m]."""
+    z = min(z, outline[-1, HEIGHT])
+    return on_piece(outline, piece_at(outline, z), column, z)
+
+
+@exact_kernel
+def body_of_outline(design: Design, outline: np.ndarray) -> Body:
+    """Mass, centre, moment of inertia and reach of a boulder with an outline (Eqs 141 to 144).
+
+    Parameters
+    ----------
+    design
+        The design, SI; its density is that of the volume within the outline.
+    outline
+        The outline, shape (P, 4).
+    """
+    d = design.d
+    volume = x = z_c = xx = zz = line = 0.0
+    for i in range(len(outline) - 1):
+        low, high = outline[i, HEIGHT], outline[i + 1, HEIGHT]
+        buried = min(high, d)
+        for g in range(3):
+            z = low + NODES[g] * (high - low)
+            w, near, far = (on_piece(outline, i, WIDTH, z), on_piece(outline, i, NEAR, z), on_piece(outline, i, FAR, z))
+            slice_ = WEIGHTS[g] * (high - low) * w
+            area = slice_ * (near + far)
+            volume += area
+            z_c += area * z
+            zz += area * z * z
+            x += slice_ * 0.5 * (far * far - near * near)
+            xx += slice_ * (far * far * far + near * near * near) / 3.0
+            if low < buried:
+                z = low + NODES[g] * (buried - low)
+                line += WEIGHTS[g] * (buried - low) * (d - z) * on_piece(outline, i, FAR, z)
+    x, z_c, line = x / volume, z_c / volume, line / (0.5 * d * d)
+    m_b = design.rho_b * volume
+    own = design.rho_b * (xx + zz) - m_b * (x * x + z_c * z_c)
+    struck = at_height(outline, NEAR, d + design.e)
+    foot_near, foot_far = outline[0, NEAR], outline[0, FAR]
+    half = 0.5 * (foot_near + foot_far)
+    return Body(m_b, own, struck + x, z_c, struck + line, half, 0.5 * (foot_far - foot_near) - x)
 
 
 class OutlinedElements(NamedTuple):
@@ -46,7 +125,7 @@ class OutlinedElements(NamedTuple):
     lean: np.ndarray
     """D over the depth of embedment [N], shape (1,)."""
     outline: np.ndarray
-    """Outline of the boulder, see `boulder_kernels.outline`."""
+    """Outline of the boulder, see `boulder_kernels.outlined`."""
 
 
 class OutlinedPieces(NamedTuple):
@@ -354,60 +433,6 @@ def _body_beside(design: Any, soil: Any) -> Callable[..., Body]:
 def lean_with(body: Body, design: Design, gravity: bool) -> float:
     """Return D over the depth [N] (Eq 144), where the restoring moment is the couple of the weight, or else 0."""
     return body.m_b * G * body.lean / design.d if gravity else 0.0
-
-
-def keep_lean(body: Body, design: Design, gravity: bool, soil: Any) -> None:
-    """Keep what the weight adds beside the soil."""
-    if is_outlined(soil):
-        soil.lean[0] = lean_with(body, design, gravity)
-
-
-@overload(keep_lean)
-def _keep_lean(body: Any, design: Any, gravity: Any, soil: Any) -> Callable[..., None]:
-    if not is_outlined(soil):
-        return lambda body, design, gravity, soil: None
-
-    def keep(body: Body, design: Design, gravity: bool, soil: Any) -> None:
-        """Keep it."""
-        soil.lean[0] = lean_with(body, design, gravity)
-
-    return keep
-
-
-def _soil_in(c: Any) -> Any:
-    """Return the record of the soil of constants or of their Numba type; None of uniform soil."""
-    if hasattr(c, "instance_class"):
-        names = c.instance_class._fields
-        return c[names.index("soil")] if "soil" in names else None
-    return getattr(c, "soil", None)
-
-
-LIFT = "c.C_cos * abs(sin) + c.C_sin * versin"
-
-
-def lift_of(sin: float, versin: float, c: Constants) -> float:
-    """Return the energy of the weight, lifted by a rotation with this sine and versine [J] (Eqs 37-39, 144)."""
-    lift = c.C_cos * abs(sin) + c.C_sin * versin
-    soil = _soil_in(c)
-    return float(lift + soil.lean[0] * c.d * sin if is_outlined(soil) else lift)
-
-
-@overload(lift_of)
-def _lift_of(sin: Any, versin: Any, c: Any) -> Callable[..., float]:
-    more = " + c.soil.lean[0] * c.d * sin" if is_outlined(_soil_in(c)) else ""
-    return function_of(f"def lift_of(sin, versin, c):\n return {LIFT}{more}")
-
-
-def least_couple(c: Constants) -> float:
-    """Return the lesser of the moments of the weight about the ends of the foot [N m]; they differ by 2 D (Eq 144)."""
-    soil = _soil_in(c)
-    return float(c.C_cos - abs(soil.lean[0]) * c.d if is_outlined(soil) else c.C_cos)
-
-
-@overload(least_couple)
-def _least_couple(c: Any) -> Callable[..., float]:
-    less = " - abs(c.soil.lean[0]) * c.d" if is_outlined(_soil_in(c)) else ""
-    return function_of(f"def least_couple(c):\n return c.C_cos{less}")
 
 
 def empty_outlined(pieces: int, elements: int, outline: np.ndarray) -> OutlinedPieces | OutlinedElements:

@@ -18,8 +18,7 @@ import numpy as np
 
 from ._jit import function_of, inlined, kernel, overload
 from .layered_soil import potential_of_elements, power_of_elements, reaction_of_elements
-from .outline import NODES, WEIGHTS
-from .outlined import FewPieces, OutlinedElements, OutlinedPieces, Piece, TaperedSoil
+from .outlined import NODES, WEIGHTS, FewPieces, OutlinedElements, OutlinedPieces, Piece, TaperedSoil
 from .soil import TINY, Kinematics, Potential, Reaction
 
 

@@ -25,9 +25,9 @@ import numpy as np
 
 from ._jit import inlined, kernel, overload
 from .design import Constants
-from .flat import WIDTH, add, field, partial_sums, total
 from .layered import SoilElements
 from .layered_soil import power_of_elements
+from .numerics import WIDTH, add, field, partial_sums, total
 from .soil import Kinematics, Potential, Reaction
 
 ELASTIC, PLASTIC, PLASTIC_WITH_GAP = range(3)

@@ -15,20 +15,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .dense_output import displacement_at, slope_at, turning_point
 from .design import Constants, G, constants_of, corrected, design_in, is_computable
-from .dormand_prince import STAGES
-from .flat import field, put
+from .dormand_prince import STAGES, displacement_at, slope_at, turning_point
 from .heave import (
+    EACH,
+    PARTS,
     PIECES,
+    SUMS,
     Base,
+    Forces,
     Form,
     HeaveConstants,
     heave_constants,
-    kinetic_energy,
-    potential_energy,
+    inertia_at,
     prepare,
+    seated_sine,
+    soil_element,
     strip_depth,
+    summed,
 )
 from .heave_steps import (
     AXES,
@@ -47,8 +51,9 @@ from .heave_steps import (
     track_of,
     write_rate,
 )
-from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
+from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 from .outcomes import Status
+from .soil import soil_kinematics
 
 READINGS = corrected()
 """The only readings that there are second opinions of."""
@@ -113,6 +118,60 @@ class HeaveOutcome(NamedTuple):
 def no_heave_record() -> HeaveRecord:
     """Return a record that keeps nothing."""
     return HeaveRecord(np.empty(0), np.empty((0, 2 * AXES)), np.empty(0))
+
+
+@kernel
+def kinetic_energy(v_b: float, theta_b: float, omega_b: float, w_b: float, f: HeaveConstants) -> float:
+    """Kinetic energy of boulder and lumped soil [J] (Eq 131)."""
+    sin, versin = sine_versine(theta_b)
+    i = inertia_at(sin, 1.0 - versin, f)
+    rise = f.heave * w_b
+    turning = 0.5 * i.A * omega_b * omega_b - f.heave * f.m_b * i.X * omega_b * rise
+    return 0.5 * f.c.m_eff * v_b * v_b + 0.5 * f.m_b * rise * rise + turning
+
+
+@kernel
+def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f: HeaveConstants) -> Forces:
+    """Potential energy of soil, base and weight, and its slopes (Eq 136).
+
+    Parameters
+    ----------
+    x_b, theta_b, y_b
+        Displacement and rise of the common centre of mass [m], rotation [rad].
+    work
+        The workspace; where a strip is pressed beyond what it can bear, the work to press it there is counted.
+    f
+        Constants of the design.
+
+    Returns
+    -------
+    Forces
+        Minus the slopes by x_b and y_b as ``Q_x`` and ``Q_y``, zero as ``Q_theta``, and the energy [J] as ``u``.
+    """
+    sin, versin = sine_versine(theta_b)
+    k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
+    for j in range(PARTS):
+        energy = along_x = lifting = 0.0
+        for part in range(EACH):
+            piece = j + part * PARTS
+            e = soil_element(work, piece, y_b, sin, versin, k, f)
+            depth = max(strip_depth(work, piece, y_b, sin, versin, f), 0.0)
+            elastic = min(f.k_strip * depth, f.q_strip)
+            energy += e.energy + f.heave * elastic * (depth - elastic * (0.5 / f.k_strip))
+            along_x += e.spring
+            lifting += e.lift + f.heave * elastic
+        put(work, SUMS, j, energy)
+        put(work, SUMS + PARTS, j, along_x)
+        put(work, SUMS + 2 * PARTS, j, lifting)
+    V, Q_x, Q_y = summed(work, 0), summed(work, 1), summed(work, 2)
+    weight = f.m_b * G
+    if f.heave > 0.0:
+        V += weight * (y_b - f.a_b * sin - f.b_b * versin)
+    else:
+        seated = seated_sine(f)
+        over = max(abs(sin) - seated, 0.0)
+        V += weight * (0.5 * f.L * ((abs(sin) - over) ** 2 / (2.0 * seated) + over) - (f.b_b + f.c.c_y) * versin)
+    return Forces(Q_x, Q_y - f.heave * weight, 0.0, V)
 
 
 @kernel

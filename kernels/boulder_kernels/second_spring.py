@@ -24,14 +24,14 @@ import numpy as np
 
 from ._jit import exact_kernel, function_of, kernel, overload
 from .after_step import Kept
-from .dense_output import DenseOutput, state_at
 from .design import Constants, Design
-from .modes import Switches
+from .dormand_prince import DenseOutput, state_at
+from .dynamics import Switches
 from .numerics import ITERATIONS, Bracket, narrowed, next_guess
 from .outcomes import Compression, Maxima, compression_at, highest
 
 STIFFENS = 8
-"""Event: the crush reaches the second spring. Numbered after those of `boulder_kernels.gaps`."""
+"""Event: the crush reaches the second spring. Numbered after those of `boulder_kernels.modes`."""
 PRECISION = 1e-12
 """Precision of the instant as a fraction of the step. The offset u_0 stays for good, so its error is of first order
 in that of the instant."""

@@ -30,10 +30,9 @@ from typing import Any
 
 from ._jit import inlined, kernel, unless_none
 from .design import Constants, Readings
-from .dynamics import State, contact_displacement, spring_compression
+from .dynamics import State, contact_displacement, least_couple, lift_of, spring_compression
 from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
 from .outcomes import Maxima
-from .outlined import least_couple, lift_of
 from .plastic import Memory, memory_of
 from .soil import Potential, soil_kinematics
 from .soil_laws import soil_potential

@@ -25,7 +25,7 @@ import numpy as np
 
 from ._jit import inlined, kernel
 from .design import Constants
-from .flat import WIDTH, add, partial_sums, total
+from .numerics import WIDTH, add, partial_sums, total
 
 TINY = 1e-30
 """Stands in for a slope of zero, so that a break point at infinity is clamped and not 0/0."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import exact_inlined, function_of, kernel, overload, unless_none
-from .design import Constants, Design, Readings, constants_of, constants_with
+from .design import Body, Constants, Design, Readings, constants_of, constants_with
 from .layered import (
     FewLayers,
     LayeredConstants,
@@ -44,7 +44,8 @@ from .outlined import (
     empty_outlined,
     fill_outlined_elements,
     fill_outlined_pieces,
-    keep_lean,
+    is_outlined,
+    lean_with,
 )
 from .outlined_soil import (
     potential_of_outlined_elements,
@@ -188,6 +189,24 @@ def _with_records(c: Any, soil: Any, memory: Any) -> Callable[..., Any]:
     else:
         source, record = f"def with_records(c, soil, memory):\n return Record({values}, soil)", LayeredConstants
     return function_of(source, Record=record)
+
+
+def keep_lean(body: Body, design: Design, gravity: bool, soil: Any) -> None:
+    """Keep what the weight adds beside the soil."""
+    if is_outlined(soil):
+        soil.lean[0] = lean_with(body, design, gravity)
+
+
+@overload(keep_lean)
+def _keep_lean(body: Any, design: Any, gravity: Any, soil: Any) -> Callable[..., None]:
+    if not is_outlined(soil):
+        return lambda body, design, gravity, soil: None
+
+    def keep(body: Body, design: Design, gravity: bool, soil: Any) -> None:
+        """Keep it."""
+        soil.lean[0] = lean_with(body, design, gravity)
+
+    return keep
 
 
 @exact_inlined

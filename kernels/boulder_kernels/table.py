@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import array_kernel, kernel, plain, unless_none
+from .control import STEP_RATIO, Control
 from .design import DesignTable, Readings, design_at, design_in
 from .dynamics import State
 from .error_estimates import (
@@ -18,19 +19,8 @@ from .error_estimates import (
     estimate_errors,
     step_errors,
 )
-from .impact import (
-    STEP_RATIO,
-    Control,
-    Problem,
-    Record,
-    failed,
-    misses,
-    no_record,
-    simulate,
-    simulate_motion,
-)
+from .impact import Problem, failed, misses, simulate, simulate_last_resort, simulate_motion
 from .lanes import simulate_lanes
-from .last_resort import simulate_last_resort
 from .layered import LAYERED, PRESSURE, OutlinedTable, filled_layers, lanes_count
 from .outcomes import (
     COARSER,
@@ -52,6 +42,7 @@ from .plastic import ELASTIC, LAST, PLASTIC_WITH_GAP, SWING, empty_memory, memor
 from .second_spring import SecondSpring, SecondSprings
 from .settling import proof_is_possible
 from .soil_laws import SoilProfile, constants_in, empty_soil, profile_of
+from .time_history import Record, no_record
 from .unloading import rest_of
 from .workspace import LayeredLanes, OutlinedLanes, TaperedLanes
 
@@ -111,7 +102,7 @@ def run_last_resort(
     record: Record,
     out: np.ndarray,
 ) -> None:
-    """The same for designs that need more steps than are allowed, see `boulder_kernels.last_resort`."""
+    """The same for designs that need more steps than are allowed, see `boulder_kernels.impact.simulate_last_resort`."""
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
         problem = Problem(design, None, second_spring_in(row, springs))
@@ -137,7 +128,7 @@ def simulate_rows(
     layers
         Layers of every design, shape (n, M, 6), see `boulder_kernels.layered`; None for uniform soils.
     outlines
-        Outlines of the boulders, shape (n, P, 4), see `boulder_kernels.outline`, of designs in layers; None for boxes.
+        Outlines of the boulders, shape (n, P, 4), see `boulder_kernels.outlined`, of designs in layers; None for boxes.
     soil
         Elements or layers that every design fills anew; None for uniform soils.
     springs

@@ -20,9 +20,8 @@ import math
 from typing import Any, NamedTuple
 
 from ._jit import inlined, kernel, unless_none
-from .after_step import RUNNING, Decided, Ending, rate_of
-from .dynamics import Acceleration, State
-from .modes import Switches
+from .after_step import RUNNING, Decided, Ending
+from .dynamics import Acceleration, State, Switches, rate_of
 from .numerics import sine_versine
 from .outcomes import Status, highest
 from .plastic import LAST, PEAK, SWING, WORK, Memory, push, slider_energy

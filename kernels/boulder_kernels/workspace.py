@@ -18,14 +18,12 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 
 from ._jit import function_of, overload
-from .dense_output import Track
 from .design import Body, Constants, Design, Readings, constants_of
-from .dynamics import Acceleration, State
-from .flat import field, put
-from .gaps import GapFactors, Gaps
+from .dormand_prince import Track
+from .dynamics import Acceleration, Modes, State, Switches
 from .layered import COUNTS, FewLayers, GivenLayer, Layer, LayeredConstants, SoilSums, constants_of_few
-from .modes import Modes, Switches
-from .numerics import Bracket
+from .modes import GapFactors, Gaps
+from .numerics import Bracket, field, put
 from .outcomes import Compression, Maxima
 from .outlined import FewPieces, GivenPiece, Lean, Piece, TaperedPiece, TaperedSoil, constants_beside
 

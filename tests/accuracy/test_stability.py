@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from boulder_kernels import SIMULATED, Record, Status, constants_of, simulate_design, simulate_table
+from boulder_kernels.control import ACCEPTED, Rates, first_step, rates_of, refusal, stable_step
 from boulder_kernels.design import design_at
-from boulder_kernels.dynamics import acceleration
-from boulder_kernels.impact import first_step
-from boulder_kernels.modes import Modes, switches_of
-from boulder_kernels.stability import ACCEPTED, Rates, rates_of, refusal, stable_step
+from boulder_kernels.dynamics import Modes, acceleration, switches_of
 from boulder_sweep.judge.accuracy import STEPS
 from docs.studies.coverage import random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows

@@ -16,7 +16,7 @@ class Mutation(NamedTuple):
 
 
 _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/soil.py"
-_DYNAMICS, _MODES = "kernels/boulder_kernels/dynamics.py", "kernels/boulder_kernels/modes.py"
+_DYNAMICS = "kernels/boulder_kernels/dynamics.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
 _RESISTANCE = "boulder_sweep/soils.py"
@@ -25,9 +25,7 @@ _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered"
 
 _PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
 _HEAVE, _STEPS, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "heave_steps", "second_opinion"))
-_OUTLINE, _BESIDE, _OUTLINED = (
-    f"kernels/boulder_kernels/{name}.py" for name in ("outline", "outlined", "outlined_soil")
-)
+_BESIDE, _OUTLINED = (f"kernels/boulder_kernels/{name}.py" for name in ("outlined", "outlined_soil"))
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return (1.0 + half) / (1.0 - half)", "return (1.0 - half) / (1.0 + half)"),
@@ -67,15 +65,15 @@ MUTATIONS = (
     Mutation(
         (37,), _DYNAMICS, "c.C_cos - c.C_cos * versin + c.C_sin * sin", "c.C_cos - c.C_cos * versin - c.C_sin * sin"
     ),
-    Mutation((38,), _MODES, "net, couple, couple_sin = 1.0, 0.0, 0.0", "net, couple, couple_sin = 0.0, 0.0, 0.0"),
-    Mutation((39,), _MODES, "couple, couple_sin = -modes.corner", "couple, couple_sin = modes.corner"),
-    Mutation((39,), _MODES, "net = 1.0 - modes.corner", "net = 1.0 + modes.corner"),
+    Mutation((38,), _DYNAMICS, "net, couple, couple_sin = 1.0, 0.0, 0.0", "net, couple, couple_sin = 0.0, 0.0, 0.0"),
+    Mutation((39,), _DYNAMICS, "couple, couple_sin = -modes.corner", "couple, couple_sin = modes.corner"),
+    Mutation((39,), _DYNAMICS, "net = 1.0 - modes.corner", "net = 1.0 + modes.corner"),
     Mutation((37, 39), _DYNAMICS, "switches.couple_sin * sin", "switches.couple_sin * sin * sin"),
     Mutation((40, 45), _DYNAMICS, "c.tau_v * (c.v_0 - v_v)", "c.tau_v * c.v_0"),
     Mutation((41, 46, 47), _DYNAMICS, "F_v = s.k_contact * u", "F_v = s.k_truck * u"),
     Mutation((45, 48), _DYNAMICS, "return c.h - c.h * versin + c.g_x * sin", "return c.h - c.h * versin - c.g_x * sin"),
     Mutation(
-        (47,), _MODES, "if modes.touching or not readings.separation_released else 0.0", "if modes.touching else 0.0"
+        (47,), _DYNAMICS, "if modes.touching or not readings.separation_released else 0.0", "if modes.touching else 0.0"
     ),
     Mutation((49,), _WALL, "x = m / c * (v_0 - v) + v_0 * odd", "x = m / c * (v_0 - v)"),
     Mutation((50, 51), _WALL, "/ (2.0 * self.damper_N_s_m)", "/ self.damper_N_s_m"),
@@ -152,12 +150,15 @@ MUTATIONS = (
     Mutation((135,), _HEAVE, "a = f.a_b + 0.5 * f.L * min", "a = f.a_b - 0.5 * f.L * min"),
     Mutation((135,), _HEAVE, "return 6.0 * f.s_0 / f.L", "return 2.0 * f.s_0 / f.L"),
     Mutation(
-        (136,), _HEAVE, "elastic * (depth - elastic * (0.5 / f.k_strip))", "elastic * (depth - elastic / f.k_strip)"
+        (136,), _OPINION, "elastic * (depth - elastic * (0.5 / f.k_strip))", "elastic * (depth - elastic / f.k_strip)"
     ),
     Mutation(
-        (136,), _HEAVE, "weight * (y_b - f.a_b * sin - f.b_b * versin)", "weight * (y_b - f.a_b * sin + f.b_b * versin)"
+        (136,),
+        _OPINION,
+        "weight * (y_b - f.a_b * sin - f.b_b * versin)",
+        "weight * (y_b - f.a_b * sin + f.b_b * versin)",
     ),
-    Mutation((136,), _HEAVE, "- (f.b_b + f.c.c_y) * versin)", "- f.b_b * versin)"),
+    Mutation((136,), _OPINION, "- (f.b_b + f.c.c_y) * versin)", "- f.b_b * versin)"),
     Mutation((137,), _OPINION, "least - CAUTION * abs(least), False", "least + 2.0 * abs(least), False"),
     Mutation((137,), _OPINION, "bottom = min(bottom, ", "bottom = max(-0.5 * f.c.d, "),
     Mutation(
@@ -167,16 +168,16 @@ MUTATIONS = (
         "control.stop and field(work, START, 7) <= 9.0",
     ),
     Mutation((137,), _OPINION, "f) + (crush_energy(u, c) if touching else 0.0)", "f)"),
-    Mutation((141,), _OUTLINE, "m_b = design.rho_b * volume", "m_b = 1.01 * design.rho_b * volume"),
-    Mutation((141,), _OUTLINE, "area = slice_ * (near + far)", "area = slice_ * 2.0 * near"),
-    Mutation((142,), _OUTLINE, "0.5 * (far * far - near * near)", "0.5 * (far * far + near * near)"),
-    Mutation((142,), _OUTLINE, "z_c += area * z\n", "z_c += slice_ * z\n"),
-    Mutation((143,), _OUTLINE, "- m_b * (x * x + z_c * z_c)", "- m_b * z_c * z_c"),
+    Mutation((141,), _BESIDE, "m_b = design.rho_b * volume", "m_b = 1.01 * design.rho_b * volume"),
+    Mutation((141,), _BESIDE, "area = slice_ * (near + far)", "area = slice_ * 2.0 * near"),
+    Mutation((142,), _BESIDE, "0.5 * (far * far - near * near)", "0.5 * (far * far + near * near)"),
+    Mutation((142,), _BESIDE, "z_c += area * z\n", "z_c += slice_ * z\n"),
+    Mutation((143,), _BESIDE, "- m_b * (x * x + z_c * z_c)", "- m_b * z_c * z_c"),
     Mutation(
-        (143,), _OUTLINE, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
+        (143,), _BESIDE, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
     ),
-    Mutation((144,), _BESIDE, "lift + soil.lean[0] * c.d * sin if", "lift - soil.lean[0] * c.d * sin if"),
-    Mutation((144,), _BESIDE, "c.C_cos - abs(soil.lean[0]) * c.d if", "c.C_cos if"),
+    Mutation((144,), _DYNAMICS, "lift + soil.lean[0] * c.d * sin if", "lift - soil.lean[0] * c.d * sin if"),
+    Mutation((144,), _DYNAMICS, "c.C_cos - abs(soil.lean[0]) * c.d if", "c.C_cos if"),
     Mutation((144,), _OUTLINED, "reaction.M - lean[0] * k.lever_d", "reaction.M + lean[0] * k.lever_d"),
     Mutation(
         (145,),

@@ -8,13 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.after_step import enter_modes, keep_step, rate_of
-from boulder_kernels.dense_output import dense_output
-from boulder_kernels.dormand_prince import step
-from boulder_kernels.dynamics import State
-from boulder_kernels.events import SHORTEN, change_mode
-from boulder_kernels.gaps import TOLERANCE
-from boulder_kernels.modes import Modes
+from boulder_kernels.after_step import enter_modes, keep_step
+from boulder_kernels.dormand_prince import dense_output, step
+from boulder_kernels.dynamics import Modes, State, rate_of
+from boulder_kernels.events import SHORTEN
+from boulder_kernels.modes import TOLERANCE, change_mode
 from boulder_kernels.outcomes import compression_at, no_maxima
 
 from .samples import compression

@@ -14,7 +14,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import _ahead, _cache
-from boulder_kernels._arguments import UnsuitableError, flatten
+from boulder_kernels._ahead import UnsuitableError, flatten
 from boulder_kernels._numba import call_of, examples
 from boulder_kernels.design import constants_of, is_computable
 from boulder_kernels.error_estimates import estimate_errors

@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels.after_step import rate_of
-from boulder_kernels.dense_output import dense_output, displacement_at, slope_at, state_at, track
 from boulder_kernels.design import constants_of
-from boulder_kernels.dormand_prince import step
-from boulder_kernels.dynamics import State
-from boulder_kernels.modes import TURNING_FORWARD, Modes, switches_of
+from boulder_kernels.dormand_prince import dense_output, displacement_at, slope_at, state_at, step, track
+from boulder_kernels.dynamics import TURNING_FORWARD, Modes, State, rate_of, switches_of
 from tests import oracle
 
 from .samples import design_of

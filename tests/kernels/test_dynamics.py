@@ -6,14 +6,6 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import (
-    State,
-    acceleration,
-    couple_moment,
-    holding_moment,
-    signed_arm,
-)
-from boulder_kernels.events import initial_modes, mode_at_rest
-from boulder_kernels.modes import (
     FREE,
     HELD,
     LIMITED_BACK,
@@ -22,8 +14,14 @@ from boulder_kernels.modes import (
     TURNING_BACK,
     TURNING_FORWARD,
     Modes,
+    State,
+    acceleration,
+    couple_moment,
+    holding_moment,
+    signed_arm,
     switches_of,
 )
+from boulder_kernels.modes import initial_modes, mode_at_rest
 from tests import oracle
 from tests.oracle.dynamics import Contact, Rotation, loads, rate
 from tests.oracle.events import first_modes, rest_modes

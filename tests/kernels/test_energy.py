@@ -12,9 +12,8 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State, signed_arm
-from boulder_kernels.energy import exchange_rates, stored_energies
-from boulder_kernels.modes import FREE, TURNING_BACK, TURNING_FORWARD, Modes, switches_of
+from boulder_kernels.dynamics import FREE, TURNING_BACK, TURNING_FORWARD, Modes, State, signed_arm, switches_of
+from boulder_kernels.time_history import exchange_rates, stored_energies
 from tests import oracle
 from tests.oracle.dynamics import Rotation, loads
 from tests.oracle.energy import ledger, path_rates

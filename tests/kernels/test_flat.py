@@ -13,9 +13,9 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels import _cache
 from boulder_kernels.design import constants_of
-from boulder_kernels.flat import WIDTH
 from boulder_kernels.layered import uniform_layers
 from boulder_kernels.layered_soil import reaction_of_elements
+from boulder_kernels.numerics import WIDTH
 from boulder_kernels.soil import Kinematics, element_sums
 from boulder_kernels.soil_laws import fill_soil, profile_of
 

@@ -19,10 +19,9 @@ from boulder_kernels.heave import (
     accelerations,
     forces,
     heave_constants,
-    kinetic_energy,
-    potential_energy,
     prepare,
 )
+from boulder_kernels.second_opinion import kinetic_energy, potential_energy
 from tests import oracle
 from tests.oracle.heave import Base as OracleBase
 from tests.oracle.heave import Body, loads

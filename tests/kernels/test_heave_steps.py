@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels.dense_output import Track
 from boulder_kernels.design import G, constants_of
+from boulder_kernels.dormand_prince import Track
 from boulder_kernels.heave import PIECES, SETS, Base, Form, heave_constants, prepare
 from boulder_kernels.heave_steps import START, WORKSPACE, Tracks, foot_rises, press_in
 from tests import oracle

@@ -12,7 +12,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels._jit import compiler
 from boulder_kernels.design import constants_of, design_in
-from boulder_kernels.heave import ROOM, Base, Form, forces, heave_constants, potential_energy, prepare
+from boulder_kernels.heave import ROOM, Base, Form, forces, heave_constants, prepare
 from boulder_kernels.lane_events import begin_searches, find_events, find_limits, keep_steps, search_on, start_steps
 from boulder_kernels.lane_steps import (
     attempt_steps,
@@ -22,6 +22,7 @@ from boulder_kernels.lane_steps import (
     take_over_steps,
 )
 from boulder_kernels.lanes import run_lanes
+from boulder_kernels.second_opinion import potential_energy
 from boulder_kernels.workspace import LANES, SIZE, SOILS, WHOLE, LayeredLanes, OutlinedLanes, TaperedLanes
 
 from .samples import control, random_designs, table_of

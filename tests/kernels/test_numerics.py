@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
+from boulder_kernels.control import rates_of, stable_step
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State, acceleration
-from boulder_kernels.modes import FREE, SEATED, Modes, Switches, switches_of
+from boulder_kernels.dynamics import FREE, SEATED, Modes, State, Switches, acceleration, switches_of
 from boulder_kernels.numerics import ITERATIONS, Bracket, direction, half_tangent, narrowed, next_guess, sine_versine
-from boulder_kernels.stability import rates_of, stable_step
 from tests import oracle
 
 from .samples import design_of, random_designs

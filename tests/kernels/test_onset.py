@@ -5,18 +5,16 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
-from boulder_kernels.after_step import RUNNING, enter_modes, initial_state, passes, rate_of
+from boulder_kernels.after_step import RUNNING, enter_modes, initial_state, passes
+from boulder_kernels.control import BEHIND, first_length, onset_of
 from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
-from boulder_kernels.dynamics import Acceleration
-from boulder_kernels.events import AT_END, initial_modes
-from boulder_kernels.flat import field
-from boulder_kernels.gaps import TOLERANCE
+from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration, rate_of
 from boulder_kernels.lane_steps import start_designs
 from boulder_kernels.lanes import start_again
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
-from boulder_kernels.modes import SEATED, TURNING_FORWARD
-from boulder_kernels.onset import BEHIND, first_length, onset_of
+from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
+from boulder_kernels.numerics import field
 from boulder_kernels.plastic import empty_memory
 from boulder_kernels.workspace import (
     CONSTANTS,

@@ -6,10 +6,7 @@ from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State, acceleration, signed_arm
-from boulder_kernels.gaps import CONTACT, CORNER, COUPLE, ROTATION, TOLERANCE
-from boulder_kernels.impact import Problem, no_record, simulate
-from boulder_kernels.modes import (
+from boulder_kernels.dynamics import (
     FREE,
     HELD,
     LIMITED_BACK,
@@ -17,9 +14,15 @@ from boulder_kernels.modes import (
     SEATED,
     TURNING_FORWARD,
     Modes,
+    State,
+    acceleration,
+    signed_arm,
     switches_of,
 )
+from boulder_kernels.impact import Problem, simulate
+from boulder_kernels.modes import CONTACT, CORNER, COUPLE, ROTATION, TOLERANCE
 from boulder_kernels.table import simulate_once
+from boulder_kernels.time_history import no_record
 from tests import oracle
 from tests.oracle.dynamics import motion_of
 

@@ -8,10 +8,9 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels import SecondSpring, SecondSprings, Status
 from boulder_kernels.after_step import Kept
+from boulder_kernels.control import rates_of, stable_step
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State
-from boulder_kernels.energy import stored_energies
-from boulder_kernels.modes import TURNING_FORWARD, Modes, switches_of
+from boulder_kernels.dynamics import TURNING_FORWARD, Modes, State, switches_of
 from boulder_kernels.outcomes import compression_at, no_maxima
 from boulder_kernels.second_spring import (
     is_second_spring,
@@ -22,7 +21,7 @@ from boulder_kernels.second_spring import (
     stiffest,
 )
 from boulder_kernels.settling import barrier_energy
-from boulder_kernels.stability import rates_of, stable_step
+from boulder_kernels.time_history import stored_energies
 from tests import oracle
 from tests.oracle.records import recorded_impact
 from tests.oracle.summary import Summary

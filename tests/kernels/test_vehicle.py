@@ -9,13 +9,15 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import (
+    TURNING_FORWARD,
+    Modes,
     State,
     acceleration,
     contact_displacement,
     contact_lever,
     spring_compression,
+    switches_of,
 )
-from boulder_kernels.modes import TURNING_FORWARD, Modes, switches_of
 from tests import oracle
 from tests.oracle.constants import impact_lever
 from tests.oracle.vehicle import crush_force, jerk

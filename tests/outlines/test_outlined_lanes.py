@@ -10,8 +10,9 @@ import boulder_kernels as bk
 from boulder_kernels import OutcomeTable
 from boulder_kernels._jit import plain
 from boulder_kernels.design import Body, Design
+from boulder_kernels.dynamics import least_couple, lift_of
 from boulder_kernels.layered import COUNTS, OutlinedTable, uniform_layers
-from boulder_kernels.outlined import GivenPiece, constants_beside, given_beside, least_couple, lift_of
+from boulder_kernels.outlined import GivenPiece, constants_beside, given_beside
 from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
 from boulder_kernels.table import is_layered, is_paired, simulate_once, simulate_table, some_rows
 from boulder_kernels.workspace import LANES

@@ -5,9 +5,9 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import G, body_of_box, constants_of
+from boulder_kernels.dynamics import least_couple, lift_of
 from boulder_kernels.layered_soil import reaction_of_layers
-from boulder_kernels.outline import FAR, NEAR, WIDTH, at_height, body_of_outline
-from boulder_kernels.outlined import least_couple, lift_of
+from boulder_kernels.outlined import FAR, NEAR, WIDTH, at_height, body_of_outline
 from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
 from boulder_kernels.table import simulate_table
 from tests import oracle
