@@ -18,15 +18,16 @@ BITS = """
 import hashlib
 import numpy as np
 from boulder_sweep import soils
-from boulder_sweep.settings.model import Ground
+from boulder_sweep.settings.model import RESISTANCES, Ground
 from boulder_sweep.settings.notes import api_curve
 from tests.kernels.samples import random_designs, table_of
 one = table_of(random_designs(1, seed=11))
 table = one._replace(**{name: np.repeat(column, 20_000) for name, column in one._asdict().items()})
 table = table._replace(phi=np.radians(np.linspace(25.0, 50.0, 20_000)))
-found = [soils.with_law(table, law).K_epsilon for law in soils.LAWS]
-found += [api_curve(np.degrees(table.phi)), soils.slope_factor(table.phi, 0.2)]
-found += [soils.layers_of(table, law, Ground(water_table_m=0.7, cohesion_kPa=3.0)).ravel() for law in soils.LAWS]
+found = [soils.with_law(table, law).K_epsilon for law in RESISTANCES]
+found += [api_curve(np.degrees(table.phi)), soils.with_soil(table, "broms", Ground(slope_deg=11.0)).K_epsilon]
+wet = Ground(water_table_m=0.7, cohesion_kPa=3.0)
+found += [soils.with_soil(table, law, wet).layers.ravel() for law in RESISTANCES]
 print(hashlib.sha256(np.concatenate(found).tobytes()).hexdigest())
 """
 

@@ -15,7 +15,7 @@ from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import accuracy_of, sampled_designs
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import RESISTANCES, Ground, Layer
-from boulder_sweep.soils import LAWS
+from boulder_sweep.soils import coefficients
 
 DESIGNS = 4096
 TOP = ("soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3")
@@ -33,7 +33,7 @@ def tests_table() -> Table:
         given = sampled_designs(sweep, 1).table
         for law in RESISTANCES:
             found = simulate(_by(law, sweep)).summary()
-            coefficient = number(float(LAWS[law](given)[0]), 1)
+            coefficient = number(float(coefficients(given, law)[0]), 1)
             rotation = number(found["max_rotation_deg"], 2)
             table.add(
                 title, f"`{law}`", coefficient, found["verdict"], rotation, number(found["max_displacement_m"], 3)

@@ -19,8 +19,7 @@ _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/s
 _DYNAMICS = "kernels/boulder_kernels/dynamics.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
-_RESISTANCE = "boulder_sweep/soils.py"
-_GROUND = "boulder_sweep/soils.py"
+_GROUND = "kernels/boulder_kernels/ground.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
 
 _PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
@@ -80,18 +79,16 @@ MUTATIONS = (
     Mutation((52,), _DYNAMICS, "s.net * M + couple_moment", "M + couple_moment"),
     Mutation((53, 54, 55), _TRAJECTORY, "+ up * np.sin(theta)", "- up * np.sin(theta)"),
     Mutation((53, 54, 55), _TRAJECTORY, "x_b - along *", "x_b + along *"),
-    Mutation((101,), _RESISTANCE, "return 3.0 * passive_coefficient", "return 2.0 * passive_coefficient"),
-    Mutation((102,), _RESISTANCE, "5.0 * table.W / table.d", "5.0 * table.d / table.W"),
-    Mutation((102,), _RESISTANCE, "np.minimum(K_p**2, K_p * R)", "K_p * R"),
+    Mutation((101,), _GROUND, "return 3.0 * K_p", "return 2.0 * K_p"),
+    Mutation((102,), _GROUND, "5.0 * W / d", "5.0 * d / W"),
+    Mutation((102,), _GROUND, "min(K_p * K_p, K_p * R)", "K_p * R"),
     Mutation((105,), _GROUND, "2e3 * cohesion * np.sqrt(K_p)", "1e3 * cohesion * np.sqrt(K_p)"),
     Mutation((105,), _GROUND, "K_p * (stress - weight * top)", "K_p * stress"),
     Mutation((105,), _LAYERED, "p_0 * ultimate, p_1 * design.d * ultimate", "p_0 * ultimate, p_1 * ultimate"),
     Mutation((105,), _LAYERED, "pressure * design.W * h_e", "pressure * h_e"),
-    Mutation((106,), _GROUND, "if top >= water else", "if top > water else"),
-    Mutation(
-        (106,), _GROUND, "stress = stress + weight * (bottom - top)", "stress = stress + G * rho_s * (bottom - top)"
-    ),
-    Mutation((107,), _GROUND, "/ elementary.cos(slope))", ")"),
+    Mutation((106,), _GROUND, "if top >= ground.water else", "if top > ground.water else"),
+    Mutation((106,), _GROUND, "stress += weight * (bottom - top)", "stress += G * rho_s * (bottom - top)"),
+    Mutation((107,), _GROUND, "/ math.cos(slope))", ")"),
     Mutation((108,), _LAYERS, "length = a - b if above else b - a", "length = b - a"),
     Mutation((108,), _LAYERS, "(layer.P_1 if above else -layer.P_1)", "layer.P_1"),
     Mutation((108,), _LAYERS, "length * powers + P_2 * logarithm", "length * powers - P_2 * logarithm"),

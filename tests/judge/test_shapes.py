@@ -17,7 +17,7 @@ from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import Shape, tapered
-from boulder_sweep.soils import SLICES, outlines_of, width_capped, with_soil
+from boulder_sweep.soils import SLICES, coefficients, with_soil
 from tests.judge.plain import plain_designs
 
 RWG = Path(__file__).parents[2] / "configs" / "rwg.yaml"
@@ -98,7 +98,7 @@ def test_the_law_that_depends_on_the_width_takes_the_local_one():
     assert len(found) == SLICES
     heights = (designs.d[0] - (np.arange(SLICES) + 0.5) / SLICES * designs.d[0]) / designs.H[0]
     widths = designs.W[0] * np.interp(heights, [0.0, 1.0], [1.0, 0.5])
-    known = np.array([width_capped(designs._replace(W=np.array([width])))[0] for width in widths])
+    known = np.array([coefficients(designs._replace(W=np.array([width])), "width_capped")[0] for width in widths])
     assert known[0] > known[-1] + 0.1
     np.testing.assert_allclose(found[:, 5] / found[0, 5], known / known[0], rtol=1e-12)
 
@@ -117,7 +117,7 @@ def test_slices_of_that_law_converge(monkeypatch):
 
 def test_outlines_are_shares_of_the_sides():
     table = plain_designs().table
-    outline = outlines_of(table, tapered(0.5))[0]
+    outline = with_soil(table, "kp_squared", Ground(), shape=tapered(0.5)).outlines[0]
     L, W, H = table.L[0], table.W[0], table.H[0]
     np.testing.assert_allclose(outline, [[0.0, W, L / 2, L / 2], [H, W / 2, L / 4, L / 4]])
 

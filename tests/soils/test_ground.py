@@ -9,6 +9,7 @@ import pytest
 
 import boulder_sweep
 from boulder_kernels import DesignTable
+from boulder_kernels.ground import put_soil, slope_factor
 from boulder_kernels.layered import LayeredTable
 from boulder_sweep.cli.simulate import why_lines
 from boulder_sweep.impact.explanation import explain
@@ -16,8 +17,8 @@ from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.pilot import accuracy_of, sampled_designs, simulated
-from boulder_sweep.settings.model import Ground, Layer
-from boulder_sweep.soils import LAWS, layers_of, slope_factor, with_soil
+from boulder_sweep.settings.model import RESISTANCES, Ground, Layer
+from boulder_sweep.soils import SLICES, ground_of, with_soil
 from tests import oracle
 from tests.oracle import ground as by_hand
 
@@ -38,6 +39,13 @@ def table_of(phi_deg: float = 42.0) -> DesignTable:
     return DesignTable(**{name: np.array([value]) for name, value in values.items()})
 
 
+def layers_of(table: DesignTable, law: str, ground: Ground, count: int) -> np.ndarray:
+    """Return the layers of one design, also where the pressure is proportional to depth."""
+    layers = np.empty((1, count, 6))
+    put_soil(table, ground_of(law, ground), True, SLICES, np.empty((0, 4)), layers, np.empty((1, 0, 4)))
+    return layers
+
+
 def oracle_ground(table: DesignTable, ground: Ground) -> oracle.inputs.Ground:
     top = oracle.inputs.Layer(0.0, table.rho_s[0], table.phi[0], table.beta[0], 1e3 * ground.cohesion_kPa)
     below = (
@@ -54,13 +62,13 @@ def oracle_ground(table: DesignTable, ground: Ground) -> oracle.inputs.Ground:
     return oracle.inputs.Ground((top, *below), water, radians(ground.slope_deg))
 
 
-@pytest.mark.parametrize("law", list(LAWS))
+@pytest.mark.parametrize("law", RESISTANCES)
 @pytest.mark.parametrize("water_m", [None, 0.0, 0.5, 0.8, 5.0])
 def test_pressures_are_those_of_the_oracle(law: str, water_m: float | None) -> None:
     """By every law, with the water in, at a boundary of, above and below the layers (Eqs 105 to 107)."""
     table, ground = table_of(), replace(GROUND, water_table_m=water_m)
     inputs = replace(oracle.RWG, phi=table.phi[0], resistance=law)
-    layers = layers_of(table, law, ground)[0]
+    layers = with_soil(table, law, ground).layers[0]
     known = oracle_ground(table, ground)
     for depth in (0.0, 0.1, 0.49, 0.51, 0.79, 0.81, 1.19, 1.21, 1.9):
         row = layers[np.searchsorted(layers[:, 0], depth, side="right")]
@@ -74,12 +82,12 @@ def test_pressures_are_those_of_the_oracle(law: str, water_m: float | None) -> N
 def test_slope_is_coulombs_weakest_wedge(slope_deg: float) -> None:
     """The closed form against the weakest of all plane wedges (Eq 107)."""
     for phi_deg in (30.0, 40.0, 47.0):
-        found = slope_factor(np.radians([phi_deg]), radians(slope_deg))[0]
+        found = slope_factor(radians(phi_deg), radians(slope_deg))
         assert found == pytest.approx(by_hand.slope_factor(radians(phi_deg), radians(slope_deg)), rel=1e-9)
-    assert slope_factor(np.radians([40.0]), radians(20.0))[0] == pytest.approx(0.4787, abs=1e-4)
+    assert slope_factor(radians(40.0), radians(20.0)) == pytest.approx(0.4787, abs=1e-4)
 
 
-@pytest.mark.parametrize("law", list(LAWS))
+@pytest.mark.parametrize("law", RESISTANCES)
 @pytest.mark.parametrize("ground", [Ground(slope_deg=15.0), Ground(water_table_m=0.0), Ground((), 0.0, 0.0, 8.0)])
 def test_what_is_proportional_to_depth_is_a_factor(law: str, ground: Ground) -> None:
     """The lanes with a factor on the strength, and the layers with the pressures themselves: one result."""
@@ -89,7 +97,7 @@ def test_what_is_proportional_to_depth_is_a_factor(law: str, ground: Ground) -> 
     evaluation = evaluation_of(
         boulder_sweep.load("configs/rwg.yaml"), accuracy_of(boulder_sweep.load("configs/rwg.yaml"))
     )
-    layered = LayeredTable(*table, layers_of(table, law, ground))
+    layered = LayeredTable(*table, layers_of(table, law, ground, 1))
     designs = (Designs(table, np.zeros(1)) for table in (folded, layered))
     one, other = (simulated(some, evaluation.readings, evaluation.control) for some in designs)
     assert one.status == other.status

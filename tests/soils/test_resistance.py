@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from boulder_kernels.ground import BROMS, KP_SQUARED, WIDTH_CAPPED
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
@@ -15,7 +16,7 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import PRESETS, RESISTANCES
-from boulder_sweep.soils import LAWS, broms, kp_squared, width_capped, with_law
+from boulder_sweep.soils import coefficients, with_law
 from boulder_sweep.views.wording import LAW_WORDS, design_line
 from tests import oracle
 from tests.answers.designs import site
@@ -30,9 +31,8 @@ def by(law: str, sweep: Sweep) -> Sweep:
     return replace(sweep, model=replace(sweep.model, resistance=law))
 
 
-def test_the_names_of_the_settings_are_those_of_the_functions() -> None:
-    assert tuple(LAWS) == RESISTANCES
-    assert RESISTANCES[0] == "kp_squared"
+def test_the_names_of_the_settings_are_in_the_order_of_the_kernels() -> None:
+    assert tuple(map(RESISTANCES.index, ("kp_squared", "broms", "width_capped"))) == (KP_SQUARED, BROMS, WIDTH_CAPPED)
 
 
 @pytest.mark.parametrize("law", RESISTANCES)
@@ -41,16 +41,18 @@ def test_coefficients_are_those_of_the_oracle(law: str) -> None:
     for _ in range(50):
         phi, width, depth = math.radians(rng.uniform(20.0, 49.0)), rng.uniform(0.1, 4.0), rng.uniform(0.5, 3.0)
         expected = lateral_coefficient(replace(oracle.RWG, phi=phi, W=width, d=depth, resistance=law))
-        assert LAWS[law](plain_designs(phi=phi, W=width, d=depth).table)[0] == pytest.approx(expected, rel=1e-12)
+        assert coefficients(plain_designs(phi=phi, W=width, d=depth).table, law)[0] == pytest.approx(
+            expected, rel=1e-12
+        )
 
 
 def test_figures_by_hand() -> None:
     """K_p = 3 at 30 degrees: 9, 9, and 3 (1 + 1.6 (8/3)^0.67 / 6) for a body as wide as deep; never above K_p^2."""
     wide, slender = (plain_designs(phi=math.radians(30.0), W=width, d=1.5).table for width in (1.5, 0.01))
-    assert kp_squared(wide)[0] == pytest.approx(9.0)
-    assert broms(wide)[0] == pytest.approx(9.0)
-    assert width_capped(wide)[0] == pytest.approx(4.5434, abs=1e-4)
-    assert width_capped(slender)[0] == pytest.approx(9.0)
+    assert coefficients(wide, "kp_squared")[0] == pytest.approx(9.0)
+    assert coefficients(wide, "broms")[0] == pytest.approx(9.0)
+    assert coefficients(wide, "width_capped")[0] == pytest.approx(4.5434, abs=1e-4)
+    assert coefficients(slender, "width_capped")[0] == pytest.approx(9.0)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
