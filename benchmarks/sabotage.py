@@ -51,7 +51,7 @@ _ONCE = "        out = simulate_lanes(given.designs, readings, control, given.so
 _SIMULATED = "        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)\n"
 _TRIES = '        reason = ""\n        for _ in range(tries):\n'
 _COMMITTED = "committer.start()\n"
-_STAGED = "    storage.put(staged_name(staged.name, token, staged.part.sha256), content)\n"
+_STAGED = "    storage.put(staged_name(staged.name, token, part.sha256), encoded.content)\n"
 _STEP_TWICE = (
     "        y_end, k_end, _ = step(y_end, k_end, "
     "0.0 * field(ws, STEP, lane), load(ws, SWITCHES, lane), load(ws, CONSTANTS, lane))\n"
@@ -114,7 +114,7 @@ SABOTAGES = {
     "a file that nobody needs beside every part": Sabotage(
         "boulder_sweep/store/writer.py",
         _STAGED,
-        f"{_STAGED}    storage.put('_size', str(len(content)).encode())\n",
+        f"{_STAGED}    storage.put('_size', str(len(encoded.content)).encode())\n",
         ("run",),
         ("files of a table", "flushes to the disk by a run"),
     ),

@@ -14,29 +14,17 @@ import numpy as np
 from boulder_sweep.columns import GRADES, OUTCOMES, STANDINGS, VERDICTS, OutcomeColumn
 from boulder_sweep.errors import ComputationError
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed
+from boulder_sweep.store.writer import EncodedPart, StagedPart
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
-
-
-from boulder_sweep.store.writer import StagedPart
 
 MakeBlock = Callable[[int, int], "DesignBlock"]
 Evaluate = Callable[["DesignBlock"], Judged]
 _TRIES = 2
 _FAILURES_BUDGET = 5_000
 """Failed tries after which a run stops: something is then wrong with more than single designs."""
-
-
-class EncodedPart(NamedTuple):
-    """A part of the table as the bytes of its file."""
-
-    first: int
-    rows: int
-    content: memoryview | bytes
-    verdicts: dict[str, int]
-    """Number of rows of each verdict and reason, keyed as by `verdict_counts`."""
 
 
 class Computation:

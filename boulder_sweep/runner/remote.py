@@ -16,12 +16,13 @@ from typing import NamedTuple
 from boulder_sweep.errors import BackendError, BoulderSweepError
 from boulder_sweep.locations import location_of
 from boulder_sweep.runner.cluster import Cluster, Fingerprint, fingerprint, other_versions_text
-from boulder_sweep.runner.computing import Computation, Computed, EncodedPart, Ended, Message, Note, failed_rows
+from boulder_sweep.runner.computing import Computation, Computed, Ended, Message, Note, failed_rows
 from boulder_sweep.runner.dispatch import Dispatcher, Task
 from boulder_sweep.runner.estimate import blocks
-from boulder_sweep.store.lock import LOCK_NAME
+from boulder_sweep.store.files import LOCK_NAME
+from boulder_sweep.store.manifest import parts_of
 from boulder_sweep.store.storage import storage_of
-from boulder_sweep.store.writer import OutputFolder, StagedPart, stage
+from boulder_sweep.store.writer import EncodedPart, OutputFolder, StagedPart, stage
 from boulder_sweep.text import one_line
 
 _TRIES = 3
@@ -67,8 +68,7 @@ def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
         elif not (folder / LOCK_NAME).exists():  # this worker hung, and the run has ended without it
             break
         else:
-            staged = stage(storage, work.name, work.table_rows, part.first, part.content, part.rows, part.verdicts)
-            done.staged.append(staged)
+            done.staged.append(stage(storage, work.name, work.table_rows, part))
     return done
 
 
@@ -86,12 +86,6 @@ def prepare(work: Work) -> None:
                 raise BackendError(other_versions_text("a worker"))
             work.computation.warm_up()
             _prepared.add(work.name)
-
-
-def parts_of(start: int, stop: int, size: int) -> list[tuple[int, int]]:
-    """Cut rows [start, stop) at the ends of parts."""
-    ends = [*range(start - start % size + size, stop, size), stop]
-    return list(zip([start, *ends[:-1]], ends, strict=True))
 
 
 @dataclass(frozen=True)
@@ -199,12 +193,12 @@ class ClusterWorkers(threading.Thread):
     def _accept(self, rows: _Rows, done: Done) -> None:
         """Pass on the parts that a worker has written, or write those that it sent."""
         for part in done.relayed:
-            done.staged.append(self._folder.stage(part.first, part.content, part.rows, part.verdicts))
+            done.staged.append(self._folder.stage(part))
         here = [staged for staged in done.staged if self._folder.is_staged(staged)]
         for staged in here:
             self.messages.put(Computed(staged.part.rows))
             self.messages.put(staged)
-        expected = parts_of(rows.start, rows.stop, self._folder.manifest.rows_per_part)
+        expected = list(parts_of(rows.start, rows.stop, self._folder.manifest.rows_per_part))
         if len(here) < len(expected):
             if not rows.relayed:
                 self._note("a worker does not share the output folder: its rows go through the scheduler")

@@ -254,5 +254,4 @@ class ThreadWorkers(threading.Thread):
 
     def _staged(self, ready: ReadyPart) -> StagedPart:
         """Encode and stage a part."""
-        part = self._computation.encoded(ready.first, ready.pieces)
-        return self._folder.stage(part.first, part.content, part.rows, part.verdicts)
+        return self._folder.stage(self._computation.encoded(ready.first, ready.pieces))

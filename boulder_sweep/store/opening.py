@@ -7,19 +7,9 @@ from typing import Any
 
 from boulder_sweep.locations import Location
 from boulder_sweep.store import errors
-from boulder_sweep.store.generations import is_generation
-from boulder_sweep.store.lock import LOCK_NAME
-from boulder_sweep.store.manifest import (
-    MANIFEST_NAME,
-    Manifest,
-    Session,
-    check_own,
-    is_ours,
-    is_part_name,
-    load,
-    save,
-)
-from boulder_sweep.store.provenance import PREFIX, differences
+from boulder_sweep.store.files import MANIFEST_NAME, is_kept, is_ours, is_part_name
+from boulder_sweep.store.manifest import Manifest, check_own, load, save
+from boulder_sweep.store.provenance import PREFIX, Session, differences
 from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
 from boulder_sweep.store.writer import OutputFolder, recover_merge
@@ -62,7 +52,7 @@ class ClaimedFolder:
         """
         try:
             if self._there is None:
-                self._storage.remove(name for name in self._names if is_ours(name) and not _is_kept(name))
+                self._storage.remove(name for name in self._names if is_ours(name) and not is_kept(name))
                 folder = OutputFolder(self._out, self._storage, self._lock, manifest, self._created)
             else:
                 folder = self._resumed(manifest, self._there)
@@ -93,7 +83,7 @@ class ClaimedFolder:
         damaged = damaged_parts(out, there.parts, read_parts=not storage.checks_content)
         there.parts = {name: part for name, part in there.parts.items() if name not in damaged}
         there.resume_command = manifest.resume_command
-        storage.remove(name for name in self._names if is_ours(name) and name not in there.parts and not _is_kept(name))
+        storage.remove(name for name in self._names if is_ours(name) and name not in there.parts and not is_kept(name))
         folder = OutputFolder(out, storage, self._lock, there, created=False)
         folder.damaged = damaged
         return folder
@@ -134,18 +124,6 @@ def claim_output(out: Location, *, resume: bool = False, overwrite: bool = False
         raise
 
 
-def open_output(
-    out: Location, manifest: Manifest, session: Session, *, resume: bool = False, overwrite: bool = False
-) -> OutputFolder:
-    """Open a folder for a run at once: `claim_output`, then `ClaimedFolder.open`."""
-    claimed = claim_output(out, resume=resume, overwrite=overwrite)
-    try:
-        return claimed.open(manifest, session)
-    except BaseException:
-        claimed.release()
-        raise
-
-
 def _locked(out: Location, storage: Storage) -> Lock:
     """Lock the folder; an error names who else may hold it."""
     holder, host = "another run", None
@@ -162,9 +140,13 @@ def _allowed(out: Location, storage: Storage, names: list[str], resume: bool, ov
     names = [name for name in names if not (name == ".DS_Store" or name.startswith(".nfs"))]  # of the system
     foreign = [name for name in names if not is_ours(name) or storage.is_folder(name)]
     there = None
-    if not (overwrite and not _is_readable(out)):
-        with suppress(errors.NotASweepError):
-            there = load(out)
+    try:
+        there = load(out)
+    except errors.NotASweepError:
+        pass
+    except (errors.DamagedError, errors.OtherVersionError):
+        if not overwrite:
+            raise
     parts = [name for name in names if is_part_name(name)]
     if there is None and not overwrite and parts:
         raise errors.DamagedError(f"{out} contains parts but no {MANIFEST_NAME}; use --overwrite to start again")
@@ -178,20 +160,6 @@ def _allowed(out: Location, storage: Storage, names: list[str], resume: bool, ov
     if there is not None and not (resume or overwrite):
         raise errors.OutputExistsError(out, there.rows_done, there.rows)
     return there
-
-
-def _is_kept(name: str) -> bool:
-    """Whether a file stays when a run begins: the lock and the manifest, which is replaced in one step."""
-    return name in (LOCK_NAME, MANIFEST_NAME) or is_generation(name)
-
-
-def _is_readable(out: Location) -> bool:
-    """Whether the manifest is intact and in this version's format."""
-    try:
-        load(out)
-    except (errors.DamagedError, errors.OtherVersionError, errors.NotASweepError):
-        return False
-    return True
 
 
 def _is_written_by_us(path: Location) -> bool:

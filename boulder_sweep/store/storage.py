@@ -1,12 +1,18 @@
 """What a run does to its output folder, for folders on a disk and for folders on an object store.
 
 On a disk a file gets its final name by renaming, see `files`. An object store has no renaming: a part is put under its
-temporary name and copied to the final one within the store, and the manifest is written as numbered versions, see
-`generations`.
+temporary name and copied to the final one within the store.
+
+There, every version of the manifest is an object of its own, numbered and never changed.
+``_manifest-000000000042.parquet`` is version 42, and ``_manifest.parquet`` a copy of the newest. A request that arrives
+late, or twice, can therefore only write what is there already. The copy may be behind and a list of names may be, so
+neither is believed: whichever is further is where the search begins, and it ends where the next number does not exist.
+The last versions are kept for that.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import queue
 import threading
@@ -16,23 +22,32 @@ from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from stat import S_ISREG
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.store import errors
 from boulder_sweep.store.files import (
     MANIFEST_NAME,
+    PROBE_PREFIX,
     check_writable,
     flush_folder,
     hidden_name,
     is_file,
     opened_folder,
     put_file,
+    version_name,
+    version_number,
 )
-from boulder_sweep.store.generations import Encode, Generations, OtherWriterError, newest, refuses_existing
 from boulder_sweep.store.lock import FolderLock, ObjectLock
 from boulder_sweep.text import why
 
+KEPT = 16
+"""Versions of a manifest kept on an object store; the copy or the list may be behind by as many."""
+Encode = Callable[[Mapping[bytes, bytes]], memoryview | bytes]
+"""Gives the bytes of a manifest with some more metadata."""
+_NUMBER_KEY, _WRITER_KEY = b"boulder_sweep.generation", b"boulder_sweep.writer"
+_LONGEST_NUMBER = 12
+_ATTEMPTS = 5
 _PROBE_BYTES = 1 << 16
 """More than a first manifest takes."""
 _REQUESTS = 16
@@ -142,7 +157,11 @@ class ObjectStorage(_Storage):
     def __init__(self, path: RemotePath):
         self._path = path
         self._token = uuid.uuid4().hex
-        self._generations: Generations | None = None
+        self._only_new = False
+        """Whether the store itself refuses to write an object that exists. Otherwise it is asked before, and what it
+        holds is read back."""
+        self._version = 0
+        """Number of the newest manifest that this run knows of."""
 
     def make(self) -> bool:
         """Create nothing, for folders exist by their files only; True if there are none."""
@@ -161,18 +180,17 @@ class ObjectStorage(_Storage):
     def lock(self, last_host: str | None, holder: str) -> Lock:
         """Become the only writer; then look which version of the manifest is the newest."""
         try:
-            only_new = refuses_existing(self._path, self._token)
-            lock = ObjectLock(self._path, self._token, only_new, holder)
+            self._only_new = refuses_existing(self._path, self._token)
+            self._lock = ObjectLock(self._path, self._token, self._only_new, holder)
         except OSError as problem:
             raise errors.WriteError(f"cannot write into {self._path}: {problem.strerror}") from None
-        self._lock = lock
-        self._generations = Generations(self._path, self._token, only_new)
         try:
-            self._generations.look()
+            with suppress(FileNotFoundError):
+                self._version = newest(self._path).number
         except BaseException:
-            lock.release()
+            self._lock.release()
             raise
-        return lock
+        return self._lock
 
     def check_writable(self) -> None:
         """Do nothing: `lock` has written."""
@@ -218,18 +236,50 @@ class ObjectStorage(_Storage):
             raise errors.StoreError(f"{self._path} cannot be read: {problem.strerror}") from None
 
     def put_manifest(self, encode: Encode) -> None:
-        """Write the next version of the manifest."""
-        if self._generations is None:
-            raise RuntimeError("a manifest is written with the lock held only")
-        try:
-            self._generations.put(encode)
-        except OtherWriterError:
-            raise errors.FolderInUseError(f"{self._path} was taken over by another run") from None
+        """Write the next version of the manifest, then the copy.
+
+        Raises
+        ------
+        FolderInUseError
+            Another run has written it.
+        OSError
+            The store does not answer. The version may be there; writing it again is right.
+        """
+        own = self._token.encode()
+        while True:
+            number = self._version + 1
+            content = bytes(encode({_NUMBER_KEY: str(number).encode(), _WRITER_KEY: own}))
+            try:
+                there = self._created(number, content)
+            except OSError:
+                if not self._only_new:
+                    self._version = number  # it may arrive late, and must then not replace another
+                raise
+            if there != content and _metadata(there).get(_WRITER_KEY, b"") != own:
+                raise errors.FolderInUseError(f"{self._path} was taken over by another run")
+            self._version = number
+            if there == content:
+                break  # else: what this run wrote before, and was told it could not
+        (self._path / MANIFEST_NAME).put(content)
+        with suppress(OSError):
+            (self._path / version_name(number - KEPT)).unlink(missing_ok=True)
 
     def discard_manifest(self) -> None:
-        """Remove the manifest."""
-        if self._generations is not None:
-            self._generations.discard()
+        """Remove all versions of the manifest."""
+        for name in self._path.names():
+            if name == MANIFEST_NAME or version_number(name) is not None:
+                (self._path / name).unlink(missing_ok=True)
+
+    def _created(self, number: int, content: bytes) -> bytes:
+        """Write a version of the manifest unless it exists; return what is there."""
+        path = self._path / version_name(number)
+        with suppress(FileExistsError):
+            if self._only_new:
+                path.put(content, only_new=True)
+                return content
+            if not path.exists():
+                path.put(content)
+        return path.read_bytes()
 
     def _publish(self, staged_name: str, name: str, size: int | None) -> None:
         """Copy one staged file to its final name."""
@@ -275,3 +325,104 @@ Storage = DiskStorage | ObjectStorage
 def storage_of(place: Location) -> Storage:
     """Return how a run writes into a folder."""
     return DiskStorage(place) if isinstance(place, Path) else ObjectStorage(place)
+
+
+class Version(NamedTuple):
+    """One version of the manifest on an object store."""
+
+    number: int
+    content: bytes
+
+
+def newest(folder: RemotePath) -> Version:
+    """Return the newest version of the manifest.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is none.
+    OSError
+        The store does not answer.
+    """
+    for _ in range(_ATTEMPTS):
+        found = _begin(folder)
+        if found is not None:
+            while (later := _version(folder, found.number + 1)) is not None:
+                found = later
+            return found
+    raise OSError(errno.EIO, "the newest manifest is gone each time it is read")
+
+
+def refuses_existing(folder: RemotePath, token: str) -> bool:
+    """Find out whether the store can refuse to write an object that exists; and whether it can be written at all.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    probe = folder / f"{PROBE_PREFIX}{token}"
+    try:
+        probe.put(b"1", only_new=True)
+    except FileExistsError:
+        pass  # the answer to a first try was lost
+    except OSError:
+        probe.put(b"1")  # the store may not know such requests
+        probe.unlink(missing_ok=True)
+        return False
+    try:
+        probe.put(b"2", only_new=True)
+    except FileExistsError:
+        return True
+    except OSError:
+        return False
+    else:
+        return False
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
+
+
+def _begin(folder: RemotePath) -> Version | None:
+    """Return the newest version that the copy or the list of names knows of; None if it has been removed since.
+
+    Raises
+    ------
+    FileNotFoundError
+        Neither knows any.
+    """
+    copied: Version | None = None
+    with suppress(FileNotFoundError):
+        content = (folder / MANIFEST_NAME).read_bytes()
+        copied = Version(_number(content), content)
+    last = max((version_number(name) or 0 for name in folder.names()), default=0)
+    if copied is not None and copied.number >= last:
+        return copied
+    if not last:
+        raise FileNotFoundError(errno.ENOENT, "there is no manifest", str(folder))
+    return _version(folder, last)
+
+
+def _version(folder: RemotePath, number: int) -> Version | None:
+    """Return a version; None if there is none."""
+    try:
+        return Version(number, (folder / version_name(number)).read_bytes())
+    except FileNotFoundError:
+        return None
+
+
+def _number(content: bytes) -> int:
+    """Return the number of a version; 0 for a manifest without one."""
+    text = _metadata(content).get(_NUMBER_KEY, b"")
+    return int(text) if text.isdigit() and len(text) <= _LONGEST_NUMBER else 0
+
+
+def _metadata(content: bytes) -> Mapping[bytes, bytes]:
+    """Return the metadata of a Parquet file; none if it is damaged."""
+    import pyarrow as pa  # heavy, and only needed on object stores
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_metadata(BytesIO(content)).metadata or {}
+    except (pa.ArrowException, OSError, ValueError):
+        return {}
