@@ -123,7 +123,7 @@ SABOTAGES = {
         "kernels/boulder_kernels/_jit.py", '{"nogil": True, ', '{"nogil": False, ', ("threads",)
     ),
     "a fifth of a second of sleep in every block": Sabotage(
-        "boulder_sweep/runner/computing.py",
+        "boulder_sweep/runner/workers.py",
         _TRIES,
         f"        __import__('time').sleep(0.2)\n{_TRIES}",
         ("waiting",),

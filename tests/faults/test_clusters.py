@@ -20,8 +20,8 @@ import boulder_sweep
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner import dispatch, remote
-from boulder_sweep.runner.computing import Computation
 from boulder_sweep.runner.sweeper import run
+from boulder_sweep.runner.workers import Computation
 from boulder_sweep.store import status
 from boulder_sweep.store.files import LOCK_NAME
 from boulder_sweep.store.reader import read_table

@@ -13,11 +13,10 @@ import pytest
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.judged import Judged, not_computed
-from boulder_sweep.runner.committer import COMMIT_SHARE, GAP_S, Committer
-from boulder_sweep.runner.computing import Computation, Computed, Ended
 from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.runner.pool import check_backend
-from boulder_sweep.runner.threads import Assembly, ThreadWorkers
+from boulder_sweep.runner.running import COMMIT_SHARE, GAP_S, Committer
+from boulder_sweep.runner.workers import Assembly, Computation, Computed, Ended, ThreadWorkers
 from boulder_sweep.store.files import part_name
 from boulder_sweep.store.manifest import Manifest, Part
 from boulder_sweep.store.writer import EncodedPart, StagedPart
@@ -72,7 +71,7 @@ def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, part=100, make_b
     folder, computation = Folder(rows, part), Recorder(evaluate, make_block, {})
     ranges = blocks(folder.manifest.missing(), size)
     workers = ThreadWorkers(jobs, computation, ranges, limit, folder)
-    committer = Committer(folder, computation, workers.release, workers.flush)
+    committer = Committer(folder, computation, workers)
     committer.start()
     workers.start()
     computed = 0
