@@ -132,8 +132,9 @@ def run(
                 return whole.end(how)
             if remote:
                 signals.attempt(claimed.release, hurry=True)
-                return claimed.rows_done
-            return claimed.release()
+            else:
+                claimed.release()
+            return claimed.rows_done
 
         try:
             with telling_start_failure(jobs):

@@ -24,7 +24,7 @@ from boulder_sweep.locations import Location
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import MANIFEST_NAME, PART_SUFFIX, part_name
+from boulder_sweep.store.files import MANIFEST_NAME, PART_SUFFIX, hidden_name, part_name
 from boulder_sweep.store.provenance import IDENTITY_KINDS, Session
 from boulder_sweep.store.storage import Storage, storage_of
 
@@ -74,6 +74,11 @@ class Merge:
     name: str
     part: Part
     replaced: list[str]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its file, final or temporary, in the order to try: it may be renamed between the first two tries."""
+        return self.name, hidden_name(self.name), self.name
 
 
 @dataclass
@@ -352,15 +357,13 @@ def _from_json(content: Any) -> Manifest:
     differing: list[str] = []
     known = {key: value for key, value in content.items() if key != "format"}
     entries = _entries_of(Manifest, "the manifest", known, differing)
-    parts = {name: _part(name, record, differing) for name, record in entries["parts"].items()}
-    sessions = [
-        Session(**_entries_of(Session, "the record of a run", record, differing)) for record in entries["sessions"]
-    ]
-    merge = None
+    entries["parts"] = {name: _part(name, record, differing) for name, record in entries["parts"].items()}
+    runs = [_entries_of(Session, "the record of a run", record, differing) for record in entries["sessions"]]
+    entries["sessions"] = [Session(**run) for run in runs]
     if entries.get("merge") is not None:
-        merging = _entries_of(Merge, "the record of a merge", entries["merge"], differing)
-        merge = Merge(**{**merging, "part": _part(merging["name"], merging["part"], differing)})
-    return Manifest(**{**entries, "parts": parts, "sessions": sessions, "merge": merge, "differing": differing})
+        merge = _entries_of(Merge, "the record of a merge", entries["merge"], differing)
+        entries["merge"] = Merge(**{**merge, "part": _part(merge["name"], merge["part"], differing)})
+    return Manifest(**entries, differing=differing)
 
 
 def _part(name: str, record: Any, differing: list[str]) -> Part:
@@ -403,12 +406,8 @@ def _is_deep(content: Any) -> bool:
     """Whether records are nested so deeply that functions that call themselves could fail."""
     level = [content]
     for _ in range(_DEEPEST):
-        level = [
-            value
-            for one in level
-            if isinstance(one, dict | list)
-            for value in (one.values() if isinstance(one, dict) else one)
-        ]
+        nested = [one.values() if isinstance(one, dict) else one for one in level if isinstance(one, dict | list)]
+        level = [value for values in nested for value in values]
     return bool(level)
 
 

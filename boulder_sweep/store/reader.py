@@ -19,7 +19,6 @@ from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.errors import DamagedError, StoreError, refuse_to_guess
-from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.manifest import Manifest, Part, load
 from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.verify import load_checked, wrong_bytes
@@ -327,6 +326,5 @@ class _Places:
                 yield name, self.manifest.parts[name]
         merge = self.manifest.merge
         if merge is not None and merge.part.first <= row < merge.part.stop:
-            # The final name again: the file may be renamed between the first two attempts.
-            for name in (merge.name, hidden_name(merge.name), merge.name):
+            for name in merge.names:
                 yield name, merge.part

@@ -71,11 +71,12 @@ class DiskStorage(_Storage):
     checks_content = False
 
     def __init__(self, path: Path):
-        self._path = path
+        self.path = path
+        self._is_made = False
 
-    def make(self) -> bool:
-        """Create the folder if it does not exist; True if it was created."""
-        path = self._path
+    def make(self) -> None:
+        """Create the folder if it does not exist."""
+        path = self.path
         if not path.parent.is_dir():
             raise errors.StoreError(f"the folder {path.parent} does not exist: {path.name} cannot be created in it")
         try:
@@ -83,42 +84,43 @@ class DiskStorage(_Storage):
         except FileExistsError:
             if not path.is_dir():
                 raise errors.StoreError(f"{path} is a file; the output of a sweep is a folder") from None
-            return False
         except OSError as problem:
             raise errors.WriteError(f"cannot create the folder {path}: {why(problem)}") from problem
-        return True
+        else:
+            self._is_made = True
 
     def unmake(self) -> None:
-        """Remove the folder if it is empty and can be removed."""
-        with suppress(OSError):
-            self._path.rmdir()
+        """Remove the folder if `make` created it, it is empty and can be removed."""
+        if self._is_made:
+            with suppress(OSError):
+                self.path.rmdir()
 
     def lock(self, last_host: str | None, holder: str) -> Lock:
         """Become the only writer."""
-        self._lock = FolderLock(self._path, last_host, holder)
+        self._lock = FolderLock(self.path, last_host, holder)
         return self._lock
 
     def check_writable(self) -> None:
         """Raise OSError if the folder cannot be written."""
-        is_file(self._path / MANIFEST_NAME)  # a link would be refused only when old parts are gone
-        check_writable(self._path, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
+        is_file(self.path / MANIFEST_NAME)  # a link would be refused only when old parts are gone
+        check_writable(self.path, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
 
     def names(self) -> list[str]:
         """Return the names in the folder."""
-        return sorted(entry.name for entry in self._path.iterdir())
+        return sorted(entry.name for entry in self.path.iterdir())
 
     def is_folder(self, name: str) -> bool:
         """Whether one of the names is that of a folder."""
-        return (self._path / name).is_dir()
+        return (self.path / name).is_dir()
 
     def put(self, name: str, content: memoryview | bytes) -> None:
         """Write a file whole or not at all, durably."""
-        put_file(self._path, name, content)
+        put_file(self.path, name, content)
 
     def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Give staged files, by their temporary names, their final names, durably."""
         self._check_lock()
-        with opened_folder(self._path) as at:
+        with opened_folder(self.path) as at:
             for staged, final in names.items():
                 os.rename(staged, final, src_dir_fd=at, dst_dir_fd=at)
             os.fsync(at)
@@ -128,24 +130,24 @@ class DiskStorage(_Storage):
         self._check_lock()
         names = sorted(names, reverse=True)  # the last rows first: no gap, wherever a run is killed
         for name in names:
-            (self._path / name).unlink(missing_ok=True)
+            (self.path / name).unlink(missing_ok=True)
         if names:
-            flush_folder(self._path)
+            flush_folder(self.path)
 
     def open_manifest(self) -> IO[bytes]:
         """Open the manifest; raises OSError."""
         # A pipe of this name must not be waited for.
-        return open(self._path / MANIFEST_NAME, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
+        return open(self.path / MANIFEST_NAME, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
 
     def put_manifest(self, encode: Encode) -> None:
         """Replace the manifest in one step."""
         self._check_lock()
-        put_file(self._path, MANIFEST_NAME, encode({}))
+        put_file(self.path, MANIFEST_NAME, encode({}))
 
     def discard_manifest(self) -> None:
         """Remove the manifest."""
         self._check_lock()
-        (self._path / MANIFEST_NAME).unlink()
+        (self.path / MANIFEST_NAME).unlink()
 
 
 class ObjectStorage(_Storage):
@@ -155,7 +157,7 @@ class ObjectStorage(_Storage):
     """Whether it sees to it itself that a file holds what was written, so that comparing its size is enough."""
 
     def __init__(self, path: RemotePath):
-        self._path = path
+        self.path = path
         self._token = uuid.uuid4().hex
         self._only_new = False
         """Whether the store itself refuses to write an object that exists. Otherwise it is asked before, and what it
@@ -163,16 +165,15 @@ class ObjectStorage(_Storage):
         self._version = 0
         """Number of the newest manifest that this run knows of."""
 
-    def make(self) -> bool:
-        """Create nothing, for folders exist by their files only; True if there are none."""
+    def make(self) -> None:
+        """Create nothing, for folders exist by their files only."""
         try:
-            if S_ISREG(self._path.stat().st_mode):
-                raise errors.StoreError(f"{self._path} is a file; the output of a sweep is a folder")
+            if S_ISREG(self.path.stat().st_mode):
+                raise errors.StoreError(f"{self.path} is a file; the output of a sweep is a folder")
         except FileNotFoundError:
-            return True
+            pass
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._path}: {problem.strerror}") from None
-        return not self.names()
+            raise errors.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
 
     def unmake(self) -> None:
         """Do nothing."""
@@ -180,13 +181,13 @@ class ObjectStorage(_Storage):
     def lock(self, last_host: str | None, holder: str) -> Lock:
         """Become the only writer; then look which version of the manifest is the newest."""
         try:
-            self._only_new = refuses_existing(self._path, self._token)
-            self._lock = ObjectLock(self._path, self._token, self._only_new, holder)
+            self._only_new = refuses_existing(self.path, self._token)
+            self._lock = ObjectLock(self.path, self._token, self._only_new, holder)
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._path}: {problem.strerror}") from None
+            raise errors.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
         try:
             with suppress(FileNotFoundError):
-                self._version = newest(self._path).number
+                self._version = newest(self.path).number
         except BaseException:
             self._lock.release()
             raise
@@ -197,7 +198,7 @@ class ObjectStorage(_Storage):
 
     def names(self) -> list[str]:
         """Return the names in the folder."""
-        return self._path.names()
+        return self.path.names()
 
     def is_folder(self, name: str) -> bool:
         """Whether one of the names is that of a folder."""
@@ -205,7 +206,7 @@ class ObjectStorage(_Storage):
 
     def put(self, name: str, content: memoryview | bytes) -> None:
         """Write a file whole or not at all."""
-        (self._path / name).put(content)
+        (self.path / name).put(content)
 
     def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Copy staged files to their final names and remove the staged ones."""
@@ -216,7 +217,7 @@ class ObjectStorage(_Storage):
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, unless they are another run's by now."""
         self._check_lock()
-        self._each(lambda name: (self._path / name).unlink(missing_ok=True), names)
+        self._each(lambda name: (self.path / name).unlink(missing_ok=True), names)
 
     def open_manifest(self) -> IO[bytes]:
         """Open the newest version of the manifest.
@@ -229,11 +230,11 @@ class ObjectStorage(_Storage):
             The store does not answer, which says nothing about the manifest.
         """
         try:
-            return BytesIO(newest(self._path).content)
+            return BytesIO(newest(self.path).content)
         except FileNotFoundError:
             raise
         except OSError as problem:
-            raise errors.StoreError(f"{self._path} cannot be read: {problem.strerror}") from None
+            raise errors.StoreError(f"{self.path} cannot be read: {problem.strerror}") from None
 
     def put_manifest(self, encode: Encode) -> None:
         """Write the next version of the manifest, then the copy.
@@ -256,23 +257,23 @@ class ObjectStorage(_Storage):
                     self._version = number  # it may arrive late, and must then not replace another
                 raise
             if there != content and _metadata(there).get(_WRITER_KEY, b"") != own:
-                raise errors.FolderInUseError(f"{self._path} was taken over by another run")
+                raise errors.FolderInUseError(f"{self.path} was taken over by another run")
             self._version = number
             if there == content:
                 break  # else: what this run wrote before, and was told it could not
-        (self._path / MANIFEST_NAME).put(content)
+        (self.path / MANIFEST_NAME).put(content)
         with suppress(OSError):
-            (self._path / version_name(number - KEPT)).unlink(missing_ok=True)
+            (self.path / version_name(number - KEPT)).unlink(missing_ok=True)
 
     def discard_manifest(self) -> None:
         """Remove all versions of the manifest."""
-        for name in self._path.names():
+        for name in self.path.names():
             if name == MANIFEST_NAME or version_number(name) is not None:
-                (self._path / name).unlink(missing_ok=True)
+                (self.path / name).unlink(missing_ok=True)
 
     def _created(self, number: int, content: bytes) -> bytes:
         """Write a version of the manifest unless it exists; return what is there."""
-        path = self._path / version_name(number)
+        path = self.path / version_name(number)
         with suppress(FileExistsError):
             if self._only_new:
                 path.put(content, only_new=True)
@@ -283,10 +284,10 @@ class ObjectStorage(_Storage):
 
     def _publish(self, staged_name: str, name: str, size: int | None) -> None:
         """Copy one staged file to its final name."""
-        staged = self._path / staged_name
+        staged = self.path / staged_name
         if size is not None and staged.stat().st_size != size:
             raise errors.DamagedError(f"{staged} is not what a worker wrote there: it has another size")
-        staged.copy_to(self._path / name)
+        staged.copy_to(self.path / name)
         with suppress(OSError):
             staged.unlink(missing_ok=True)
 

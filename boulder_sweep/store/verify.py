@@ -14,7 +14,6 @@ from typing import Any
 
 from boulder_sweep.locations import Location, LocationError, location_of
 from boulder_sweep.store.errors import refuse_to_guess
-from boulder_sweep.store.files import hidden_name
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import Manifest, Merge, Part, load
 from boulder_sweep.store.provenance import Session, judged_by
@@ -216,9 +215,7 @@ def _without_merged(folder: Location, manifest: Manifest, damaged: dict[str, str
 
 def merged_file(folder: Location, merge: Merge) -> str | None:
     """Return the name of a merged part on disk, final or temporary; None if it is not intact."""
-    # The final name twice: the file may be renamed between the first two checks.
-    names = (merge.name, hidden_name(merge.name), merge.name)
-    return next((name for name in names if not wrong_content(folder / name, merge.part)), None)
+    return next((name for name in merge.names if not wrong_content(folder / name, merge.part)), None)
 
 
 def damaged_parts(folder: Location, parts: Mapping[str, Part], *, read_parts: bool) -> dict[str, str]:

@@ -23,7 +23,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from boulder_sweep.locations import Location
 from boulder_sweep.store import errors
 from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name, is_ours, is_part_name, part_name, staged_name
 from boulder_sweep.store.manifest import Manifest, Merge, Part, save, total_verdicts
@@ -83,8 +82,8 @@ def stage(storage: Storage, token: str, table_rows: int, encoded: EncodedPart) -
 class OutputFolder:
     """The folder of a run, open for writing until `close`; made by `opening.ClaimedFolder.open`."""
 
-    def __init__(self, path: Location, storage: Storage, lock: Lock, manifest: Manifest, created: bool):
-        self.path = path
+    def __init__(self, storage: Storage, lock: Lock, manifest: Manifest):
+        self.path = storage.path
         self._storage = storage
         self.manifest = manifest
         self.token = secrets.token_hex(8)
@@ -94,7 +93,6 @@ class OutputFolder:
         self.damaged: dict[str, str] = {}
         """Parts found damaged when the folder was opened, and what was wrong; their rows count as missing."""
         self._lock = lock
-        self._created = created
         self._busy = threading.RLock()
         self._ended: str | None = None
         self._open = True
@@ -188,7 +186,7 @@ class OutputFolder:
             except (OSError, errors.StoreError):
                 self.manifest.merge = None
                 raise
-            finish_merge(self.manifest, self.path, self._storage)
+            finish_merge(self.manifest, self._storage)
             save(self.manifest, self._storage)
 
     def heartbeat(self) -> None:
@@ -241,8 +239,7 @@ class OutputFolder:
         with suppress(OSError, errors.StoreError):  # a folder that is gone must not hide why the run was refused
             self._storage.discard_manifest()
         self._lock.release()
-        if self._created:
-            self._storage.unmake()
+        self._storage.unmake()
 
     @contextmanager
     def _writing(self) -> Iterator[bool]:
@@ -273,7 +270,7 @@ class OutputFolder:
     def _remove_staged(self) -> None:
         """Remove parts that were staged and not committed."""
         merge = self.manifest.merge
-        keep = set(self.manifest.parts) | (set() if merge is None else {merge.name, hidden_name(merge.name)})
+        keep = set(self.manifest.parts) | set(() if merge is None else merge.names)
         with suppress(OSError, errors.StoreError):
             self._storage.remove(name for name in self._storage.names() if _is_staged(name) and name not in keep)
 
@@ -294,22 +291,22 @@ def _part(encoded: EncodedPart) -> Part:
     return Part(first, rows, len(content), hashlib.sha256(content).hexdigest(), verdicts, now())
 
 
-def finish_merge(manifest: Manifest, folder: Location, storage: Storage) -> None:
+def finish_merge(manifest: Manifest, storage: Storage) -> None:
     """Let the merged part, complete under its temporary name, replace the small ones.
 
     Parameters
     ----------
     manifest
         Announces the merge; updated in place, and the caller must save it.
-    folder, storage
-        The output folder, and how it is written.
+    storage
+        How the output folder is written.
     """
     merge = manifest.merge
     if merge is None:
         return
     # The small ones are removed first: a reader in between misses rows for a moment, but never sees any twice.
     storage.remove(merge.replaced)
-    if (folder / hidden_name(merge.name)).exists():
+    if (storage.path / hidden_name(merge.name)).exists():
         storage.publish({hidden_name(merge.name): merge.name})
     for name in merge.replaced:
         manifest.parts.pop(name, None)
@@ -317,11 +314,11 @@ def finish_merge(manifest: Manifest, folder: Location, storage: Storage) -> None
     manifest.merge = None
 
 
-def recover_merge(manifest: Manifest, folder: Location, storage: Storage) -> None:
+def recover_merge(manifest: Manifest, storage: Storage) -> None:
     """Finish a merge during which a run was killed, or drop it if it had only been announced.
 
     Parameters and effect are those of `finish_merge`.
     """
-    if manifest.merge is not None and merged_file(folder, manifest.merge) is None:
+    if manifest.merge is not None and merged_file(storage.path, manifest.merge) is None:
         manifest.merge = None
-    finish_merge(manifest, folder, storage)
+    finish_merge(manifest, storage)
