@@ -51,7 +51,7 @@ _ONCE = "        out = simulate_lanes(given.designs, readings, control, given.so
 _SIMULATED = "        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)\n"
 _TRIES = '        reason = ""\n        for _ in range(tries):\n'
 _COMMITTED = "committer.start()\n"
-_STAGED = "    storage.put(staged_name(staged.name, token, staged.part.sha256), content)\n"
+_STAGED = "    storage.put(staged_name(staged.name, token, part.sha256), encoded.content)\n"
 _STEP_TWICE = (
     "        y_end, k_end, _ = step(y_end, k_end, "
     "0.0 * field(ws, STEP, lane), load(ws, SWITCHES, lane), load(ws, CONSTANTS, lane))\n"
@@ -114,7 +114,7 @@ SABOTAGES = {
     "a file that nobody needs beside every part": Sabotage(
         "boulder_sweep/store/writer.py",
         _STAGED,
-        f"{_STAGED}    storage.put('_size', str(len(content)).encode())\n",
+        f"{_STAGED}    storage.put('_size', str(len(encoded.content)).encode())\n",
         ("run",),
         ("files of a table", "flushes to the disk by a run"),
     ),
@@ -123,7 +123,7 @@ SABOTAGES = {
         "kernels/boulder_kernels/_jit.py", '{"nogil": True, ', '{"nogil": False, ', ("threads",)
     ),
     "a fifth of a second of sleep in every block": Sabotage(
-        "boulder_sweep/runner/computing.py",
+        "boulder_sweep/runner/workers.py",
         _TRIES,
         f"        __import__('time').sleep(0.2)\n{_TRIES}",
         ("waiting",),

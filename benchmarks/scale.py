@@ -12,7 +12,8 @@ import time
 from pathlib import Path
 
 from boulder_sweep.runner.remote import Done
-from boulder_sweep.store.manifest import Manifest, Part, load, part_name, save
+from boulder_sweep.store.files import part_name
+from boulder_sweep.store.manifest import Manifest, Part, load, save
 from boulder_sweep.store.storage import DiskStorage
 from boulder_sweep.store.writer import ROWS_PER_PART, StagedPart
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import boulder_sweep
 from boulder_sweep.judge import evaluation
-from boulder_sweep.runner import committer, computing, running
+from boulder_sweep.runner import running, workers
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import schema, storage, writer
 
@@ -62,9 +62,9 @@ def main() -> None:
         (schema, "encode", "encoding"),
         (writer, "_part", "checksums"),
         (storage, "put_file", "writing"),
-        (computing.Computation, "judged", "blocks"),
-        (computing.Computation, "encoded", "parts"),
-        (committer.Committer, "run", "committing"),
+        (workers.Computation, "judged", "blocks"),
+        (workers.Computation, "encoded", "parts"),
+        (running.Committer, "run", "committing"),
         (running.Run, "_coordinate", "messages"),
     ):
         clock.watch(owner, name, kind)

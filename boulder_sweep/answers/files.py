@@ -22,7 +22,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Criterion, completed
 from boulder_sweep.settings.sweep import Axis, DesignList
-from boulder_sweep.store.manifest import MANIFEST_NAME
+from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.reader import FinishedRows
 from boulder_sweep.text import counted
 

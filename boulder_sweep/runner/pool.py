@@ -75,12 +75,8 @@ class Pool:
             return (function(*arguments, **named) for function, arguments, named in calls)
         import joblib  # a quarter of the time of a short question
 
-        try:
+        with telling_start_failure(self._jobs):
             return joblib.Parallel(n_jobs=self._jobs or -1, backend="threading", return_as="generator")(calls)
-        except Exception as problem:
-            if failure := start_failure(problem, self._jobs):
-                raise failure from problem
-            raise
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Pool, (1,)
@@ -182,16 +178,28 @@ def check_count(name: str, count: int) -> None:
         raise ValueError(f"{name} must be at least 1, not {count}")
 
 
-def start_failure(problem: BaseException, jobs: int | None) -> BackendError | None:
-    """Return the error to raise if a pool failed because the system starts no more threads, None otherwise.
+@contextmanager
+def telling_start_failure(jobs: int | None) -> Iterator[None]:
+    """Turn what fails because the system starts no more threads into an error for the user.
 
     `multiprocessing` then stumbles over the threads it has started, which cannot be terminated; the cause is the
     context of its error.
+
+    Raises
+    ------
+    BackendError
+        The system starts no more threads.
     """
-    cause: BaseException | None = problem
-    while cause is not None:
-        if isinstance(cause, RuntimeError) and "can't start new thread" in str(cause):
-            wanted = "a thread for every core" if jobs is None else f"{jobs:,} threads"
-            return BackendError(f"the system cannot start {wanted}; give a smaller number of --jobs")
-        cause = cause.__cause__ or cause.__context__
-    return None
+    try:
+        yield
+    except BoulderSweepError:
+        raise
+    except Exception as problem:
+        cause: BaseException | None = problem
+        while cause is not None:
+            if isinstance(cause, RuntimeError) and "can't start new thread" in str(cause):
+                wanted = "a thread for every core" if jobs is None else f"{jobs:,} threads"
+                text = f"the system cannot start {wanted}; give a smaller number of --jobs"
+                raise BackendError(text) from problem
+            cause = cause.__cause__ or cause.__context__
+        raise

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 import time
 from collections import deque
@@ -16,12 +15,13 @@ from typing import NamedTuple
 from boulder_sweep.errors import BackendError, BoulderSweepError
 from boulder_sweep.locations import location_of
 from boulder_sweep.runner.cluster import Cluster, Fingerprint, fingerprint, other_versions_text
-from boulder_sweep.runner.computing import Computation, Computed, EncodedPart, Ended, Message, Note, failed_rows
 from boulder_sweep.runner.dispatch import Dispatcher, Task
 from boulder_sweep.runner.estimate import blocks
-from boulder_sweep.store.lock import LOCK_NAME
+from boulder_sweep.runner.workers import Computation, Computed, Note, Workers, failed_rows
+from boulder_sweep.store.files import LOCK_NAME
+from boulder_sweep.store.manifest import parts_of
 from boulder_sweep.store.storage import storage_of
-from boulder_sweep.store.writer import OutputFolder, StagedPart, stage
+from boulder_sweep.store.writer import EncodedPart, OutputFolder, StagedPart, stage
 from boulder_sweep.text import one_line
 
 _TRIES = 3
@@ -67,8 +67,7 @@ def compute(work: Work, start: int, stop: int, relayed: bool) -> Done:
         elif not (folder / LOCK_NAME).exists():  # this worker hung, and the run has ended without it
             break
         else:
-            staged = stage(storage, work.name, work.table_rows, part.first, part.content, part.rows, part.verdicts)
-            done.staged.append(staged)
+            done.staged.append(stage(storage, work.name, work.table_rows, part))
     return done
 
 
@@ -88,12 +87,6 @@ def prepare(work: Work) -> None:
             _prepared.add(work.name)
 
 
-def parts_of(start: int, stop: int, size: int) -> list[tuple[int, int]]:
-    """Cut rows [start, stop) at the ends of parts."""
-    ends = [*range(start - start % size + size, stop, size), stop]
-    return list(zip([start, *ends[:-1]], ends, strict=True))
-
-
 @dataclass(frozen=True)
 class _Rows:
     """Rows [start, stop) to be computed, and how often that has failed."""
@@ -107,7 +100,7 @@ class _Rows:
     """Whether the bytes come back through the scheduler, because the worker cannot write into the folder."""
 
 
-class ClusterWorkers(threading.Thread):
+class ClusterWorkers(Workers):
     """Computes ranges of rows on a cluster and puts messages into a queue, at last `Ended`.
 
     Parameters
@@ -135,8 +128,7 @@ class ClusterWorkers(threading.Thread):
         folder: OutputFolder,
         clock: Callable[[], float] = time.monotonic,
     ):
-        super().__init__(name="workers", daemon=True)
-        self.messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        super().__init__()
         self._computation = computation
         self._ranges = (_Rows(*rows) for rows in tasks)
         self._folder = folder
@@ -154,32 +146,18 @@ class ClusterWorkers(threading.Thread):
         self._again: deque[_Rows] = deque()
         self._suspects: deque[_Rows] = deque()
         """Rows whose workers died; computed one task after the other."""
-        self._stopped = threading.Event()
 
     def stop(self) -> None:
         """Hand out no more tasks; those in progress are dropped."""
-        self._stopped.set()
+        super().stop()
         self._dispatcher.stop()
 
-    def release(self, rows: int) -> None:
-        """Do nothing: rows that are staged never were in the memory of this process."""
-
-    def flush(self) -> list[StagedPart]:
-        """Stage what is not written yet: nothing, for workers write what they compute."""
-        return []
-
-    def run(self) -> None:
-        """Compute everything; called by `start`."""
-        problem: BaseException | None = None
-        try:
-            for rows, done, failure in self._dispatcher.outcomes(self._next_task):
-                if failure is None:
-                    self._accept(rows, done)
-                else:
-                    self._retry(rows, failure)
-        except BaseException as raised:
-            problem = raised
-        self.messages.put(Ended(None if self._stopped.is_set() else problem))
+    def _compute_all(self) -> None:
+        for rows, done, failure in self._dispatcher.outcomes(self._next_task):
+            if failure is None:
+                self._accept(rows, done)
+            else:
+                self._retry(rows, failure)
 
     def _note(self, text: str) -> None:
         """Tell the user something."""
@@ -199,12 +177,12 @@ class ClusterWorkers(threading.Thread):
     def _accept(self, rows: _Rows, done: Done) -> None:
         """Pass on the parts that a worker has written, or write those that it sent."""
         for part in done.relayed:
-            done.staged.append(self._folder.stage(part.first, part.content, part.rows, part.verdicts))
+            done.staged.append(self._folder.stage(part))
         here = [staged for staged in done.staged if self._folder.is_staged(staged)]
         for staged in here:
             self.messages.put(Computed(staged.part.rows))
             self.messages.put(staged)
-        expected = parts_of(rows.start, rows.stop, self._folder.manifest.rows_per_part)
+        expected = list(parts_of(rows.start, rows.stop, self._folder.manifest.rows_per_part))
         if len(here) < len(expected):
             if not rows.relayed:
                 self._note("a worker does not share the output folder: its rows go through the scheduler")

@@ -1,7 +1,11 @@
-"""One run, from finding workers to the last row written; the steps of `sweeper.run`."""
+"""One run, from finding workers to the last row written; the steps of `sweeper.run`.
+
+One thread records staged parts in the manifest, if possible in the order of the designs, while others are computed.
+"""
 
 from __future__ import annotations
 
+import math
 import queue
 import shlex
 import threading
@@ -16,8 +20,6 @@ from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.locations import Location
-from boulder_sweep.runner.committer import Committer
-from boulder_sweep.runner.computing import Computation, Computed, Ended, Message, Note
 from boulder_sweep.runner.estimate import (
     Estimate,
     blocks,
@@ -28,26 +30,146 @@ from boulder_sweep.runner.estimate import (
     tasks,
 )
 from boulder_sweep.runner.interruption import Signals
-from boulder_sweep.runner.pool import DASK, start_failure
+from boulder_sweep.runner.pool import DASK, telling_start_failure
 from boulder_sweep.runner.summary import Progress, progress_of
-from boulder_sweep.runner.threads import ThreadWorkers
-from boulder_sweep.store.errors import DoesNotFitError
+from boulder_sweep.runner.workers import Computation, Computed, Ended, InOrder, Message, Note, ThreadWorkers, Workers
+from boulder_sweep.store.errors import DamagedError, DoesNotFitError
 from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.provenance import cpu_name, file_metadata
 from boulder_sweep.store.writer import OutputFolder, StagedPart
 
 if TYPE_CHECKING:
     from boulder_sweep.runner.cluster import Cluster
-    from boulder_sweep.runner.remote import ClusterWorkers
     from boulder_sweep.settings import Sweep
 
 Report = Callable[[Progress], None]
 FINISHED = "finished"
+COMMIT_SHARE = 0.02
+"""Share of one processor that writing manifests may take."""
+GAP_S = 30.0
+"""How long parts wait for the one before them, which may never come, before they are committed without it [s]."""
 _LOOK_EVERY_S = 0.1
 _PATIENCE_S = 0.6
 """How long an interrupted run waits for what is being written."""
 _PATIENCE_AFTER_PROBLEM_S = 6.0
 """The same for a run stopped by a problem: no user waits, and no worker may write into a folder already released."""
+
+
+class Committer(threading.Thread):
+    """Commits staged parts; merges small ones at the end.
+
+    Parameters
+    ----------
+    folder
+        Open for writing.
+    computation
+        Encodes merged parts.
+    workers
+        Told what is staged, and asked for the rows that are ready when the run is stopped.
+    clock, work_clock
+        Give the time, and the processor time of the calling thread [s].
+    """
+
+    def __init__(
+        self,
+        folder: OutputFolder,
+        computation: Computation,
+        workers: Workers | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        work_clock: Callable[[], float] = time.thread_time,
+    ):
+        super().__init__(name="committer", daemon=True)
+        self.problem: BaseException | None = None
+        self._folder = folder
+        self._computation = computation
+        self._workers = workers or Workers()
+        self._clock = clock
+        self._work_clock = work_clock
+        self._arrived: queue.SimpleQueue[StagedPart | None] = queue.SimpleQueue()
+        self._waiting: InOrder[StagedPart] = InOrder(folder.manifest.missing())
+        self._gap_until = math.inf
+        self._stopped = threading.Event()
+        self._rest_until = -math.inf
+
+    def put(self, staged: StagedPart) -> None:
+        """Hand over a staged part; never waits."""
+        self._arrived.put(staged)
+
+    def finish(self) -> None:
+        """Commit everything that was handed over, merge small parts, and end."""
+        self._arrived.put(None)
+
+    def stop(self) -> None:
+        """Commit what is there, and end."""
+        self._stopped.set()
+        self._arrived.put(None)
+
+    def run(self) -> None:
+        """Commit parts; called by `start`."""
+        try:
+            while (staged := self._next_item()) is not None:
+                self._waiting.put(staged.part.first, staged.part.stop, staged)
+                self._workers.release(staged.part.rows)
+            if self._stopped.is_set():
+                for staged in self._workers.flush():
+                    self._waiting.put(staged.part.first, staged.part.stop, staged)
+            self._commit(self._stopped.is_set())
+            self._merge()
+        except BaseException as problem:
+            self.problem = problem
+
+    def _next_item(self) -> StagedPart | None:
+        """Wait for a staged part, None for the end; commit meanwhile what has arrived when it is time to.
+
+        The manifest is written as a whole, and grows with the table. So after each commit there is a rest, long
+        enough for the commits to take no more than `COMMIT_SHARE` of a processor; what arrives meanwhile shares the
+        next manifest.
+        """
+        while True:
+            due = self._rest_until - self._clock()
+            if self._waiting.is_next_there:
+                self._gap_until = math.inf
+            elif self._waiting:
+                self._gap_until = min(self._gap_until, self._clock() + GAP_S)
+                due = self._gap_until - self._clock()
+            try:
+                return self._arrived.get(timeout=max(due, 0.0) if self._waiting else None)
+            except queue.Empty:
+                begun = self._work_clock()
+                all_there = self._clock() >= self._gap_until
+                self._commit(all_there)
+                if all_there:
+                    self._gap_until = math.inf
+                self._rest_until = self._clock() + (self._work_clock() - begun) / COMMIT_SHARE
+
+    def _commit(self, all_there: bool = False) -> None:
+        """Commit the parts that continue the table, or all that are there."""
+        ready = list(self._waiting.take())
+        if all_there:
+            ready += self._waiting.take_early()
+        if ready:
+            self._folder.commit(ready)
+
+    def _merge(self) -> None:
+        """Replace small parts, once all rows are there, by those that a fast run writes directly."""
+        import pyarrow as pa  # heavy, and only needed where there are small parts
+        import pyarrow.parquet as pq
+
+        from boulder_sweep.store.schema import judged_rows
+
+        for names in self._folder.manifest.mergeable():
+            if self._stopped.is_set():
+                return
+            try:
+                contents = [(self._folder.path / name).read_bytes() for name in names]
+                sources = [pa.BufferReader(content) for content in contents]
+                tables = [pq.read_table(source, page_checksum_verification=True) for source in sources]
+            except (OSError, pa.ArrowException) as problem:
+                self._folder.check()
+                raise DamagedError(f"{self._folder.path} was damaged during the run: {problem}") from problem
+            first = self._folder.manifest.parts[names[0]].first
+            merged = self._computation.encoded(first, [judged_rows(table) for table in tables])
+            self._folder.merge(names, merged.content)
 
 
 class Run:
@@ -104,30 +226,23 @@ class Run:
         workers = self._workers(computation, commit_every_s)
         if progress is not None and self._cluster is not None and self._cluster.dashboard:
             self.notes.append(f"dashboard of the cluster: {self._cluster.dashboard}")
-        if workers is None:
-            committer = Committer(self._folder, computation)
-        else:
-            committer = Committer(self._folder, computation, workers.release, workers.flush)
+        committer = Committer(self._folder, computation, workers)
         try:
-            committer.start()
-            if workers is None:
-                committer.finish()
-            else:
+            with telling_start_failure(self.jobs):
+                committer.start()
                 workers.start()
             self._coordinate(workers, committer, progress)
         except BaseException as stop:
             patience = _PATIENCE_S if isinstance(stop, KeyboardInterrupt) else _PATIENCE_AFTER_PROBLEM_S
-            if workers is not None:
-                workers.stop()
-                _join(workers, patience / 3)
-                while not workers.messages.empty():  # parts written meanwhile
-                    message = workers.messages.get()
-                    if isinstance(message, StagedPart):
-                        committer.put(message)
+            workers.stop()
+            _join(workers, patience / 3)
+            while not workers.messages.empty():  # parts written meanwhile
+                message = workers.messages.get()
+                if isinstance(message, StagedPart):
+                    committer.put(message)
             committer.stop()
             _join(committer, patience)
-            without_workers = isinstance(stop, BackendError) and not isinstance(stop, ClusterLostError)
-            if without_workers or start_failure(stop, self.jobs):
+            if isinstance(stop, BackendError) and not isinstance(stop, ClusterLostError):
                 self._discard()  # unless something was written, there is nothing to resume
             raise
 
@@ -173,10 +288,10 @@ class Run:
             rows_per_part=self._folder.manifest.rows_per_part,
         )
 
-    def _workers(self, computation: Computation, commit_every_s: float) -> ThreadWorkers | ClusterWorkers | None:
-        """Return the workers for the missing rows; None if there are no missing rows."""
-        if self._estimate is None:
-            return None
+    def _workers(self, computation: Computation, commit_every_s: float) -> Workers:
+        """Return the workers for the missing rows."""
+        if self._estimate is None:  # no row is missing
+            return Workers()
         manifest, size = self._folder.manifest, self._estimate.rows_per_block
         if self._cluster is not None:
             rows = rows_per_task(self._estimate, manifest.rows_per_part)
@@ -187,15 +302,13 @@ class Run:
         ranges = blocks(manifest.missing(), size)
         return ThreadWorkers(self.jobs, computation, ranges, most, self._folder, commit_every_s)
 
-    def _coordinate(
-        self, workers: ThreadWorkers | ClusterWorkers | None, committer: Committer, progress: Report | None
-    ) -> None:
+    def _coordinate(self, workers: Workers, committer: Committer, progress: Report | None) -> None:
         """Pass messages on until everything is written."""
         begun = reported = time.monotonic()
-        ended = workers is None
+        ended = False
         while committer.is_alive():
             self._signals.check()
-            if workers is None or ended:
+            if ended:
                 committer.join(_LOOK_EVERY_S)
             else:
                 with suppress(queue.Empty):

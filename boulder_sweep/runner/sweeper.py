@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.errors import BoulderSweepError, ClusterLostError, ComputationError, Interrupted
+from boulder_sweep.errors import ClusterLostError, ComputationError, Interrupted
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.pilot import accuracy_of
@@ -20,11 +20,11 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample
 from boulder_sweep.runner.interruption import noted_signals
-from boulder_sweep.runner.pool import available_cores, check_backend, check_count, check_jobs, start_failure
+from boulder_sweep.runner.pool import available_cores, check_backend, check_count, check_jobs, telling_start_failure
 from boulder_sweep.runner.running import FINISHED, Report, Run, repeat_command
 from boulder_sweep.runner.running import resume_command as default_resume_command
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
-from boulder_sweep.runner.threads import COMMIT_EVERY_S
+from boulder_sweep.runner.workers import COMMIT_EVERY_S
 from boulder_sweep.store.errors import NotASweepError
 from boulder_sweep.store.manifest import Manifest, check_own, load
 from boulder_sweep.store.opening import ClaimedFolder, claim_output
@@ -132,26 +132,28 @@ def run(
                 return whole.end(how)
             if remote:
                 signals.attempt(claimed.release, hurry=True)
-                return claimed.rows_done
-            return claimed.release()
+            else:
+                claimed.release()
+            return claimed.rows_done
 
         try:
-            if not force:
-                refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
-            accuracy = signals.call(lambda: accuracy_of(sweep))
-            evaluation = evaluation_of(sweep, accuracy, simulate)
-            manifest = Manifest(
-                identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()),
-                sweep.n_designs,
-                rows_per_part,
-                again,
-            )
-            session = new_session(command or "boulder_sweep.run", jobs, backend)
-            begin = partial(claimed.open, manifest, session)
-            folder = signals.call(begin, lambda late: late.close("interrupted")) if remote else begin()
-            whole = Run(sweep, evaluation, folder, signals)
-            whole.prepare(backend, jobs, scheduler, dashboard, force)
-            whole.compute(progress, commit_every_s)
+            with telling_start_failure(jobs):
+                if not force:
+                    refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
+                accuracy = signals.call(lambda: accuracy_of(sweep))
+                evaluation = evaluation_of(sweep, accuracy, simulate)
+                manifest = Manifest(
+                    identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()),
+                    sweep.n_designs,
+                    rows_per_part,
+                    again,
+                )
+                session = new_session(command or "boulder_sweep.run", jobs, backend)
+                begin = partial(claimed.open, manifest, session)
+                folder = signals.call(begin, lambda late: late.close("interrupted")) if remote else begin()
+                whole = Run(sweep, evaluation, folder, signals)
+                whole.prepare(backend, jobs, scheduler, dashboard, force)
+                whole.compute(progress, commit_every_s)
         except Interrupted as stop:
             done = ended(f"interrupted by signal {stop.signum}")
             raise Interrupted(stop.signum, done, sweep.n_designs, again) from None
@@ -161,8 +163,6 @@ def run(
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
         except BaseException as problem:
             ended(f"stopped by {type(problem).__name__}: {problem}")
-            if not isinstance(problem, BoulderSweepError) and (failure := start_failure(problem, jobs)):
-                raise failure from problem
             raise
         whole.end(FINISHED)
     return summary_of(

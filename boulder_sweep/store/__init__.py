@@ -14,6 +14,6 @@ A folder contains
 
 from boulder_sweep.store.errors import StoreError
 from boulder_sweep.store.reader import read
-from boulder_sweep.store.status import RunStatus, status
+from boulder_sweep.store.verify import RunStatus, status
 
 __all__ = ["RunStatus", "StoreError", "read", "status"]

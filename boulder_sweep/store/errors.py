@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError
-from boulder_sweep.locations import Location
+from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.text import printable
 
 _LONGEST = 200
@@ -21,6 +21,12 @@ def settings_file(place: object) -> str:
 
 class StoreError(BoulderSweepError):
     """An output folder cannot be used, or can no longer be written."""
+
+
+def refuse_to_guess(place: Location, problem: OSError) -> None:
+    """Raise StoreError where a file is on an object store: what does not answer is not damaged."""
+    if isinstance(place, RemotePath):
+        raise StoreError(f"{place} cannot be read: {problem.strerror}") from None
 
 
 class OutputExistsError(StoreError):

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, survive a power cut once they are there, and lie where they may.
+"""Files that appear whole or not at all, survive a power cut once they are there, and lie where they may; their names.
 
 A file is written without a name where the file system can do that (``O_TMPFILE``: Linux on ext4, XFS,
 Btrfs, tmpfs), else under a name that begins with ``_``; it is flushed to the disk, gets its name in one step,
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -23,17 +24,65 @@ from boulder_sweep.store.errors import LinkError
 
 MANIFEST_NAME = "_manifest.parquet"
 """A folder with such a file is the result of a run, see `manifest`."""
+LOCK_NAME = "_lock"
+PROBE_PREFIX = "_probe-"
+"""Of objects that are written to find out what an object store can."""
 WRITING_SUFFIX = ".writing"
 """Suffix of a file that does not have its final name yet; such names begin with ``_``, and readers skip them."""
+PART_SUFFIX = ".parquet"
+_DIGITS = 12
+_PART_NAME = re.compile(rf"rows-[0-9]{{{_DIGITS},}}(-[0-9]{{{_DIGITS},}})?{re.escape(PART_SUFFIX)}")
+"""The first tables named a part by its first row only."""
+_VERSION_NAME = re.compile(rf"_manifest-([0-9]{{{_DIGITS}}})\.parquet")
+_TOKENS = re.compile(r"(\.[0-9a-f]{16})+$")
 _PIECE = 8 << 20
 _SHOWN = 40
 """Characters of a name that are repeated in a temporary one: four bytes each, and 255 bytes are a name's limit."""
 _FATAL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
+def part_name(first: int, stop: int, table_rows: int) -> str:
+    """Return the file name of the part with the rows [first, stop) of a table; names sort as the rows do."""
+    digits = max(_DIGITS, len(str(table_rows)))
+    return f"rows-{first:0{digits}d}-{stop:0{digits}d}{PART_SUFFIX}"
+
+
+def is_part_name(name: str) -> bool:
+    """Whether a file name is that of a part."""
+    return bool(_PART_NAME.fullmatch(name))
+
+
+def version_name(number: int) -> str:
+    """Return the name of a version of the manifest on an object store, see `storage`."""
+    return f"_manifest-{number:0{_DIGITS}d}.parquet"
+
+
+def version_number(name: str) -> int | None:
+    """Return which version of a manifest has a name; None for another name."""
+    match = _VERSION_NAME.fullmatch(name)
+    return None if match is None else int(match[1])
+
+
 def hidden_name(name: str) -> str:
     """Return the temporary name of a file, such as a merged part while the parts it replaces still exist."""
     return f"_{name}{WRITING_SUFFIX}"
+
+
+def staged_name(name: str, token: str, sha256: str) -> str:
+    """Return the temporary name of a part: no other run, and no other content, has the same."""
+    return hidden_name(f"{name}.{token}.{sha256[:16]}")
+
+
+def is_kept(name: str) -> bool:
+    """Whether a file stays when a run begins: the lock and the manifest, which is replaced in one step."""
+    return name in (LOCK_NAME, MANIFEST_NAME) or version_number(name) is not None
+
+
+def is_ours(name: str) -> bool:
+    """Whether a sweep gives its files such a name, temporary names included."""
+    if name.endswith(WRITING_SUFFIX):
+        return name.startswith("_") and is_ours(_TOKENS.sub("", name[1 : -len(WRITING_SUFFIX)]))
+    return is_part_name(name) or is_kept(name) or name.startswith(PROBE_PREFIX)
 
 
 def is_file(path: Path) -> bool:

@@ -7,7 +7,7 @@ keeps renewing the time of ``_lock``.
 
 An object store has no locks: ``_lock`` holds the name of the holder and the time of its last heartbeat. That keeps two
 runs from working at the same time. Should one believe that the other is dead while it is not, it still cannot spoil
-the table: a version of the manifest is written once, see `generations`.
+the table: a version of the manifest is written once, see `storage`.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from typing import Any
 
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, LinkError, StoreError, WriteError
+from boulder_sweep.store.files import LOCK_NAME
 
-LOCK_NAME = "_lock"
 HEARTBEAT_S = 10.0
 """How often the holder renews the lock [s]."""
 DEAD_AFTER_S = 6 * HEARTBEAT_S

@@ -3,46 +3,39 @@
 It is the file ``_manifest.parquet``: the columns of the table, no rows, and the records as JSON in its
 metadata. A reader that takes every file of the folder for a part (DuckDB, Polars) then finds no rows in it,
 where any other kind of file would make it fail.
+
+Records have the form that this version knows. An entry that another version has more is left out, and one that was
+added since may be missing; both are noted, and no run goes on there. Anything else is refused, never guessed at.
+docs/formats.md says what may change between versions.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import re
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from itertools import pairwise
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.store.errors import (
-    DamagedError,
-    ImpossibleRecordsError,
-    NotASweepError,
-    OtherVersionError,
-    settings_file,
-)
-from boulder_sweep.store.files import MANIFEST_NAME, WRITING_SUFFIX, hidden_name
-from boulder_sweep.store.generations import is_generation, is_probe
-from boulder_sweep.store.lock import LOCK_NAME
-from boulder_sweep.store.records import IDENTITY, check_kinds, entries_of, is_deep, version_of
+from boulder_sweep.store import errors
+from boulder_sweep.store.files import MANIFEST_NAME, PART_SUFFIX, hidden_name, part_name
+from boulder_sweep.store.provenance import IDENTITY_KINDS, Session
 from boulder_sweep.store.storage import Storage, storage_of
 
 _KEY = b"boulder_sweep.manifest"
 _FORMAT = 1
 """Of tables, apart from the version of the package: docs/formats.md says when it must grow."""
 _IN_EVERY_TABLE = frozenset({DESIGN_ID.name, *INPUT_COLUMNS, "verdict", "reason"})
-_PART_PREFIX, _PART_SUFFIX = "rows-", ".parquet"
-_DIGITS = 12
-_PART_NAME = re.compile(rf"{_PART_PREFIX}[0-9]{{{_DIGITS},}}(-[0-9]{{{_DIGITS},}})?{re.escape(_PART_SUFFIX)}")
-"""The first tables named a part by its first row only."""
 _MOST_ROWS = 2**63 - 1
 _LONGEST_REASON = 200
-_TOKENS = re.compile(r"(\.[0-9a-f]{16})+$")
+_DEEPEST = 32
+"""Most levels of nested records; a settings file has fewer than ten."""
 
 
 @dataclass(frozen=True)
@@ -82,21 +75,10 @@ class Merge:
     part: Part
     replaced: list[str]
 
-
-@dataclass
-class Session:
-    """One run into the folder: the first, or one that resumed."""
-
-    started: str
-    host: str
-    pid: int
-    cpu: str
-    jobs: int
-    backend: str
-    command: str
-    ended: str | None = None
-    how: str | None = None
-    """How it ended: ``finished``, or what stopped it; None while it runs, and also if it was killed."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its file, final or temporary, in the order to try: it may be renamed between the first two tries."""
+        return self.name, hidden_name(self.name), self.name
 
 
 @dataclass
@@ -141,27 +123,20 @@ class Manifest:
         return sum(part.rows for part in self.parts.values())
 
     @property
+    def ranges(self) -> list[tuple[int, int]]:
+        """Rows [first, stop) of the finished parts, in order."""
+        return sorted((part.first, part.stop) for part in self.parts.values())
+
+    @property
     def verdicts(self) -> dict[str, int]:
         """How many finished rows have each verdict and reason, keyed as in `Part`."""
-        total: dict[str, int] = {}
-        for part in self.parts.values():
-            for key, count in part.verdicts.items():
-                total[key] = total.get(key, 0) + count
-        return dict(sorted(total.items()))
+        return total_verdicts(self.parts.values())
 
     def missing(self) -> Iterator[tuple[int, int]]:
         """Return the missing ranges [start, stop) of rows, in order, none across two parts."""
-        there = sorted((part.first, part.stop) for part in self.parts.values())
-        return self._gaps([*there, (self.rows, self.rows)])
-
-    def _gaps(self, there: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
-        """Yield what lies between ranges, cut at the ends of parts."""
         start = 0
-        for first, stop in there:
-            while start < first:
-                end = min(start - start % self.rows_per_part + self.rows_per_part, first)
-                yield start, end
-                start = end
+        for first, stop in [*self.ranges, (self.rows, self.rows)]:
+            yield from parts_of(start, first, self.rows_per_part)
             start = stop
 
     def mergeable(self) -> list[list[str]]:
@@ -188,28 +163,20 @@ class Manifest:
         return (*resting, *(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
 
 
-def part_name(first: int, stop: int, table_rows: int) -> str:
-    """Return the file name of the part with the rows [first, stop) of a table; names sort as the rows do."""
-    digits = max(_DIGITS, len(str(table_rows)))
-    return f"{_PART_PREFIX}{first:0{digits}d}-{stop:0{digits}d}{_PART_SUFFIX}"
+def total_verdicts(parts: Iterable[Part]) -> dict[str, int]:
+    """Count the rows of each verdict and reason in several parts."""
+    total: Counter[str] = Counter()
+    for part in parts:
+        total.update(part.verdicts)
+    return dict(sorted(total.items()))
 
 
-def staged_name(name: str, token: str, sha256: str) -> str:
-    """Return the temporary name of a part: no other run, and no other content, has the same."""
-    return hidden_name(f"{name}.{token}.{sha256[:16]}")
-
-
-def is_ours(name: str) -> bool:
-    """Whether a sweep gives its files such a name, temporary names included."""
-    if name.endswith(WRITING_SUFFIX):
-        return name.startswith("_") and is_ours(_TOKENS.sub("", name[1 : -len(WRITING_SUFFIX)]))
-    known = is_part_name(name) or is_generation(name) or is_probe(name)
-    return known or name in (MANIFEST_NAME, LOCK_NAME)
-
-
-def is_part_name(name: str) -> bool:
-    """Whether a file name is that of a part."""
-    return bool(_PART_NAME.fullmatch(name))
+def parts_of(start: int, stop: int, size: int) -> Iterator[tuple[int, int]]:
+    """Cut rows [start, stop) at the ends of parts, lazily."""
+    while start < stop:
+        end = min(start - start % size + size, stop)
+        yield start, end
+        start = end
 
 
 def save(manifest: Manifest, storage: Storage) -> None:
@@ -264,24 +231,24 @@ def load(folder: Location) -> Manifest:
         with storage_of(folder).open_manifest() as file:  # pyarrow takes no names that are not Unicode
             found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
-        raise NotASweepError(_no_result(folder)) from None
+        raise errors.NotASweepError(_no_result(folder)) from None
     except (OSError, pa.ArrowException) as problem:
-        raise DamagedError(f"{path} cannot be read: {problem}") from problem
+        raise errors.DamagedError(f"{path} cannot be read: {problem}") from problem
     except ValueError as problem:  # a name of a column that is no text
-        raise ImpossibleRecordsError(path, str(problem)) from None
+        raise errors.ImpossibleRecordsError(path, str(problem)) from None
     value = (found.metadata or {}).get(_KEY, b"")
     checksum, text = value[:64], value[64:]
     if hashlib.sha256(text).hexdigest().encode() != checksum:
-        raise DamagedError(
+        raise errors.DamagedError(
             f"{path} is damaged: its checksum does not match. The parts beside it can still be read as a "
             f"table, but no run can resume from them"
         )
     try:
         content = json.loads(text)
-        if is_deep(content):
+        if _is_deep(content):
             raise ValueError("its records are nested too deeply")
     except (ValueError, RecursionError) as problem:
-        raise ImpossibleRecordsError(path, str(problem)) from None
+        raise errors.ImpossibleRecordsError(path, str(problem)) from None
     try:
         manifest = _from_json(content)
         _check_claims(path, manifest)
@@ -289,9 +256,9 @@ def load(folder: Location) -> Manifest:
         manifest.differing = [*_differing_columns(manifest), *manifest.differing]
         return manifest
     except ValueError as unfamiliar:
-        version = version_of(content)
+        version = _version_of(content)
         why = shorten(str(unfamiliar), _LONGEST_REASON)
-        raise OtherVersionError(path, why, None if version is None else shorten(version)) from None
+        raise errors.OtherVersionError(path, why, None if version is None else shorten(version)) from None
 
 
 def _check_claims(path: Location, manifest: Manifest) -> None:
@@ -304,27 +271,27 @@ def _check_claims(path: Location, manifest: Manifest) -> None:
     """
     rows, size, parts, merge = manifest.rows, manifest.rows_per_part, manifest.parts, manifest.merge
     if not (0 <= rows <= _MOST_ROWS and 1 <= size <= _MOST_ROWS):
-        raise ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
+        raise errors.ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
     for name, part in (*parts.items(), *([] if merge is None else [(merge.name, merge.part)])):
         within = 0 <= part.first < part.stop <= rows and part.first // size == (part.stop - 1) // size
         own = part_name(part.first, part.stop, rows) if within else ""
         # The first tables named the first row only. More zeros would sort otherwise than the rows do.
-        if not within or name not in (own, own.rpartition("-")[0] + _PART_SUFFIX):
-            raise ImpossibleRecordsError(path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}")
+        if not within or name not in (own, own.rpartition("-")[0] + PART_SUFFIX):
+            raise errors.ImpossibleRecordsError(path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}")
         if part.bytes < 1 or not all(type(count) is int and count >= 0 for count in part.verdicts.values()):
-            raise ImpossibleRecordsError(path, f"{name} with impossible counts")
-    for (_, stop), (first, _) in pairwise(sorted((part.first, part.stop) for part in parts.values())):
+            raise errors.ImpossibleRecordsError(path, f"{name} with impossible counts")
+    for (_, stop), (first, _) in pairwise(manifest.ranges):
         if first < stop:
-            raise ImpossibleRecordsError(path, f"row {first} twice")
+            raise errors.ImpossibleRecordsError(path, f"row {first} twice")
     if merge is not None:
         if not all(isinstance(name, str) and name in parts for name in merge.replaced) or merge.name in parts:
-            raise ImpossibleRecordsError(path, "a merge of parts that it does not have")
+            raise errors.ImpossibleRecordsError(path, "a merge of parts that it does not have")
         edges = sorted(edge for name in merge.replaced for edge in (parts[name].first, parts[name].stop))
         # Neighbours share an edge, each of which is there twice, and the ends are those of the merged part.
         ends = [merge.part.first, merge.part.stop]
         if [*edges[:1], *edges[-1:]] != ends or edges[1:-1:2] != edges[2:-1:2]:
-            raise ImpossibleRecordsError(path, "a merge of other rows than it replaces")
-    check_kinds(path, "identity", manifest.identity, IDENTITY)
+            raise errors.ImpossibleRecordsError(path, "a merge of other rows than it replaces")
+    _check_kinds(path, "identity", manifest.identity, IDENTITY_KINDS)
 
 
 def check_own(manifest: Manifest, folder: Location) -> None:
@@ -337,7 +304,9 @@ def check_own(manifest: Manifest, folder: Location) -> None:
     """
     if manifest.differing:
         why = "; ".join(manifest.differing[:3]) + ("; ..." if len(manifest.differing) > 3 else "")
-        raise OtherVersionError(folder / MANIFEST_NAME, shorten(why, 300), version_of({"identity": manifest.identity}))
+        raise errors.OtherVersionError(
+            folder / MANIFEST_NAME, shorten(why, 300), _version_of({"identity": manifest.identity})
+        )
 
 
 def _no_result(folder: Location) -> str:
@@ -346,7 +315,7 @@ def _no_result(folder: Location) -> str:
         return f"there is no {folder}; the result of a run is a folder, such as m30-sizing.sweep"
     if folder.is_dir():
         return f"{folder} is not the result of a sweep (no {MANIFEST_NAME})"
-    if advice := settings_file(folder):
+    if advice := errors.settings_file(folder):
         return advice
     around = folder.resolve().parent
     advice = "; `sweep report`, `plot`, `export` and `compare` take a file of answers"
@@ -387,20 +356,93 @@ def _from_json(content: Any) -> Manifest:
         raise ValueError(f"its format is {content['format']}, and this version knows {_FORMAT} only")
     differing: list[str] = []
     known = {key: value for key, value in content.items() if key != "format"}
-    entries = entries_of(Manifest, "the manifest", known, differing)
-    parts = {name: _part(name, record, differing) for name, record in entries["parts"].items()}
-    sessions = [
-        Session(**entries_of(Session, "the record of a run", record, differing)) for record in entries["sessions"]
-    ]
-    merge = None
+    entries = _entries_of(Manifest, "the manifest", known, differing)
+    entries["parts"] = {name: _part(name, record, differing) for name, record in entries["parts"].items()}
+    runs = [_entries_of(Session, "the record of a run", record, differing) for record in entries["sessions"]]
+    entries["sessions"] = [Session(**run) for run in runs]
     if entries.get("merge") is not None:
-        merging = entries_of(Merge, "the record of a merge", entries["merge"], differing)
-        merge = Merge(**{**merging, "part": _part(merging["name"], merging["part"], differing)})
-    return Manifest(**{**entries, "parts": parts, "sessions": sessions, "merge": merge, "differing": differing})
+        merge = _entries_of(Merge, "the record of a merge", entries["merge"], differing)
+        entries["merge"] = Merge(**{**merge, "part": _part(merge["name"], merge["part"], differing)})
+    return Manifest(**entries, differing=differing)
 
 
 def _part(name: str, record: Any, differing: list[str]) -> Part:
     """Rebuild the record of a part; the first tables kept the size of a file, which could still grow, apart."""
     if isinstance(record, dict) and isinstance(record.get("now"), dict):
         record = {**record, **record["now"]}
-    return Part(**entries_of(Part, f"the record of {shorten(name)}", record, differing))
+    return Part(**_entries_of(Part, f"the record of {shorten(name)}", record, differing))
+
+
+def _entries_of(record: type, what: str, content: Any, differing: list[str]) -> dict[str, Any]:
+    """Return the known entries of a record, if all that its dataclass needs are there, with values of the right type.
+
+    `what` describes the record, for the message. Nested records are not checked. What another version wrote otherwise
+    is added to the lines `differing`: entries that are unknown, or missing though they have a default.
+
+    Raises
+    ------
+    ValueError
+        An entry without a default is missing, or one is of another type; the text says which.
+    """
+    if not isinstance(content, dict):
+        raise ValueError(f"{what} has no named entries")
+    types = get_type_hints(record)
+    expected = {entry.name for entry in fields(record) if entry.compare}
+    needed = {entry.name for entry in fields(record) if entry.default is MISSING} & expected
+    wrong = [f"{name} is missing" for name in sorted(needed - content.keys())]
+    wrong += [
+        f"{name} is {content[name]!r:.60}"
+        for name in sorted(expected & content.keys())
+        if not _fits(content[name], types[name])
+    ]
+    if wrong:
+        raise ValueError(f"{what}: {', '.join(wrong)}")
+    differing += [f"{what}: {name} is unknown" for name in sorted(content.keys() - expected)]
+    differing += [f"{what}: {name} is missing" for name in sorted(expected - needed - content.keys())]
+    return {name: value for name, value in content.items() if name in expected}
+
+
+def _is_deep(content: Any) -> bool:
+    """Whether records are nested so deeply that functions that call themselves could fail."""
+    level = [content]
+    for _ in range(_DEEPEST):
+        nested = [one.values() if isinstance(one, dict) else one for one in level if isinstance(one, dict | list)]
+        level = [value for values in nested for value in values]
+    return bool(level)
+
+
+def _check_kinds(path: Location, what: str, content: Any, kinds: Any) -> None:
+    """Check the kinds of those nested entries that are looked at by name.
+
+    Raises
+    ------
+    ImpossibleRecordsError
+        One is of another kind.
+    """
+    if isinstance(kinds, type):
+        if not isinstance(content, kinds):
+            raise errors.ImpossibleRecordsError(path, f"{what} that is {type(content).__name__}")
+        return
+    _check_kinds(path, what, content, dict)
+    for name in kinds.keys() & content.keys():
+        _check_kinds(path, f"{what}.{name}", content[name], kinds[name])
+
+
+def _version_of(content: Any) -> str | None:
+    """Return the version of boulder-sweep that wrote the records of a manifest; None if it is not recorded."""
+    for key in ("identity", "versions", "boulder-sweep"):
+        content = content.get(key) if isinstance(content, dict) else None
+    return content if isinstance(content, str) else None
+
+
+def _fits(value: Any, type_: Any) -> bool:
+    """Whether a value from a JSON file has the annotated type; contents of lists are not checked."""
+    if type_ is type(None):
+        return value is None
+    kinds = get_args(type_) if get_origin(type_) not in (dict, list) else ()
+    if kinds:
+        return any(_fits(value, kind) for kind in kinds)
+    kind = get_origin(type_) or type_
+    if kind is int and isinstance(value, bool):
+        return False
+    return isinstance(value, kind if kind in (str, int, dict, list) else dict)

@@ -7,19 +7,9 @@ from typing import Any
 
 from boulder_sweep.locations import Location
 from boulder_sweep.store import errors
-from boulder_sweep.store.generations import is_generation
-from boulder_sweep.store.lock import LOCK_NAME
-from boulder_sweep.store.manifest import (
-    MANIFEST_NAME,
-    Manifest,
-    Session,
-    check_own,
-    is_ours,
-    is_part_name,
-    load,
-    save,
-)
-from boulder_sweep.store.provenance import PREFIX, differences
+from boulder_sweep.store.files import MANIFEST_NAME, is_kept, is_ours, is_part_name
+from boulder_sweep.store.manifest import Manifest, check_own, load, save
+from boulder_sweep.store.provenance import PREFIX, Session, differences
 from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
 from boulder_sweep.store.writer import OutputFolder, recover_merge
@@ -35,10 +25,10 @@ class ClaimedFolder:
         Rows that a resumed run keeps, if their parts are intact.
     """
 
-    def __init__(self, out: Location, storage: Storage, lock: Lock, resume: bool, overwrite: bool, created: bool):
-        self._out, self._storage, self._lock, self._created = out, storage, lock, created
+    def __init__(self, storage: Storage, lock: Lock, resume: bool, overwrite: bool):
+        self._storage, self._lock = storage, lock
         self._names = storage.names()
-        there = _allowed(out, storage, self._names, resume, overwrite)
+        there = _allowed(storage, self._names, resume, overwrite)
         self._there = None if overwrite else there
         self.rows_done = 0 if self._there is None else self._there.rows_done
         storage.check_writable()
@@ -62,39 +52,37 @@ class ClaimedFolder:
         """
         try:
             if self._there is None:
-                self._storage.remove(name for name in self._names if is_ours(name) and not _is_kept(name))
-                folder = OutputFolder(self._out, self._storage, self._lock, manifest, self._created)
+                self._storage.remove(name for name in self._names if is_ours(name) and not is_kept(name))
+                folder = OutputFolder(self._storage, self._lock, manifest)
             else:
                 folder = self._resumed(manifest, self._there)
             folder.manifest.sessions.append(session)
             save(folder.manifest, self._storage)
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._out}: {why(problem)}") from problem
+            raise errors.WriteError(f"cannot write into {self._storage.path}: {why(problem)}") from problem
         return folder
 
-    def release(self) -> int:
-        """Release the folder as it was; return the rows in it."""
+    def release(self) -> None:
+        """Release the folder as it was."""
         self._lock.release()
-        if self._created:
-            self._storage.unmake()
-        return self.rows_done
+        self._storage.unmake()
 
     def _resumed(self, manifest: Manifest, there: Manifest) -> OutputFolder:
         """Resume the run in the folder, if it is the same."""
-        out, storage = self._out, self._storage
+        storage = self._storage
         different = differences(there.identity, manifest.identity)
         if there.rows != manifest.rows:
             different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
         if different:
-            raise errors.SettingsDifferError(out, different)
+            raise errors.SettingsDifferError(storage.path, different)
         there.identity = manifest.identity  # the heading of reports may be another
-        recover_merge(there, out, storage)
+        recover_merge(there, storage)
         # Where the storage checks content itself, reading all of it again may take hours.
-        damaged = damaged_parts(out, there.parts, read_parts=not storage.checks_content)
+        damaged = damaged_parts(storage.path, there.parts, read_parts=not storage.checks_content)
         there.parts = {name: part for name, part in there.parts.items() if name not in damaged}
         there.resume_command = manifest.resume_command
-        storage.remove(name for name in self._names if is_ours(name) and name not in there.parts and not _is_kept(name))
-        folder = OutputFolder(out, storage, self._lock, there, created=False)
+        storage.remove(name for name in self._names if is_ours(name) and name not in there.parts and not is_kept(name))
+        folder = OutputFolder(storage, self._lock, there)
         folder.damaged = damaged
         return folder
 
@@ -119,52 +107,44 @@ def claim_output(out: Location, *, resume: bool = False, overwrite: bool = False
     if resume and overwrite:
         raise errors.StoreError("--resume and --overwrite cannot be used together")
     storage = storage_of(out)
-    created = storage.make()
+    storage.make()
     lock = None
     try:
-        lock = _locked(out, storage)
-        return ClaimedFolder(out, storage, lock, resume, overwrite, created)
+        lock = _locked(storage)
+        return ClaimedFolder(storage, lock, resume, overwrite)
     except BaseException as problem:
         if lock is not None:
             lock.release()
-        if created:
-            storage.unmake()
+        storage.unmake()
         if isinstance(problem, OSError):
             raise errors.WriteError(f"cannot write into {out}: {why(problem)}") from problem
         raise
 
 
-def open_output(
-    out: Location, manifest: Manifest, session: Session, *, resume: bool = False, overwrite: bool = False
-) -> OutputFolder:
-    """Open a folder for a run at once: `claim_output`, then `ClaimedFolder.open`."""
-    claimed = claim_output(out, resume=resume, overwrite=overwrite)
-    try:
-        return claimed.open(manifest, session)
-    except BaseException:
-        claimed.release()
-        raise
-
-
-def _locked(out: Location, storage: Storage) -> Lock:
+def _locked(storage: Storage) -> Lock:
     """Lock the folder; an error names who else may hold it."""
     holder, host = "another run", None
     with suppress(errors.StoreError):
-        sessions = load(out).sessions
+        sessions = load(storage.path).sessions
         if sessions and sessions[-1].ended is None:
             last = sessions[-1]
             holder, host = f"process {last.pid} on {last.host} since {last.started}", last.host
     return storage.lock(host, holder)
 
 
-def _allowed(out: Location, storage: Storage, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
+def _allowed(storage: Storage, names: list[str], resume: bool, overwrite: bool) -> Manifest | None:
     """Check that a run may use a folder; return its manifest, None if there is none to resume from."""
+    out = storage.path
     names = [name for name in names if not (name == ".DS_Store" or name.startswith(".nfs"))]  # of the system
     foreign = [name for name in names if not is_ours(name) or storage.is_folder(name)]
     there = None
-    if not (overwrite and not _is_readable(out)):
-        with suppress(errors.NotASweepError):
-            there = load(out)
+    try:
+        there = load(out)
+    except errors.NotASweepError:
+        pass
+    except (errors.DamagedError, errors.OtherVersionError):
+        if not overwrite:
+            raise
     parts = [name for name in names if is_part_name(name)]
     if there is None and not overwrite and parts:
         raise errors.DamagedError(f"{out} contains parts but no {MANIFEST_NAME}; use --overwrite to start again")
@@ -178,20 +158,6 @@ def _allowed(out: Location, storage: Storage, names: list[str], resume: bool, ov
     if there is not None and not (resume or overwrite):
         raise errors.OutputExistsError(out, there.rows_done, there.rows)
     return there
-
-
-def _is_kept(name: str) -> bool:
-    """Whether a file stays when a run begins: the lock and the manifest, which is replaced in one step."""
-    return name in (LOCK_NAME, MANIFEST_NAME) or is_generation(name)
-
-
-def _is_readable(out: Location) -> bool:
-    """Whether the manifest is intact and in this version's format."""
-    try:
-        load(out)
-    except (errors.DamagedError, errors.OtherVersionError, errors.NotASweepError):
-        return False
-    return True
 
 
 def _is_written_by_us(path: Location) -> bool:

@@ -17,6 +17,7 @@ import platform
 import socket
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from importlib.util import find_spec
@@ -25,7 +26,6 @@ from typing import Any
 
 from boulder_sweep.settings.heading import SECTION
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.store.manifest import Session
 
 PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
@@ -41,6 +41,33 @@ _DECIDING_SOURCES = (
     "stones/rock.py",
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
+IDENTITY_KINDS = {
+    "settings": {"name": str, "inputs": dict, "model": dict, "criterion": dict, "solver": dict, "labels": dict},
+    "readings": dict,
+    "control": dict,
+    "accuracy": dict,
+    "versions": dict,
+    "settings_sha256": str,
+    "kernels_sha256": str,
+    "rules_sha256": str,
+}
+"""Kinds of the entries of an identity that are looked at by name."""
+
+
+@dataclass
+class Session:
+    """One run into the folder: the first, or one that resumed."""
+
+    started: str
+    host: str
+    pid: int
+    cpu: str
+    jobs: int
+    backend: str
+    command: str
+    ended: str | None = None
+    how: str | None = None
+    """How it ended: ``finished``, or what stopped it; None while it runs, and also if it was killed."""
 
 
 def canonical(content: Any) -> str:

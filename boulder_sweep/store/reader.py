@@ -18,8 +18,7 @@ from boulder_sweep.columns import COLUMNS, OUTCOMES, column_spec
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.store.errors import DamagedError, StoreError
-from boulder_sweep.store.files import hidden_name
+from boulder_sweep.store.errors import DamagedError, StoreError, refuse_to_guess
 from boulder_sweep.store.manifest import Manifest, Part, load
 from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.verify import load_checked, wrong_bytes
@@ -185,7 +184,7 @@ class FinishedRows:
         self._folder = folder
         self._schemas: dict[str, pa.Schema] = {}
         self._places = _Places(manifest)
-        self._ranges = sorted((part.first, part.stop) for part in manifest.parts.values())
+        self._ranges = manifest.ranges
 
     def _other_columns(self, today: Sequence[str]) -> Iterator[str]:
         """Say which columns the table has more or less than one of this version."""
@@ -213,7 +212,7 @@ class FinishedRows:
 
         _, damaged = load_checked(self._folder, read_parts=False)
         if damaged:
-            raise DamagedError(_damage_text(self._folder, damaged))
+            raise self._damaged(damaged)
         wanted = list(columns) if columns is not None else None
         ahead: deque[Future[list[pa.Table]]] = deque()
         with ThreadPoolExecutor(_THREADS) as pool:
@@ -262,15 +261,14 @@ class FinishedRows:
                 except FileNotFoundError:
                     continue
                 except OSError as problem:
-                    if isinstance(self._folder, RemotePath):
-                        raise StoreError(f"{self._folder / name} cannot be read: {problem.strerror}") from None
-                    raise DamagedError(_damage_text(self._folder, {name: str(problem.strerror)})) from problem
+                    refuse_to_guess(self._folder / name, problem)
+                    raise self._damaged({name: str(problem.strerror)}) from problem
             before, places = places, _Places(load(self._folder))
             if places.manifest.identity != self.identity:
                 raise StoreError(f"{self._folder} was replaced by the result of another sweep while it was read")
             if places.manifest == before.manifest:
                 name = next((name for name, _ in places.of(row)), f"the part with row {row}")
-                raise DamagedError(_damage_text(self._folder, {name: "missing"}))
+                raise self._damaged({name: "missing"})
             self._places = places
 
     def _read(self, file: IO[bytes], name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
@@ -284,24 +282,31 @@ class FinishedRows:
         try:
             if verify:
                 content = file.read()
-                wrong = wrong_bytes(content, part)
-                if wrong:
-                    raise DamagedError(_damage_text(self._folder, {name: wrong}))
+                if wrong := wrong_bytes(content, part):
+                    raise self._damaged({name: wrong})
                 source = pa.BufferReader(content)
             # Parts are read in parallel already, and reading through a dataset would take twice as long.
             with pq.ParquetFile(source, page_checksum_verification=True) as opened:
                 if set(opened.schema_arrow.names) != set(self._stored):
-                    wrong = "its columns are not those of the manifest"
-                    raise DamagedError(_damage_text(self._folder, {name: wrong}))
+                    raise self._damaged({name: "its columns are not those of the manifest"})
                 schema = self._schemas.setdefault("of all parts", opened.schema_arrow)  # one step, as of threads
                 if opened.metadata.num_rows != part.rows or not opened.schema_arrow.equals(schema):
-                    raise DamagedError(_damage_text(self._folder, {name: "other rows or columns than recorded"}))
+                    raise self._damaged({name: "other rows or columns than recorded"})
                 table = opened.read(columns, use_threads=False)
         except (OSError, ValueError, pa.ArrowException) as problem:  # ValueError: a name that is no text
-            raise DamagedError(_damage_text(self._folder, {name: str(problem)})) from problem
+            raise self._damaged({name: str(problem)}) from problem
         if not self.lacking and columns is None:
             return table
         return with_columns(table, self.columns if columns is None else columns)
+
+    def _damaged(self, damaged: dict[str, str]) -> DamagedError:
+        """Return the error that says what is damaged and what to do."""
+        first, what = next(iter(damaged.items()))
+        more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
+        return DamagedError(
+            f"{self._folder} is damaged ({first}: {what}{more}). `sweep status {self._folder} --verify` lists the "
+            f"damaged parts, and running again with --resume recomputes them"
+        )
 
 
 class _Places:
@@ -321,16 +326,5 @@ class _Places:
                 yield name, self.manifest.parts[name]
         merge = self.manifest.merge
         if merge is not None and merge.part.first <= row < merge.part.stop:
-            # The final name again: the file may be renamed between the first two attempts.
-            for name in (merge.name, hidden_name(merge.name), merge.name):
+            for name in merge.names:
                 yield name, merge.part
-
-
-def _damage_text(folder: Location, damaged: dict[str, str]) -> str:
-    """Describe what is damaged and what to do."""
-    first, what = next(iter(damaged.items()))
-    more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
-    return (
-        f"{folder} is damaged ({first}: {what}{more}). `sweep status {folder} --verify` lists the damaged parts, "
-        f"and running again with --resume recomputes them"
-    )

@@ -19,14 +19,17 @@ from boulder_sweep.columns import (
     AT_REST,
     COLUMNS,
     DESIGN_ID,
+    GRADES,
     INPUTS,
     OPTIONAL_COLUMNS,
     OUTCOMES,
+    STANDINGS,
+    VERDICTS,
     ColumnSpec,
     OutcomeColumn,
     column_spec,
 )
-from boulder_sweep.judge.judged import Judged
+from boulder_sweep.judge.judged import PASS, Judged
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import Column, DesignBlock
@@ -126,6 +129,30 @@ def judged_rows(table: pa.Table) -> Judged:
         else:
             columns[spec.name] = table[spec.name].to_numpy()  # null becomes NaN
     return Judged(columns, words)
+
+
+def verdict_counts(judged: Judged) -> dict[str, int]:
+    """Count the rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` without one.
+
+    Passes are counted by their robustness, sensitive ones by what they stand under, too.
+    """
+    width = len(judged.reasons)
+    counts = np.bincount(judged.verdict.astype(np.int64) * width + judged.reason)
+    found = {}
+    for code in np.flatnonzero(counts):
+        verdict, reason = VERDICTS[code // width], judged.reasons[code % width]
+        found[f"{verdict}/{reason}" if reason else verdict] = int(counts[code])
+    passing = judged.verdict == PASS
+    grade, standing = judged["robustness"][passing], judged["stands_under"][passing]
+    found.pop("pass", None)
+    pairs = np.bincount((grade.astype(np.int64) + 1) * (len(STANDINGS) + 1) + standing + 1)  # -1 is none
+    for code in np.flatnonzero(pairs):
+        place, under = divmod(int(code), len(STANDINGS) + 1)
+        word = GRADES[place - 1]
+        laws = STANDINGS[under - 1].split(";")[1:] if word == "sensitive" and under else []
+        key = f"pass/{word}" + (f" (stands under {' and '.join(laws)})" if laws else "")
+        found[key] = found.get(key, 0) + int(pairs[code])
+    return dict(sorted((key, count) for key, count in found.items() if count))
 
 
 def _field(spec: ColumnSpec, type_: pa.DataType) -> pa.Field:

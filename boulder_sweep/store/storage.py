@@ -1,12 +1,18 @@
 """What a run does to its output folder, for folders on a disk and for folders on an object store.
 
 On a disk a file gets its final name by renaming, see `files`. An object store has no renaming: a part is put under its
-temporary name and copied to the final one within the store, and the manifest is written as numbered versions, see
-`generations`.
+temporary name and copied to the final one within the store.
+
+There, every version of the manifest is an object of its own, numbered and never changed.
+``_manifest-000000000042.parquet`` is version 42, and ``_manifest.parquet`` a copy of the newest. A request that arrives
+late, or twice, can therefore only write what is there already. The copy may be behind and a list of names may be, so
+neither is believed: whichever is further is where the search begins, and it ends where the next number does not exist.
+The last versions are kept for that.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import queue
 import threading
@@ -16,23 +22,32 @@ from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from stat import S_ISREG
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.store import errors
 from boulder_sweep.store.files import (
     MANIFEST_NAME,
+    PROBE_PREFIX,
     check_writable,
     flush_folder,
     hidden_name,
     is_file,
     opened_folder,
     put_file,
+    version_name,
+    version_number,
 )
-from boulder_sweep.store.generations import Encode, Generations, OtherWriterError, newest, refuses_existing
 from boulder_sweep.store.lock import FolderLock, ObjectLock
 from boulder_sweep.text import why
 
+KEPT = 16
+"""Versions of a manifest kept on an object store; the copy or the list may be behind by as many."""
+Encode = Callable[[Mapping[bytes, bytes]], memoryview | bytes]
+"""Gives the bytes of a manifest with some more metadata."""
+_NUMBER_KEY, _WRITER_KEY = b"boulder_sweep.generation", b"boulder_sweep.writer"
+_LONGEST_NUMBER = 12
+_ATTEMPTS = 5
 _PROBE_BYTES = 1 << 16
 """More than a first manifest takes."""
 _REQUESTS = 16
@@ -56,11 +71,12 @@ class DiskStorage(_Storage):
     checks_content = False
 
     def __init__(self, path: Path):
-        self._path = path
+        self.path = path
+        self._is_made = False
 
-    def make(self) -> bool:
-        """Create the folder if it does not exist; True if it was created."""
-        path = self._path
+    def make(self) -> None:
+        """Create the folder if it does not exist."""
+        path = self.path
         if not path.parent.is_dir():
             raise errors.StoreError(f"the folder {path.parent} does not exist: {path.name} cannot be created in it")
         try:
@@ -68,42 +84,43 @@ class DiskStorage(_Storage):
         except FileExistsError:
             if not path.is_dir():
                 raise errors.StoreError(f"{path} is a file; the output of a sweep is a folder") from None
-            return False
         except OSError as problem:
             raise errors.WriteError(f"cannot create the folder {path}: {why(problem)}") from problem
-        return True
+        else:
+            self._is_made = True
 
     def unmake(self) -> None:
-        """Remove the folder if it is empty and can be removed."""
-        with suppress(OSError):
-            self._path.rmdir()
+        """Remove the folder if `make` created it, it is empty and can be removed."""
+        if self._is_made:
+            with suppress(OSError):
+                self.path.rmdir()
 
     def lock(self, last_host: str | None, holder: str) -> Lock:
         """Become the only writer."""
-        self._lock = FolderLock(self._path, last_host, holder)
+        self._lock = FolderLock(self.path, last_host, holder)
         return self._lock
 
     def check_writable(self) -> None:
         """Raise OSError if the folder cannot be written."""
-        is_file(self._path / MANIFEST_NAME)  # a link would be refused only when old parts are gone
-        check_writable(self._path, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
+        is_file(self.path / MANIFEST_NAME)  # a link would be refused only when old parts are gone
+        check_writable(self.path, hidden_name(MANIFEST_NAME), _PROBE_BYTES)
 
     def names(self) -> list[str]:
         """Return the names in the folder."""
-        return sorted(entry.name for entry in self._path.iterdir())
+        return sorted(entry.name for entry in self.path.iterdir())
 
     def is_folder(self, name: str) -> bool:
         """Whether one of the names is that of a folder."""
-        return (self._path / name).is_dir()
+        return (self.path / name).is_dir()
 
     def put(self, name: str, content: memoryview | bytes) -> None:
         """Write a file whole or not at all, durably."""
-        put_file(self._path, name, content)
+        put_file(self.path, name, content)
 
     def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Give staged files, by their temporary names, their final names, durably."""
         self._check_lock()
-        with opened_folder(self._path) as at:
+        with opened_folder(self.path) as at:
             for staged, final in names.items():
                 os.rename(staged, final, src_dir_fd=at, dst_dir_fd=at)
             os.fsync(at)
@@ -113,24 +130,24 @@ class DiskStorage(_Storage):
         self._check_lock()
         names = sorted(names, reverse=True)  # the last rows first: no gap, wherever a run is killed
         for name in names:
-            (self._path / name).unlink(missing_ok=True)
+            (self.path / name).unlink(missing_ok=True)
         if names:
-            flush_folder(self._path)
+            flush_folder(self.path)
 
     def open_manifest(self) -> IO[bytes]:
         """Open the manifest; raises OSError."""
         # A pipe of this name must not be waited for.
-        return open(self._path / MANIFEST_NAME, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
+        return open(self.path / MANIFEST_NAME, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))
 
     def put_manifest(self, encode: Encode) -> None:
         """Replace the manifest in one step."""
         self._check_lock()
-        put_file(self._path, MANIFEST_NAME, encode({}))
+        put_file(self.path, MANIFEST_NAME, encode({}))
 
     def discard_manifest(self) -> None:
         """Remove the manifest."""
         self._check_lock()
-        (self._path / MANIFEST_NAME).unlink()
+        (self.path / MANIFEST_NAME).unlink()
 
 
 class ObjectStorage(_Storage):
@@ -140,20 +157,23 @@ class ObjectStorage(_Storage):
     """Whether it sees to it itself that a file holds what was written, so that comparing its size is enough."""
 
     def __init__(self, path: RemotePath):
-        self._path = path
+        self.path = path
         self._token = uuid.uuid4().hex
-        self._generations: Generations | None = None
+        self._only_new = False
+        """Whether the store itself refuses to write an object that exists. Otherwise it is asked before, and what it
+        holds is read back."""
+        self._version = 0
+        """Number of the newest manifest that this run knows of."""
 
-    def make(self) -> bool:
-        """Create nothing, for folders exist by their files only; True if there are none."""
+    def make(self) -> None:
+        """Create nothing, for folders exist by their files only."""
         try:
-            if S_ISREG(self._path.stat().st_mode):
-                raise errors.StoreError(f"{self._path} is a file; the output of a sweep is a folder")
+            if S_ISREG(self.path.stat().st_mode):
+                raise errors.StoreError(f"{self.path} is a file; the output of a sweep is a folder")
         except FileNotFoundError:
-            return True
+            pass
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._path}: {problem.strerror}") from None
-        return not self.names()
+            raise errors.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
 
     def unmake(self) -> None:
         """Do nothing."""
@@ -161,25 +181,24 @@ class ObjectStorage(_Storage):
     def lock(self, last_host: str | None, holder: str) -> Lock:
         """Become the only writer; then look which version of the manifest is the newest."""
         try:
-            only_new = refuses_existing(self._path, self._token)
-            lock = ObjectLock(self._path, self._token, only_new, holder)
+            self._only_new = refuses_existing(self.path, self._token)
+            self._lock = ObjectLock(self.path, self._token, self._only_new, holder)
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._path}: {problem.strerror}") from None
-        self._lock = lock
-        self._generations = Generations(self._path, self._token, only_new)
+            raise errors.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
         try:
-            self._generations.look()
+            with suppress(FileNotFoundError):
+                self._version = newest(self.path).number
         except BaseException:
-            lock.release()
+            self._lock.release()
             raise
-        return lock
+        return self._lock
 
     def check_writable(self) -> None:
         """Do nothing: `lock` has written."""
 
     def names(self) -> list[str]:
         """Return the names in the folder."""
-        return self._path.names()
+        return self.path.names()
 
     def is_folder(self, name: str) -> bool:
         """Whether one of the names is that of a folder."""
@@ -187,7 +206,7 @@ class ObjectStorage(_Storage):
 
     def put(self, name: str, content: memoryview | bytes) -> None:
         """Write a file whole or not at all."""
-        (self._path / name).put(content)
+        (self.path / name).put(content)
 
     def publish(self, names: Mapping[str, str], sizes: Mapping[str, int] | None = None) -> None:
         """Copy staged files to their final names and remove the staged ones."""
@@ -198,7 +217,7 @@ class ObjectStorage(_Storage):
     def remove(self, names: Iterable[str]) -> None:
         """Remove files that may exist, unless they are another run's by now."""
         self._check_lock()
-        self._each(lambda name: (self._path / name).unlink(missing_ok=True), names)
+        self._each(lambda name: (self.path / name).unlink(missing_ok=True), names)
 
     def open_manifest(self) -> IO[bytes]:
         """Open the newest version of the manifest.
@@ -211,32 +230,64 @@ class ObjectStorage(_Storage):
             The store does not answer, which says nothing about the manifest.
         """
         try:
-            return BytesIO(newest(self._path).content)
+            return BytesIO(newest(self.path).content)
         except FileNotFoundError:
             raise
         except OSError as problem:
-            raise errors.StoreError(f"{self._path} cannot be read: {problem.strerror}") from None
+            raise errors.StoreError(f"{self.path} cannot be read: {problem.strerror}") from None
 
     def put_manifest(self, encode: Encode) -> None:
-        """Write the next version of the manifest."""
-        if self._generations is None:
-            raise RuntimeError("a manifest is written with the lock held only")
-        try:
-            self._generations.put(encode)
-        except OtherWriterError:
-            raise errors.FolderInUseError(f"{self._path} was taken over by another run") from None
+        """Write the next version of the manifest, then the copy.
+
+        Raises
+        ------
+        FolderInUseError
+            Another run has written it.
+        OSError
+            The store does not answer. The version may be there; writing it again is right.
+        """
+        own = self._token.encode()
+        while True:
+            number = self._version + 1
+            content = bytes(encode({_NUMBER_KEY: str(number).encode(), _WRITER_KEY: own}))
+            try:
+                there = self._created(number, content)
+            except OSError:
+                if not self._only_new:
+                    self._version = number  # it may arrive late, and must then not replace another
+                raise
+            if there != content and _metadata(there).get(_WRITER_KEY, b"") != own:
+                raise errors.FolderInUseError(f"{self.path} was taken over by another run")
+            self._version = number
+            if there == content:
+                break  # else: what this run wrote before, and was told it could not
+        (self.path / MANIFEST_NAME).put(content)
+        with suppress(OSError):
+            (self.path / version_name(number - KEPT)).unlink(missing_ok=True)
 
     def discard_manifest(self) -> None:
-        """Remove the manifest."""
-        if self._generations is not None:
-            self._generations.discard()
+        """Remove all versions of the manifest."""
+        for name in self.path.names():
+            if name == MANIFEST_NAME or version_number(name) is not None:
+                (self.path / name).unlink(missing_ok=True)
+
+    def _created(self, number: int, content: bytes) -> bytes:
+        """Write a version of the manifest unless it exists; return what is there."""
+        path = self.path / version_name(number)
+        with suppress(FileExistsError):
+            if self._only_new:
+                path.put(content, only_new=True)
+                return content
+            if not path.exists():
+                path.put(content)
+        return path.read_bytes()
 
     def _publish(self, staged_name: str, name: str, size: int | None) -> None:
         """Copy one staged file to its final name."""
-        staged = self._path / staged_name
+        staged = self.path / staged_name
         if size is not None and staged.stat().st_size != size:
             raise errors.DamagedError(f"{staged} is not what a worker wrote there: it has another size")
-        staged.copy_to(self._path / name)
+        staged.copy_to(self.path / name)
         with suppress(OSError):
             staged.unlink(missing_ok=True)
 
@@ -275,3 +326,104 @@ Storage = DiskStorage | ObjectStorage
 def storage_of(place: Location) -> Storage:
     """Return how a run writes into a folder."""
     return DiskStorage(place) if isinstance(place, Path) else ObjectStorage(place)
+
+
+class Version(NamedTuple):
+    """One version of the manifest on an object store."""
+
+    number: int
+    content: bytes
+
+
+def newest(folder: RemotePath) -> Version:
+    """Return the newest version of the manifest.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is none.
+    OSError
+        The store does not answer.
+    """
+    for _ in range(_ATTEMPTS):
+        found = _begin(folder)
+        if found is not None:
+            while (later := _version(folder, found.number + 1)) is not None:
+                found = later
+            return found
+    raise OSError(errno.EIO, "the newest manifest is gone each time it is read")
+
+
+def refuses_existing(folder: RemotePath, token: str) -> bool:
+    """Find out whether the store can refuse to write an object that exists; and whether it can be written at all.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    probe = folder / f"{PROBE_PREFIX}{token}"
+    try:
+        probe.put(b"1", only_new=True)
+    except FileExistsError:
+        pass  # the answer to a first try was lost
+    except OSError:
+        probe.put(b"1")  # the store may not know such requests
+        probe.unlink(missing_ok=True)
+        return False
+    try:
+        probe.put(b"2", only_new=True)
+    except FileExistsError:
+        return True
+    except OSError:
+        return False
+    else:
+        return False
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
+
+
+def _begin(folder: RemotePath) -> Version | None:
+    """Return the newest version that the copy or the list of names knows of; None if it has been removed since.
+
+    Raises
+    ------
+    FileNotFoundError
+        Neither knows any.
+    """
+    copied: Version | None = None
+    with suppress(FileNotFoundError):
+        content = (folder / MANIFEST_NAME).read_bytes()
+        copied = Version(_number(content), content)
+    last = max((version_number(name) or 0 for name in folder.names()), default=0)
+    if copied is not None and copied.number >= last:
+        return copied
+    if not last:
+        raise FileNotFoundError(errno.ENOENT, "there is no manifest", str(folder))
+    return _version(folder, last)
+
+
+def _version(folder: RemotePath, number: int) -> Version | None:
+    """Return a version; None if there is none."""
+    try:
+        return Version(number, (folder / version_name(number)).read_bytes())
+    except FileNotFoundError:
+        return None
+
+
+def _number(content: bytes) -> int:
+    """Return the number of a version; 0 for a manifest without one."""
+    text = _metadata(content).get(_NUMBER_KEY, b"")
+    return int(text) if text.isdigit() and len(text) <= _LONGEST_NUMBER else 0
+
+
+def _metadata(content: bytes) -> Mapping[bytes, bytes]:
+    """Return the metadata of a Parquet file; none if it is damaged."""
+    import pyarrow as pa  # heavy, and only needed on object stores
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_metadata(BytesIO(content)).metadata or {}
+    except (pa.ArrowException, OSError, ValueError):
+        return {}

@@ -18,15 +18,14 @@ import errno
 import hashlib
 import secrets
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from boulder_sweep.locations import Location
 from boulder_sweep.store import errors
-from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name
-from boulder_sweep.store.manifest import Manifest, Merge, Part, is_ours, is_part_name, part_name, save, staged_name
+from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name, is_ours, is_part_name, part_name, staged_name
+from boulder_sweep.store.manifest import Manifest, Merge, Part, save, total_verdicts
 from boulder_sweep.store.provenance import now
 from boulder_sweep.store.storage import Lock, Storage
 from boulder_sweep.store.verify import damaged_parts, merged_file
@@ -34,6 +33,17 @@ from boulder_sweep.text import NO_SPACE
 
 ROWS_PER_PART = 131_072
 """Rows of a part; a quarter of a second of work and some 10 MB."""
+
+
+class EncodedPart(NamedTuple):
+    """A part of the table as the bytes of its file."""
+
+    first: int
+    """Row number of its first row."""
+    rows: int
+    content: memoryview | bytes
+    verdicts: dict[str, int]
+    """Number of rows of each verdict and reason, keyed as in `Part`."""
 
 
 class StagedPart(NamedTuple):
@@ -44,15 +54,7 @@ class StagedPart(NamedTuple):
     part: Part
 
 
-def stage(
-    storage: Storage,
-    token: str,
-    table_rows: int,
-    first: int,
-    content: memoryview | bytes,
-    rows: int,
-    verdicts: dict[str, int],
-) -> StagedPart:
+def stage(storage: Storage, token: str, table_rows: int, encoded: EncodedPart) -> StagedPart:
     """Write a part under its temporary name; other machines that share the folder may do that, too.
 
     Parameters
@@ -63,30 +65,25 @@ def stage(
         Of the run, see `OutputFolder`.
     table_rows
         Rows of the whole table.
-    first
-        Row number of the first row of the part.
-    content
-        The bytes of its file.
-    rows
-        Number of its rows.
-    verdicts
-        Number of rows of each verdict and reason.
+    encoded
+        The part.
 
     Raises
     ------
     OSError
         The disk is full or the folder cannot be written; nothing has changed.
     """
-    staged = StagedPart(part_name(first, first + rows, table_rows), _part(first, content, rows, verdicts))
-    storage.put(staged_name(staged.name, token, staged.part.sha256), content)
+    part = _part(encoded)
+    staged = StagedPart(part_name(part.first, part.stop, table_rows), part)
+    storage.put(staged_name(staged.name, token, part.sha256), encoded.content)
     return staged
 
 
 class OutputFolder:
-    """The folder of a run, open for writing until `close`; made by `opening.open_output`."""
+    """The folder of a run, open for writing until `close`; made by `opening.ClaimedFolder.open`."""
 
-    def __init__(self, path: Location, storage: Storage, lock: Lock, manifest: Manifest, created: bool):
-        self.path = path
+    def __init__(self, storage: Storage, lock: Lock, manifest: Manifest):
+        self.path = storage.path
         self._storage = storage
         self.manifest = manifest
         self.token = secrets.token_hex(8)
@@ -96,24 +93,12 @@ class OutputFolder:
         self.damaged: dict[str, str] = {}
         """Parts found damaged when the folder was opened, and what was wrong; their rows count as missing."""
         self._lock = lock
-        self._created = created
         self._busy = threading.RLock()
         self._ended: str | None = None
         self._open = True
 
-    def stage(self, first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> StagedPart:
+    def stage(self, encoded: EncodedPart) -> StagedPart:
         """Write a part under its temporary name; any thread may do that at any time.
-
-        Parameters
-        ----------
-        first
-            Row number of its first row.
-        content
-            The bytes of its file.
-        rows
-            Number of its rows.
-        verdicts
-            Number of rows of each verdict and reason.
 
         Raises
         ------
@@ -121,12 +106,11 @@ class OutputFolder:
             The disk is full or the folder cannot be written; earlier parts are unchanged.
         """
         try:
-            staged = stage(self._storage, self.token, self.manifest.rows, first, content, rows, verdicts)
+            staged = stage(self._storage, self.token, self.manifest.rows, encoded)
         except OSError as problem:
             raise self.write_error(problem) from problem
         if not self._open:  # the run was stopped meanwhile
-            with suppress(OSError, errors.StoreError):
-                self._storage.remove([self._temporary(staged)])
+            self._remove([self._temporary(staged)])
         return staged
 
     def is_staged(self, staged: StagedPart) -> bool:
@@ -151,8 +135,7 @@ class OutputFolder:
         temporary = {self._temporary(one): one for one in staged}
         with self._writing() as is_open:
             if not is_open:  # the run was stopped while these parts were written
-                with suppress(OSError, errors.StoreError):
-                    self._storage.remove(temporary)
+                self._remove(temporary)
                 return
             # An object store lets nobody see half of a file, and checks what it holds: sizes are enough there.
             parts = {name: one.part for name, one in temporary.items()}
@@ -190,12 +173,8 @@ class OutputFolder:
             As for `commit`.
         """
         parts = [self.manifest.parts[name] for name in names]
-        verdicts: dict[str, int] = {}
-        for part in parts:
-            for key, count in part.verdicts.items():
-                verdicts[key] = verdicts.get(key, 0) + count
         rows = sum(part.rows for part in parts)
-        merged = _part(parts[0].first, content, rows, dict(sorted(verdicts.items())))
+        merged = _part(EncodedPart(parts[0].first, rows, content, total_verdicts(parts)))
         with self._writing() as is_open:
             if not is_open:
                 return
@@ -207,7 +186,7 @@ class OutputFolder:
             except (OSError, errors.StoreError):
                 self.manifest.merge = None
                 raise
-            finish_merge(self.manifest, self.path, self._storage)
+            finish_merge(self.manifest, self._storage)
             save(self.manifest, self._storage)
 
     def heartbeat(self) -> None:
@@ -260,8 +239,7 @@ class OutputFolder:
         with suppress(OSError, errors.StoreError):  # a folder that is gone must not hide why the run was refused
             self._storage.discard_manifest()
         self._lock.release()
-        if self._created:
-            self._storage.unmake()
+        self._storage.unmake()
 
     @contextmanager
     def _writing(self) -> Iterator[bool]:
@@ -292,9 +270,14 @@ class OutputFolder:
     def _remove_staged(self) -> None:
         """Remove parts that were staged and not committed."""
         merge = self.manifest.merge
-        keep = set(self.manifest.parts) | (set() if merge is None else {merge.name, hidden_name(merge.name)})
+        keep = set(self.manifest.parts) | set(() if merge is None else merge.names)
         with suppress(OSError, errors.StoreError):
             self._storage.remove(name for name in self._storage.names() if _is_staged(name) and name not in keep)
+
+    def _remove(self, names: Iterable[str]) -> None:
+        """Remove files that nobody needs, if the storage lets it."""
+        with suppress(OSError, errors.StoreError):
+            self._storage.remove(names)
 
 
 def _is_staged(name: str) -> bool:
@@ -302,27 +285,28 @@ def _is_staged(name: str) -> bool:
     return is_part_name(name) or (name.endswith(WRITING_SUFFIX) and is_ours(name))
 
 
-def _part(first: int, content: memoryview | bytes, rows: int, verdicts: dict[str, int]) -> Part:
+def _part(encoded: EncodedPart) -> Part:
     """Return the record of a part."""
+    first, rows, content, verdicts = encoded
     return Part(first, rows, len(content), hashlib.sha256(content).hexdigest(), verdicts, now())
 
 
-def finish_merge(manifest: Manifest, folder: Location, storage: Storage) -> None:
+def finish_merge(manifest: Manifest, storage: Storage) -> None:
     """Let the merged part, complete under its temporary name, replace the small ones.
 
     Parameters
     ----------
     manifest
         Announces the merge; updated in place, and the caller must save it.
-    folder, storage
-        The output folder, and how it is written.
+    storage
+        How the output folder is written.
     """
     merge = manifest.merge
     if merge is None:
         return
     # The small ones are removed first: a reader in between misses rows for a moment, but never sees any twice.
     storage.remove(merge.replaced)
-    if (folder / hidden_name(merge.name)).exists():
+    if (storage.path / hidden_name(merge.name)).exists():
         storage.publish({hidden_name(merge.name): merge.name})
     for name in merge.replaced:
         manifest.parts.pop(name, None)
@@ -330,15 +314,11 @@ def finish_merge(manifest: Manifest, folder: Location, storage: Storage) -> None
     manifest.merge = None
 
 
-def recover_merge(manifest: Manifest, folder: Location, storage: Storage) -> None:
+def recover_merge(manifest: Manifest, storage: Storage) -> None:
     """Finish a merge during which a run was killed, or drop it if it had only been announced.
 
     Parameters and effect are those of `finish_merge`.
     """
-    merge = manifest.merge
-    if merge is None:
-        return
-    if merged_file(folder, merge) is not None:
-        finish_merge(manifest, folder, storage)
-    else:
+    if manifest.merge is not None and merged_file(storage.path, manifest.merge) is None:
         manifest.merge = None
+    finish_merge(manifest, storage)

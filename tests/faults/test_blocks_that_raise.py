@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boulder_sweep.errors import ComputationError
-from boulder_sweep.runner import computing
+from boulder_sweep.runner import workers
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.reader import read_table
@@ -55,7 +55,7 @@ def test_designs_that_raise(tmp_path, whole, backend):
 
 @pytest.mark.parametrize("backend", ["threading", "dask"])
 def test_a_run_of_which_most_raises_stops_and_can_be_resumed(tmp_path, whole, monkeypatch, backend):
-    monkeypatch.setattr(computing, "_FAILURES_BUDGET", 10)
+    monkeypatch.setattr(workers, "_FAILURES_BUDGET", 10)
     monkeypatch.setenv(faulty.POISON, poison(whole, list(range(35, 80))))
     out = tmp_path / "out"
     with pytest.raises(ComputationError, match=r"1\d attempts .*ArithmeticError.* 80 rows are safe\. Resume"):

@@ -20,11 +20,12 @@ import boulder_sweep
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner import dispatch, remote
-from boulder_sweep.runner.computing import Computation, EncodedPart
 from boulder_sweep.runner.sweeper import run
+from boulder_sweep.runner.workers import Computation
 from boulder_sweep.store import status
-from boulder_sweep.store.lock import LOCK_NAME
+from boulder_sweep.store.files import LOCK_NAME
 from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.writer import EncodedPart
 from tests.faults import faulty
 from tests.faults.clusters import Cluster
 from tests.faults.faulty import Bar, held, slowly

@@ -10,7 +10,7 @@ from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import load
 from boulder_sweep.store import status
-from boulder_sweep.store.manifest import is_part_name
+from boulder_sweep.store.files import is_part_name
 from boulder_sweep.store.reader import read_table
 from tests.faults.clusters import Cluster
 from tests.faults.processes import ROOT

@@ -9,10 +9,11 @@ import pytest
 
 from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.runner.cluster import answers
-from boulder_sweep.runner.computing import Computed, Ended, Note
 from boulder_sweep.runner.dispatch import FETCH_S, Silence, received
 from boulder_sweep.runner.remote import ClusterWorkers, Done
-from boulder_sweep.store.manifest import Manifest, Part, part_name
+from boulder_sweep.runner.workers import Computed, Ended, Note
+from boulder_sweep.store.files import part_name
+from boulder_sweep.store.manifest import Manifest, Part
 from boulder_sweep.store.writer import StagedPart
 
 ROWS, SIZE = 100, 10

@@ -14,8 +14,8 @@ from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner import interruption
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import generations, status
 from boulder_sweep.store import lock as locks
+from boulder_sweep.store import status, storage
 from boulder_sweep.store.errors import WriteError
 from boulder_sweep.store.reader import read_table
 from boulder_sweep.store.writer import OutputFolder
@@ -83,7 +83,7 @@ def test_what_goes_on_after_a_signal_is_undone(silent, monkeypatch):
     """In a notebook the process goes on, and may not hold the folder for ever."""
     monkeypatch.setattr(interruption, "LAST_S", 0.2)  # no answer comes, however long it is
     monkeypatch.setattr(locks, "HEARTBEAT_S", HANG_GUARD_S)  # hang guard
-    begin = generations.refuses_existing
+    begin = storage.refuses_existing
 
     def stop(folder, token):
         signal.raise_signal(signal.SIGINT)
@@ -91,7 +91,7 @@ def test_what_goes_on_after_a_signal_is_undone(silent, monkeypatch):
         return begin(folder, token)
 
     with monkeypatch.context() as patch:
-        patch.setattr("boulder_sweep.store.storage.refuses_existing", stop)
+        patch.setattr(storage, "refuses_existing", stop)
         with pytest.raises(Interrupted):
             start()
     silent.speaks.set()

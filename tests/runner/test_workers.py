@@ -13,13 +13,13 @@ import pytest
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.judged import Judged, not_computed
-from boulder_sweep.runner.committer import COMMIT_SHARE, GAP_S, Committer
-from boulder_sweep.runner.computing import Computation, Computed, EncodedPart, Ended
 from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.runner.pool import check_backend
-from boulder_sweep.runner.threads import Assembly, ThreadWorkers
-from boulder_sweep.store.manifest import Manifest, Part, part_name
-from boulder_sweep.store.writer import StagedPart
+from boulder_sweep.runner.running import COMMIT_SHARE, GAP_S, Committer
+from boulder_sweep.runner.workers import Assembly, Computation, Computed, Ended, ThreadWorkers
+from boulder_sweep.store.files import part_name
+from boulder_sweep.store.manifest import Manifest, Part
+from boulder_sweep.store.writer import EncodedPart, StagedPart
 from tests.waiting import HANG_GUARD_S, wait_until
 
 
@@ -45,8 +45,9 @@ class Folder:
         self.manifest = Manifest({}, rows, size, "")
         self.committed = []
 
-    def stage(self, first, content, rows, verdicts):
-        return StagedPart(part_name(first, first + rows, self.manifest.rows), Part(first, rows, 0, "", verdicts, ""))
+    def stage(self, encoded):
+        part = Part(encoded.first, encoded.rows, 0, "", encoded.verdicts, "")
+        return StagedPart(part_name(part.first, part.stop, self.manifest.rows), part)
 
     def commit(self, staged):
         self.committed += staged
@@ -70,7 +71,7 @@ def work_off(evaluate, rows=1000, size=32, jobs=2, limit=10**9, part=100, make_b
     folder, computation = Folder(rows, part), Recorder(evaluate, make_block, {})
     ranges = blocks(folder.manifest.missing(), size)
     workers = ThreadWorkers(jobs, computation, ranges, limit, folder)
-    committer = Committer(folder, computation, workers.release, workers.flush)
+    committer = Committer(folder, computation, workers)
     committer.start()
     workers.start()
     computed = 0
@@ -260,7 +261,7 @@ def test_a_large_manifest_is_written_seldom():
 
     def put(*firsts):
         for first in firsts:
-            writer.put(folder.stage(first, b"", 10, {"pieces": []}))
+            writer.put(folder.stage(EncodedPart(first, 10, b"", {"pieces": []})))
 
     writer.start()
     put(0)
@@ -290,7 +291,7 @@ def test_parts_do_not_wait_for_ever_for_the_one_before_them(first_comes):
 
     def put(*firsts):
         for first in firsts:
-            writer.put(folder.stage(first, b"", 10, {"pieces": []}))
+            writer.put(folder.stage(EncodedPart(first, 10, b"", {"pieces": []})))
 
     writer.start()
     put(0)
@@ -322,7 +323,7 @@ def test_parts_behind_a_gap_are_not_lost_where_a_run_is_stopped():
     folder = Folder(100, 10)
     writer = Committer(folder, Recorder(good, Rows, {}), clock=lambda: 0.0, work_clock=lambda: 0.0)
     for first in (0, 20, 30, 70):
-        writer.put(folder.stage(first, b"", 10, {"pieces": []}))
+        writer.put(folder.stage(EncodedPart(first, 10, b"", {"pieces": []})))
     writer.stop()
     writer.run()
     assert writer.problem is None

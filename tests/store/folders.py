@@ -12,12 +12,12 @@ import pyarrow.parquet as pq
 
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.pilot import accuracy_of
-from boulder_sweep.runner.computing import verdict_counts
-from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest
-from boulder_sweep.store.opening import open_output
+from boulder_sweep.store.files import MANIFEST_NAME
+from boulder_sweep.store.manifest import Manifest
+from boulder_sweep.store.opening import claim_output
 from boulder_sweep.store.provenance import file_metadata, kernels_sha256, new_session, rules_sha256
-from boulder_sweep.store.schema import encode, part_table
-from boulder_sweep.store.writer import OutputFolder
+from boulder_sweep.store.schema import encode, part_table, verdict_counts
+from boulder_sweep.store.writer import EncodedPart, OutputFolder
 from tests.runner.grids import grid, plausible
 
 IDENTITY = {
@@ -40,7 +40,12 @@ def open_folder(
 ) -> OutputFolder:
     """Take a folder for a run of 441 rows in parts of 100."""
     manifest = Manifest(identity, rows, SIZE, resume_command)
-    return open_output(out, manifest, new_session("sweep run x.yaml", 2, "threading"), **how)
+    claimed = claim_output(out, **how)
+    try:
+        return claimed.open(manifest, new_session("sweep run x.yaml", 2, "threading"))
+    except BaseException:
+        claimed.release()
+        raise
 
 
 def part_bytes(first: int, rows: int) -> tuple[bytes, dict[str, int]]:
@@ -51,11 +56,17 @@ def part_bytes(first: int, rows: int) -> tuple[bytes, dict[str, int]]:
     return bytes(encode(part_table(block, judged, file_metadata(IDENTITY, "sweep run x.yaml")))), verdict_counts(judged)
 
 
+def encoded_part(first: int, of: int | None = None) -> EncodedPart:
+    """A part of 100 rows; with the content of those from another row on, if one is given."""
+    content, verdicts = part_bytes(first if of is None else of, SIZE)
+    return EncodedPart(first, SIZE, content, verdicts)
+
+
 def commit(folder: OutputFolder, first: int, rows: int | None = None) -> None:
     """Put a part into a folder."""
     rows = min(SIZE, ROWS - first) if rows is None else rows
     content, verdicts = part_bytes(first, rows)
-    folder.commit([folder.stage(first, content, rows, verdicts)])
+    folder.commit([folder.stage(EncodedPart(first, rows, content, verdicts))])
 
 
 def finished_folder(out: Path) -> Path:

@@ -9,8 +9,7 @@ import stat
 import pytest
 
 from boulder_sweep.store import files
-from boulder_sweep.store.files import put_file
-from boulder_sweep.store.manifest import is_ours
+from boulder_sweep.store.files import is_ours, put_file
 
 
 def names(folder):

@@ -21,7 +21,8 @@ from boulder_sweep.columns import COLUMNS, INPUT_COLUMNS
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.store import status
 from boulder_sweep.store.errors import DamagedError, OtherVersionError, SettingsDifferError
-from boulder_sweep.store.manifest import MANIFEST_NAME, load, part_name
+from boulder_sweep.store.files import MANIFEST_NAME, part_name
+from boulder_sweep.store.manifest import load
 from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.reader import FinishedRows, read, read_row
 from boulder_sweep.store.schema import encode, table_schema

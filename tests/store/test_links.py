@@ -14,10 +14,18 @@ import boulder_sweep
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store import files, status
 from boulder_sweep.store.errors import DamagedError, LinkError
-from boulder_sweep.store.files import check_target, hidden_name, put_file, replacing
+from boulder_sweep.store.files import (
+    MANIFEST_NAME,
+    check_target,
+    hidden_name,
+    is_ours,
+    part_name,
+    put_file,
+    replacing,
+    staged_name,
+)
 from boulder_sweep.store.lock import is_locked
-from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, part_name, staged_name
-from tests.store.folders import ROWS, SIZE, finished_folder, open_folder, part_bytes
+from tests.store.folders import ROWS, SIZE, encoded_part, finished_folder, open_folder, part_bytes
 
 TOKEN = "0123456789abcdef"
 FIRST = part_name(0, SIZE, ROWS)
@@ -25,11 +33,6 @@ FIRST = part_name(0, SIZE, ROWS)
 
 def names(out):
     return sorted(path.name for path in out.iterdir())
-
-
-def _content(first):
-    content, verdicts = part_bytes(first, SIZE)
-    return content, SIZE, verdicts
 
 
 @pytest.fixture
@@ -76,7 +79,7 @@ def test_a_linked_manifest_is_refused_before_a_part_is_removed(tmp_path, how):
 @pytest.mark.parametrize("name", [MANIFEST_NAME, hidden_name(MANIFEST_NAME)])
 def test_a_link_that_comes_later_is_refused(way, tmp_path, outside, name):
     folder = open_folder(tmp_path / "out")
-    staged = folder.stage(0, *_content(0))
+    staged = folder.stage(encoded_part(0))
     (tmp_path / "out" / name).unlink(missing_ok=True)
     (tmp_path / "out" / name).symlink_to(outside)
     with pytest.raises(LinkError, match=f"{name} is a link"):
@@ -91,7 +94,7 @@ def test_a_link_with_the_name_of_a_staged_part_is_refused(way, tmp_path, outside
     assert is_ours(name)
     (tmp_path / "out" / name).symlink_to(outside)
     with pytest.raises(LinkError, match="is a link"):
-        folder.stage(0, *_content(0))
+        folder.stage(encoded_part(0))
     folder.close("stopped")
 
 

@@ -15,19 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError
-from boulder_sweep.store.manifest import (
-    MANIFEST_NAME,
-    Manifest,
-    Merge,
-    Part,
-    Session,
-    check_own,
-    is_ours,
-    is_part_name,
-    load,
-    part_name,
-    save,
-)
+from boulder_sweep.store.files import MANIFEST_NAME, is_ours, is_part_name, part_name
+from boulder_sweep.store.manifest import Manifest, Merge, Part, Session, check_own, load, save
 from boulder_sweep.store.storage import DiskStorage
 from tests.store.folders import OTHER_FORMS, READABLE_FORMS, rewrite_records
 

@@ -9,7 +9,8 @@ import pytest
 
 from boulder_sweep.store import status, storage, verify, writer
 from boulder_sweep.store.errors import DamagedError, StoreError, WriteError
-from boulder_sweep.store.manifest import MANIFEST_NAME, load
+from boulder_sweep.store.files import MANIFEST_NAME
+from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import FinishedRows, read_table
 from tests.runner.grids import same_bits
 from tests.store.folders import ROWS, commit, open_folder, part_bytes

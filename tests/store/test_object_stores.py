@@ -27,9 +27,10 @@ from boulder_sweep.store.errors import (
     StoreError,
     WriteError,
 )
-from boulder_sweep.store.generations import KEPT, generation_name, newest
-from boulder_sweep.store.manifest import is_part_name, load
+from boulder_sweep.store.files import is_part_name, version_name
+from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.storage import KEPT, newest
 from tests.runner.grids import same_bits
 from tests.store import folders
 from tests.store.object_stores import FaultyFileSystem, Trouble, store
@@ -70,7 +71,7 @@ def test_a_finished_folder_holds_the_bytes_that_a_local_one_holds(out, tmp_path)
     assert all((out / name).read_bytes() == (local / name).read_bytes() for name in parts)
     assert same_bits(read_table(out), read_table(local))
     assert [name for name in names(out) if name not in parts] == [
-        *(generation_name(number) for number in range(1, 8)),
+        *(version_name(number) for number in range(1, 8)),
         "_manifest.parquet",
     ]
     found = status(OUT, verify=True)
@@ -79,8 +80,7 @@ def test_a_finished_folder_holds_the_bytes_that_a_local_one_holds(out, tmp_path)
 
 def test_nobody_sees_a_part_before_it_is_committed(out):
     folder = folders.open_folder(out)
-    content, verdicts = folders.part_bytes(0, 100)
-    staged = folder.stage(0, content, 100, verdicts)
+    staged = folder.stage(folders.encoded_part(0))
     assert not any(is_part_name(name) for name in names(out))
     folder.commit([staged])
     assert [name for name in names(out) if is_part_name(name) or name.endswith(".writing")] == [staged.name]
@@ -112,9 +112,9 @@ def test_old_versions_go_and_the_last_ones_stay(out):
 def test_the_newest_manifest_is_found_where_copy_and_list_are_behind(out, monkeypatch, behind):
     folders.finished_folder(out)
     if behind in ("the copy", "both"):
-        (out / "_manifest.parquet").put((out / generation_name(3)).read_bytes())
+        (out / "_manifest.parquet").put((out / version_name(3)).read_bytes())
     if behind in ("the list", "both"):
-        monkeypatch.setattr(RemotePath, "names", lambda self: [generation_name(2)])
+        monkeypatch.setattr(RemotePath, "names", lambda self: [version_name(2)])
     assert load(out).rows_done == folders.ROWS
 
 
@@ -278,8 +278,7 @@ def test_a_store_that_does_not_answer_is_not_taken_for_damaged(out, monkeypatch,
 
 def test_a_store_that_does_not_say_whether_a_part_is_there_is_told_of_with_what_is_safe(out, monkeypatch):
     folder = folders.open_folder(out)
-    content, verdicts = folders.part_bytes(0, folders.SIZE)
-    staged = folder.stage(0, content, folders.SIZE, verdicts)
+    staged = folder.stage(folders.encoded_part(0))
     with monkeypatch.context() as patch:
         patch.setattr(FaultyFileSystem, "_may_fail", lambda self: (_ for _ in ()).throw(PermissionError("not yours")))
         with pytest.raises(WriteError, match=r"not yours\. 0 of 441 rows are safe; resume with: "):

@@ -17,8 +17,8 @@ from boulder_sweep.locations import location_of
 from boulder_sweep.store import lock as locks
 from boulder_sweep.store import read, status
 from boulder_sweep.store.errors import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
-from boulder_sweep.store.files import hidden_name
-from boulder_sweep.store.manifest import MANIFEST_NAME, is_ours, load, part_name, staged_name
+from boulder_sweep.store.files import MANIFEST_NAME, hidden_name, is_ours, part_name, staged_name
+from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import FinishedRows, read_table
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.writer import stage
@@ -27,6 +27,7 @@ from tests.store.folders import (
     ROWS,
     SIZE,
     commit,
+    encoded_part,
     finished_folder,
     open_folder,
     part_bytes,
@@ -62,8 +63,8 @@ def test_what_a_worker_of_another_run_stages_is_never_published(tmp_path, place,
         killed = open_folder(out, identity=OTHER)
         killed._lock.release()
         folder = open_folder(out, overwrite=True)
-        own = [folder.stage(first, *_content(first)) for first in (0, SIZE)]
-        late = stage(storage_of(out), killed.token, ROWS, 0, *_content(200))
+        own = [folder.stage(encoded_part(first)) for first in (0, SIZE)]
+        late = stage(storage_of(out), killed.token, ROWS, encoded_part(0, of=200))
         assert late.name == own[0].name == FIRST
         folder.commit(own)
         assert (out / FIRST).read_bytes() == part_bytes(0, SIZE)[0]
@@ -76,15 +77,10 @@ def test_what_a_worker_of_another_run_stages_is_never_published(tmp_path, place,
         assert load(out).rows_done == 2 * SIZE
 
 
-def _content(first):
-    content, verdicts = part_bytes(first, SIZE)
-    return content, SIZE, verdicts
-
-
 def test_what_was_staged_and_not_committed_is_computed_again(tmp_path):
     killed = open_folder(tmp_path / "out")
     commit(killed, 0)
-    killed.stage(SIZE, *_content(SIZE))
+    killed.stage(encoded_part(SIZE))
     killed._lock.release()
     folder = open_folder(tmp_path / "out", resume=True)
     assert folder.token != killed.token
@@ -95,7 +91,7 @@ def test_what_was_staged_and_not_committed_is_computed_again(tmp_path):
 
 def test_a_staged_part_that_was_changed_is_not_published(tmp_path):
     folder = open_folder(tmp_path / "out")
-    staged = folder.stage(0, *_content(0))
+    staged = folder.stage(encoded_part(0))
     temporary = tmp_path / "out" / staged_name(staged.name, folder.token, staged.part.sha256)
     changed = bytearray(temporary.read_bytes())
     changed[1000] ^= 1
@@ -112,7 +108,7 @@ def test_a_staged_part_that_was_changed_is_not_published(tmp_path):
 def test_the_same_rows_staged_twice_with_other_bytes_do_not_disturb_each_other(tmp_path):
     """As by machines whose processors have other names."""
     folder = open_folder(tmp_path / "out")
-    one, other = folder.stage(0, *_content(0)), folder.stage(0, *_content(200))
+    one, other = folder.stage(encoded_part(0)), folder.stage(encoded_part(0, of=200))
     assert folder.is_staged(one)
     assert folder.is_staged(other)
     folder.commit([one])
@@ -125,7 +121,7 @@ def test_a_lock_that_another_run_has_taken_keeps_parts_from_being_published(monk
     with store():
         out = location_of("faulty://bucket/out")
         asleep = open_folder(out)
-        staged = asleep.stage(0, *_content(0))
+        staged = asleep.stage(encoded_part(0))
         monkeypatch.setattr(locks, "DEAD_AFTER_S", 0.0)
         other = open_folder(out, resume=True)
         with pytest.raises(BoulderSweepError, match="taken over by another run"):
@@ -139,7 +135,7 @@ def test_a_run_does_not_lock_again_what_another_has_finished_meanwhile(monkeypat
     with store():
         out = location_of("faulty://bucket/out")
         asleep = open_folder(out, identity=OTHER)
-        staged = asleep.stage(0, *_content(0))
+        staged = asleep.stage(encoded_part(0))
         monkeypatch.setattr(locks, "DEAD_AFTER_S", 0.0)
         other = open_folder(out, overwrite=True)
         commit(other, 0)
@@ -160,9 +156,9 @@ def test_a_run_does_not_lock_again_what_another_has_finished_meanwhile(monkeypat
 def test_a_folder_removed_during_a_run_is_called_that(tmp_path):
     out = tmp_path / "out"
     folder = open_folder(out)
-    staged = folder.stage(0, *_content(0))
+    staged = folder.stage(encoded_part(0))
     shutil.rmtree(out)
-    for act in (lambda: folder.commit([staged]), lambda: folder.stage(0, *_content(0)), folder.check):
+    for act in (lambda: folder.commit([staged]), lambda: folder.stage(encoded_part(0)), folder.check):
         with pytest.raises(FolderRemovedError, match=rf"{out} was removed, moved or replaced during the run") as told:
             act()
         assert told.value.exit_code == 2

@@ -20,7 +20,8 @@ from boulder_sweep.store.errors import (
     StoreError,
     WriteError,
 )
-from boulder_sweep.store.manifest import MANIFEST_NAME, load
+from boulder_sweep.store.files import MANIFEST_NAME
+from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import read_table
 from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder, rewrite_records
 
