@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.answers.chance import Points, chance
-from boulder_sweep.answers.draws import Draws, threads
+from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import judges_of
@@ -24,6 +24,7 @@ from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.sweep import DesignList
 
@@ -93,7 +94,7 @@ def wrong_ends(found: Need, count: int, seed: int = 2) -> tuple[int, int]:
 def draw_one(drawn: int) -> float:
     """Return the chance of passing of the uncertain site by so many designs."""
     sweep = load(SITE)
-    draws = Draws(sweep.plan.given_rows(0, 1), Spread(sweep), judges_of(sweep), threads(None))
+    draws = Draws(sweep.plan.given_rows(0, 1), Spread(sweep), judges_of(sweep), Pool(None))
     points = Points(len(draws.spread.names), 0)
     found = chance(draws.passes, 1, points, half_width=0.0, most=drawn, first=drawn // 16)
     return float(found.estimate[0])

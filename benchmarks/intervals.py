@@ -15,10 +15,11 @@ import numpy as np
 from scipy.special import ndtri
 
 from boulder_sweep.answers.chance import SCRAMBLINGS, Event, Points, chance
-from boulder_sweep.answers.draws import Draws, threads
+from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import judges_of
+from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings import load
 
 from .report import Table
@@ -76,7 +77,7 @@ def simulated(inputs: int, seeds: int, probabilities: tuple[float, ...] = SIMULA
     depths = np.array(found, dtype=float)
     given = sweep.plan.given_rows(0, 1)
     rows = {name: np.repeat(values, len(depths)) for name, values in given.items()} | {"embedment_depth_m": depths}
-    draws = Draws(rows, Spread(sweep), judges_of(sweep), threads(None))
+    draws = Draws(rows, Spread(sweep), judges_of(sweep), Pool(None))
     many = Points(draws.dimensions, seeds)
     first = REFERENCE // SCRAMBLINGS
     exact = chance(draws.passes, len(depths), many, half_width=0.0, most=REFERENCE, first=first).estimate

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
-from boulder_sweep.answers.trials import Judges, Rows
+from boulder_sweep.answers.trials import Judges, Rows, rows_at
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.judged import ERROR, NO_CONTACT, UNDECIDED
 from boulder_sweep.runner.pool import Pool, call
@@ -16,6 +16,7 @@ from boulder_sweep.runner.pool import Pool, call
 if TYPE_CHECKING:
     from boulder_sweep.answers.spread import Spread
     from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.judge.evaluation import Evaluation
     from boulder_sweep.judge.judged import Judged
 
 AT_ONCE = 16_384
@@ -95,18 +96,9 @@ class Draws:
     def _measured(
         self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray], *, reserve: bool = False
     ) -> np.ndarray:
-        ends = range(0, len(index), AT_ONCE)
-        pieces = self.parallel(
-            call(
-                self._piece,
-                index[at : at + AT_ONCE],
-                z[at : at + AT_ONCE],
-                {name: values[at : at + AT_ONCE] for name, values in inputs.items()},
-                reserve,
-            )
-            for at in ends
-        )
-        return np.concatenate(list(pieces)) if len(ends) else np.empty(0)
+        parts = [slice(at, at + AT_ONCE) for at in range(0, len(index), AT_ONCE)]
+        calls = (call(self._piece, index[part], z[part], rows_at(inputs, part), reserve) for part in parts)
+        return np.concatenate(list(self.parallel(calls))) if parts else np.empty(0)
 
     def passes(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
         """Return whether designs pass; arguments: see `distance`."""
@@ -114,7 +106,7 @@ class Draws:
 
     def given(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> Rows:
         """Return the inputs of sampled designs."""
-        return self.spread.filled({name: values[index] for name, values in self.rows.items()} | inputs, z)
+        return self.spread.filled(rows_at(self.rows, index) | inputs, z)
 
     def _piece(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray], reserve: bool) -> np.ndarray:
         given = self.given(index, z, inputs)
@@ -126,19 +118,20 @@ class Draws:
         for place, judges in enumerate(self.variants):
             own = np.flatnonzero(chosen == place)
             if len(own):
-                found[own] = self._each({name: values[own] for name, values in given.items()}, judges, reserve)
+                found[own] = self._each(rows_at(given, own), judges, reserve)
         return found
 
     def _each(self, given: Rows, judges: Judges, reserve: bool) -> np.ndarray:
-        block = block_of(given)
-        judged = judges.coarse(block)
-        found = _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)
+        def judged_by(evaluation: Evaluation, rows: Rows) -> tuple[Judged, np.ndarray]:
+            block = block_of(rows)
+            judged = evaluation(block)
+            return judged, _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)
+
+        judged, found = judged_by(judges.coarse, given)
         if judges.coarse is not judges.final:
             near = np.flatnonzero(np.abs(judged["margin"] - judges.least_margin) < NEAR)
             if len(near):
-                closer = block_of({name: values[near] for name, values in given.items()})
-                again = judges.final(closer)
-                found[near] = _reserve_of(again, judges, closer) if reserve else _distance_of(again, judges)
+                found[near] = judged_by(judges.final, rows_at(given, near))[1]
         return found
 
 
@@ -172,8 +165,3 @@ def _signed(found: np.ndarray, judged: Judged, judges: Judges) -> np.ndarray:
     """Return a measure that is positive where designs pass, and negative where they do not."""
     smallest = np.finfo(float).tiny
     return np.where(judges.holds(judged), np.maximum(found, smallest), np.minimum(found, -smallest))
-
-
-def threads(jobs: int | None) -> Pool:
-    """Return a pool that yields results in order; with one job everything runs in the calling thread."""
-    return Pool(jobs)

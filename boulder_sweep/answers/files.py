@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import DEPTH, SIDES
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.trials import Open
 from boulder_sweep.columns import BOULDER_MASS, COLUMNS
-from boulder_sweep.errors import BoulderSweepError
+from boulder_sweep.columns import BY_NAME as COLUMN_OF
+from boulder_sweep.designs import Label
+from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.explanation import model_of
 from boulder_sweep.judge.evaluation import known_control
 from boulder_sweep.locations import Location, RemotePath
@@ -22,13 +27,14 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Criterion, completed
 from boulder_sweep.settings.sweep import Axis, DesignList
+from boulder_sweep.store.errors import settings_file
 from boulder_sweep.store.files import MANIFEST_NAME
+from boulder_sweep.store.provenance import identity_in, judged_by, settings_sha256
 from boulder_sweep.store.reader import FinishedRows
-from boulder_sweep.text import counted
+from boulder_sweep.store.schema import with_columns
+from boulder_sweep.text import counted, one_line
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
     from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
 
@@ -44,6 +50,8 @@ LATER = {"time_to_limit_error_s"}
 """Columns that came after the first such files; one that lacks another column is damaged."""
 OF_ONE_FILE = {"repeat", "commit", "cpu"}
 """Entries of the metadata by which equal files differ."""
+_IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
+"""Entries of the metadata that every such file has."""
 OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
@@ -75,10 +83,8 @@ class AnswerFile:
     """
 
     def __init__(self, path: Path, refusal: type[BoulderSweepError], *, histories: bool = False) -> None:
-        from boulder_sweep.answers.tables import read_parquet
-
         self.path = path
-        self.table, found, self.judged_by = read_parquet(path, refusal)
+        self.table, found, self.judged_by = _read_parquet(path, refusal)
         self._refusal = refusal
         try:
             self.question: dict[str, Any] = json.loads(found.pop("question", "{}"))
@@ -99,8 +105,6 @@ class AnswerFile:
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows, or some of their columns, at once."""
-        from boulder_sweep.store.schema import with_columns
-
         yield self.table if columns is None else with_columns(self.table, columns)
 
     def row(self, number: int) -> pa.Table:
@@ -111,8 +115,6 @@ class AnswerFile:
         IndexError
             There is no such row.
         """
-        from boulder_sweep.store.schema import with_columns
-
         if not 0 <= number < self.rows:
             raise IndexError(f"the file has {counted(self.rows, 'design')}, numbered from 0; there is no {number}")
         return with_columns(self.table.slice(number, 1), self.columns)
@@ -157,9 +159,6 @@ class AnswerFile:
 
     def _chances(self, sweep: Sweep) -> Uncertainty:
         """Return probabilities with the indices and samples that lie beside them."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         from boulder_sweep.answers.uncertainty import Uncertainty
 
         found = {}
@@ -167,6 +166,59 @@ class AnswerFile:
             file = self.path.with_suffix(f".{name}.parquet")
             found[name] = pq.read_table(file) if file.exists() else pa.table({"design_id": pa.array([], pa.int64())})
         return Uncertainty(sweep, self.table, found["indices"], found["samples"], self.question["seed"])
+
+
+def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
+    """Read a Parquet file that a command wrote, and warn where other rules than those of this version judged it.
+
+    Parameters
+    ----------
+    path
+        The file.
+    refusal
+        The error to raise.
+
+    Returns
+    -------
+    table : Table
+        All of it.
+    identity : dict
+        As of `boulder_sweep.store.provenance.identity`.
+    judged : str
+        As of `boulder_sweep.store.provenance.judged_by`.
+
+    Raises
+    ------
+    BoulderSweepError
+        It cannot be read, is damaged, or no command wrote it.
+    """
+    if advice := settings_file(path):
+        raise refusal(advice)
+    try:
+        table = pq.read_table(path, page_checksum_verification=True)
+        table.validate(full=True)
+        kinds = {field.name: field.type for field in table.schema}
+        found = identity_in(table.schema.metadata)
+        if not found.keys() >= _IDENTITY:
+            raise refusal(f"{path} is neither the folder of a run nor a file that `sweep` wrote")
+        odd = [name for name, kind in kinds.items() if name in COLUMN_OF and not _is_of(COLUMN_OF[name].type, kind)]
+        if odd or settings_sha256(found["settings"]) != found["settings_sha256"]:
+            raise refusal(f"{path} is damaged; write it again")
+    except BoulderSweepError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, RecursionError) as problem:
+        # Of a damaged file, pyarrow raises almost anything; names and texts that are not Unicode are ValueErrors.
+        raise refusal(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+    if judged := judged_by(found):
+        warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=3)
+    return table, found, judged
+
+
+def _is_of(type_: str, kind: pa.DataType) -> bool:
+    """Whether a column holds what it should: words or numbers."""
+    if type_ == "dictionary":
+        return pa.types.is_dictionary(kind)
+    return pa.types.is_floating(kind) or pa.types.is_integer(kind)
 
 
 def result_of(
@@ -256,9 +308,7 @@ def _values(name: str, given: Any, table: pa.Table) -> np.ndarray:
     return np.linspace(given["first"], given["last"], given["count"])
 
 
-def _label(table: pa.Table, name: str) -> Any:
-    from boulder_sweep.designs import Label
-
+def _label(table: pa.Table, name: str) -> Label:
     column = table[name].combine_chunks()
     words = tuple(column.unique().to_pylist())
     places = {word: place for place, word in enumerate(words)}

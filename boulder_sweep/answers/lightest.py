@@ -13,9 +13,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.answers.keys import Key, sweep_ranges
-from boulder_sweep.answers.questions import Answers, Brackets, replaced
-from boulder_sweep.answers.search import ALWAYS, BEYOND, FAILS, FOUND, HOLDS, NEVER, Search, last_before, search
-from boulder_sweep.answers.trials import Judges, Open, Remembered, Rows, beyond_reach, taken
+from boulder_sweep.answers.questions import Answers, Brackets
+from boulder_sweep.answers.search import (
+    ALWAYS,
+    BEYOND,
+    FAILS,
+    FOUND,
+    HOLDS,
+    NEVER,
+    Predicate,
+    Search,
+    contradicted,
+    last_before,
+    search,
+    searched_again,
+)
+from boulder_sweep.answers.trials import Judges, Open, Remembered, Rows, beyond_reach, block_at, rows_at
 from boulder_sweep.errors import QuestionError
 
 if TYPE_CHECKING:
@@ -109,27 +122,18 @@ class LightestQuestion:
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
         rows = self.given(start, stop)
-        n, final = stop - start, Remembered(self.judges.final)
+        final = Remembered(self.judges.final)
         # If the lightest boulder is as long, wide or high as it may be, a search for this side has no way to vary the
         # others at that end; the search for another side has.
         trials = [self.trial(rows, side, final) for side in reversed(self.free or [SCALE])]
-        found = [trial.certified(trial.lightest()) for trial in trials]
-        best = _lightest(found)
-        sizes = {name: _taken((own.sizes[name] for own in found), best) for name in self.searched}
-        sizes = trials[0].lighter(sizes, np.isfinite(_taken((own.passes for own in found), best)))
+        best = _lightest(rows, [trial.certified(trial.lightest()) for trial in trials])
+        sizes = trials[0].lighter(best.sizes, np.isfinite(best.passes))
         # A side that is as small as it may be has no bracket; the same boulder has one by another side.
-        found += [trial.bracketed(sizes) for trial in trials]
-        best = _lightest(found)
-        kind, fails, passes = (
-            _taken((getattr(own, name) for own in found), best) for name in ("kind", "fails", "passes")
-        )
-        columns = {
-            name: _taken((own.block.columns[name].to_numpy() for own in found), best) for name in (*SIDES, DEPTH)
-        }
-        block = replace(taken(rows, np.arange(n), **columns), labels=self.open.labels(start, stop))
+        best = _lightest(rows, [best, *(trial.bracketed(sizes) for trial in trials)])
+        block = replace(best.block, labels=self.open.labels(start, stop))
         judged = self.judges.final.graded(final(block), block)
         simulated = sum(trial.simulated for trial in trials) + final.count
-        return Answers(block, kind, fails, passes, judged, [None] * n, simulated)
+        return Answers(block, best.kind, best.fails, best.passes, judged, [None] * (stop - start), simulated)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +183,7 @@ class Boulders:
             each = count ** len(bounds)
             index = np.repeat(np.arange(n), each)
             flat = {name: values.ravel() for name, values in tried.items()}
-            found = self.least(index, flat, quick=True)
+            found = self.least(index, flat)
             mass = np.where(found.has_holds, self.mass(index, found.holds, flat), np.inf).reshape(n, each)
             place = mass.argmin(axis=1)
             better = mass[np.arange(n), place] < best
@@ -188,14 +192,17 @@ class Boulders:
                 chosen[name] = np.where(better, tried[name][np.arange(n), place], chosen[name])
         return chosen
 
-    def least(self, index: np.ndarray, others: Sides, *, quick: bool) -> Search:
+    def least(self, index: np.ndarray, others: Sides) -> Search:
         """Search for the least of the side (or the scale) that passes, given the other sides and the depth."""
+        return search(self.predicate(index, others, quick=True), *self.ends(len(index)), CELLS)
 
-        def predicate(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
-            return self.codes(index[rows], places, {name: values[rows] for name, values in others.items()}, quick=quick)
+    def ends(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ends of the side (or the scale) for some searches."""
+        return np.full(count, self.first, dtype=np.int64), np.full(count, self.last, dtype=np.int64)
 
-        first, last = (np.full(len(index), end, dtype=np.int64) for end in (self.first, self.last))
-        return search(predicate, first, last, CELLS)
+    def predicate(self, index: np.ndarray, others: Sides, *, quick: bool) -> Predicate:
+        """Return the predicate of a search in rows, given the other sides and the depth of each."""
+        return lambda rows, places: self.codes(index[rows], places, rows_at(others, rows), quick=quick)
 
     def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
         """Return the predicate of `search`."""
@@ -208,7 +215,7 @@ class Boulders:
         """Return the designs with boulders of these sizes."""
         sides = self.sides(places, others)
         share = others.get(SHARE, np.zeros(len(index)))
-        return taken(self.rows, index, **sides, **{DEPTH: self.depth(index, sides[HEIGHT], share)})
+        return block_at(self.rows, index, **sides, **{DEPTH: self.depth(index, sides[HEIGHT], share)})
 
     def sides(self, places: np.ndarray, others: Sides) -> Sides:
         """Return all sides [m] from the lattice place of the one searched for (or of the scale) and the others."""
@@ -243,28 +250,16 @@ class Boulders:
 
     def certified(self, others: Sides) -> _SizedBrackets:
         """Return what the search finds for other sides and depths, one for each row, with the sweep's accuracy."""
-        n = len(next(iter(self.rows.values())))
-        index = np.arange(n)
-        found = self.least(index, others, quick=True)
-        failing, holding = np.flatnonzero(found.has_fails), np.flatnonzero(found.has_holds)
-        ends = np.concatenate([failing, holding])
-        places = np.concatenate([found.fails[failing], found.holds[holding]])
-        at_ends = {name: values[ends] for name, values in others.items()}
-        holds = self.codes(ends, places, at_ends, quick=False) == HOLDS
-        wrong = np.unique(ends[holds != (np.arange(len(ends)) >= len(failing))])
-        if len(wrong):
-            part = self.least(wrong, {name: values[wrong] for name, values in others.items()}, quick=False)
-            found = replaced(found, wrong, part)
+        index = np.arange(len(next(iter(self.rows.values()))))
+        found, final = self.least(index, others), self.predicate(index, others, quick=False)
+        found = searched_again(final, found, contradicted(final, found), *self.ends(len(index)), CELLS)
         return self.found(others, found.shown, found.has_holds, found.fails, found.has_fails)
 
     def bracketed(self, sizes: Sides) -> _SizedBrackets:
         """Return boulders with the last lighter ones that fail, by the side that is searched for."""
         places = self.places(sizes)
         index = np.arange(len(places))
-
-        def predicate(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
-            return self.codes(rows, places, {name: values[rows] for name, values in sizes.items()}, quick=False)
-
+        predicate = self.predicate(index, sizes, quick=False)
         has_holds = predicate(index, places) == HOLDS
         first = np.where(has_holds, self.first, places)
         fails, holds, has_fails = last_before(predicate, places, first)
@@ -298,7 +293,7 @@ class Boulders:
             # With the sweep's accuracy: the quick evaluation misses some that pass in a narrow stretch.
             kept = self.codes(index, self.places(tried), tried, quick=False) == HOLDS
             index, masses = index[kept], masses[kept]
-            tried = {name: values[kept] for name, values in tried.items()}
+            tried = rows_at(tried, kept)
             lucky, chosen = _least_of_each(index, masses)
             unlucky[rows] += 1
             unlucky[lucky[masses[chosen] < (1.0 - WORTH) * mass[lucky]]] = 0
@@ -328,18 +323,25 @@ class Boulders:
                 tried[name] = _millimetres(values).ravel()
         masses = self.mass(index, self.places(tried), tried)
         kept = masses < mass[index]
-        return index[kept], {name: values[kept] for name, values in tried.items()}, masses[kept]
+        return index[kept], rows_at(tried, kept), masses[kept]
 
     def places(self, sizes: Sides) -> np.ndarray:
         """Return the places of the side that is searched for."""
         return np.rint(sizes[self.side] * MILLIMETRES).astype(np.int64)
 
 
-def _lightest(found: Sequence[_SizedBrackets]) -> np.ndarray:
-    """Return the place of the lightest of several answers, one after the other, for each row; rather with a bracket."""
-    n = len(found[0].passes)
+def _lightest(rows: Rows, found: Sequence[_SizedBrackets]) -> _SizedBrackets:
+    """Return the lightest of several answers for each row; rather one with a bracket."""
     masses = [np.where(np.isnan(own.passes), np.inf, own.passes) + 1e-6 * np.isnan(own.fails) for own in found]
-    return np.argmin(masses, axis=0) * n + np.arange(n)
+    best, index = np.argmin(masses, axis=0), np.arange(len(masses[0]))
+
+    def picked(arrays: Iterable[np.ndarray]) -> np.ndarray:
+        return np.stack(list(arrays))[best, index]
+
+    columns = {name: picked(own.block.columns[name].to_numpy() for own in found) for name in (*SIDES, DEPTH)}
+    kind, fails, passes = (picked(getattr(own, name) for own in found) for name in ("kind", "fails", "passes"))
+    sizes = {name: picked(own.sizes[name] for own in found) for name in found[0].sizes}
+    return _SizedBrackets(block_at(rows, index, **columns), kind, fails, passes, sizes)
 
 
 def _least_of_each(index: np.ndarray, masses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -347,11 +349,6 @@ def _least_of_each(index: np.ndarray, masses: np.ndarray) -> tuple[np.ndarray, n
     order = np.argsort(masses, kind="stable")
     rows, first = np.unique(index[order], return_index=True)
     return rows, order[first]
-
-
-def _taken(values: Iterable[np.ndarray], places: np.ndarray) -> np.ndarray:
-    """Return what stands at some places of arrays, one after the other."""
-    return np.concatenate(list(values))[places]
 
 
 def _millimetres(lengths: np.ndarray) -> np.ndarray:

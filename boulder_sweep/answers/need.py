@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
 from boulder_sweep.answers.lightest import SIDES, LightestQuestion
 from boulder_sweep.answers.questions import Question
-from boulder_sweep.answers.result import Result
+from boulder_sweep.answers.result import Result, TableColumn, joined_tables, rows_table, to_build, write_parquet
 from boulder_sweep.answers.search import BLOCKED, WORDS
 from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, other_readings, ranges
-from boulder_sweep.columns import SECOND_SPRING_COLUMNS
+from boulder_sweep.columns import INPUTS, SECOND_SPRING_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
@@ -107,8 +107,6 @@ class Need(Result):
         QuestionError
             The name has another ending, its folder does not exist, or it cannot be written.
         """
-        from boulder_sweep.answers.tables import write_parquet
-
         return write_parquet(self.arrow, path)
 
     def plot(self, path: str | Path, *, units: str = "si") -> None:
@@ -242,10 +240,11 @@ def need(
             tables.append(table)
             simulated += count
             done.answered(len(table))
-    from boulder_sweep.answers.tables import joined_tables
-
     chance = None if probability is None else share(probability, "--probability")
-    table = joined_tables(tables, _metadata(asked[0], least_margin, chance, robust))
+    question = {"asked": key.answer, "tolerance": key.tolerance, "margin": least_margin}
+    question |= {} if chance is None else {"probability": chance}
+    question |= {"robust": True} if robust else {}
+    table = joined_tables(tables, sweep, judges[0], "boulder_sweep.need", question)
     return Need(sweep, table, key, least_margin, simulated, chance)
 
 
@@ -316,27 +315,36 @@ def _question(
 
 
 def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: int) -> tuple[pa.Table, int]:
-    """Answer some rows for all readings asked about; the table and the designs simulated."""
-    from boulder_sweep.answers.tables import answer_table
+    """Answer some rows for all readings asked about; the table and the designs simulated.
+
+    The table has the inputs, the answer and its bracket, and the outcome at the answer.
+    """
+    from boulder_sweep.store.schema import word_array
 
     answers = [question.answered(start, stop) for question in asked]
-    names = [question.sweep.model.preset for question in asked]
-    table = answer_table(asked[0].key, start, answers, names, asked[0].sweep)
+    own, key, sweep = answers[0], asked[0].key, asked[0].sweep
+    unit = key.field.unit
+    what = f"{'largest' if key.most else 'smallest'} value of {key.field.path} that passes"
+    next_to_it = f"value next to it of {key.field.path} that does not pass; where none passes, the last one tried"
+    columns: list[TableColumn] = [
+        (key.answer, unit, f"{what}; null where none does", own.passes),
+        ("fails_at", unit, next_to_it, own.fails),
+        ("passes_at", unit, "the same as the answer: judged as a run judges it", own.passes),
+        ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(own.kind, WORDS)),
+        ("passes_within", unit, "where it fails again further on: all stretches that pass", own.stretches),
+        *to_build(own.block, sweep),
+    ]
+    for question, other in zip(asked[1:], answers[1:], strict=True):
+        name = question.sweep.model.preset
+        columns += [
+            (f"{key.answer}_{name}", unit, f"{what} by the readings {name}", other.passes),
+            (f"found_{name}", "", f"as found, by the readings {name}", word_array(other.kind, WORDS)),
+        ]
+    if own.chances is not None:
+        columns += [
+            ("p_pass", "1", "chance of passing at the answer, or at the value tried last", own.chances.estimate),
+            ("p_pass_low", "1", "lower end of the interval of p_pass", own.chances.low),
+            ("p_pass_high", "1", "upper end of the interval of p_pass", own.chances.high),
+        ]
+    table = rows_table(start, own.block, own.judged, columns, at=1 + len(INPUTS))
     return table, sum(answer.simulated for answer in answers)
-
-
-def _metadata(
-    asked: Question | LightestQuestion, least_margin: float, probability: float | None, robust: bool
-) -> dict[bytes, bytes]:
-    """Return the metadata of a file of answers."""
-    from boulder_sweep.store.provenance import file_metadata, identity
-
-    own = asked.judges.final
-    accuracy = asked.judges.accuracy.to_dict()
-    found = identity(asked.sweep.resolved(), own.readings._asdict(), own.control._asdict(), accuracy)
-    question: dict[str, Any] = {"asked": asked.key.answer, "tolerance": asked.key.tolerance, "margin": least_margin}
-    if probability is not None:
-        question["probability"] = probability
-    if robust:
-        question["robust"] = True
-    return file_metadata(found | {"question": question}, "boulder_sweep.need")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shlex
-import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO, SIDES
 from boulder_sweep.answers.printing import (
     GRADE,
     HEADS,
+    MOST_LINES,
     WIDTH,
     Cell,
     Column,
@@ -30,6 +30,7 @@ from boulder_sweep.answers.printing import (
     volume_columns,
     volume_lines,
     word_of,
+    wrapped,
 )
 from boulder_sweep.columns import GRADES
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
 
-MOST_LINES = 40
-"""Most rows of a plain table; more are shown boulder by soil."""
 MOST_IN_ALL = 1000
 """Most lines of tables; of more, whole tables are left out."""
 SOIL = "soil"
@@ -65,15 +64,13 @@ OTHER = {
 }
 
 
-def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "GRID.yaml") -> list[str]:
+def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[str]:
     """Return the answers as lines.
 
     Parameters
     ----------
     need
         The answers.
-    width
-        Width of the terminal; columns that do not fit are left out, the least important first.
     units
         ``si`` or ``us``.
     file
@@ -83,11 +80,12 @@ def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "G
     -------
     list of str
         Header, one line for each row, or tables with a line for each boulder and a column for each soil; then a
-        legend, how often nothing passes, and the flags of what passes.
+        legend, how often nothing passes, and the flags of what passes. Columns that do not fit are left out, the least
+        important first.
     """
     rows = rows_of(_shown_part(need), units)
-    by_soil = _by_soil(need, rows, width, units) if len(rows) > MOST_LINES else []
-    tables = by_soil or [table_lines(need_columns(need, units), rows[:MOST_IN_ALL], width)]
+    by_soil = _by_soil(need, rows, units) if len(rows) > MOST_LINES else []
+    tables = by_soil or [table_lines(_need_columns(need, units), rows[:MOST_IN_ALL])]
     kept = tables[: max(1, MOST_IN_ALL // len(tables[0]))]
     lines = [line for place, table in enumerate(kept) for line in ([""] * (place > 0) + table)]
     if len(kept) < len(tables):
@@ -100,7 +98,7 @@ def need_lines(need: Need, width: int = WIDTH, units: str = "si", file: str = "G
     remarks += foot_lines(need.sweep.model, need.arrow["reason"].unique().to_pylist(), units)
     if need.key.name == BOULDER_MASS.name:
         remarks += _edges(need, units, file)
-    return [*lines, *(part for line in remarks for part in textwrap.wrap(line, width, subsequent_indent="  "))]
+    return [*lines, *wrapped(remarks)]
 
 
 def _shown_part(need: Need) -> pa.Table:
@@ -111,7 +109,7 @@ def _shown_part(need: Need) -> pa.Table:
     return need.arrow.select([n for n in need.arrow.column_names if n in needed or n.startswith(answers)])
 
 
-def _by_soil(need: Need, rows: Sequence[Row], width: int, units: str) -> list[list[str]]:
+def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
     """Return tables with a line for each boulder and a column for each soil, as many columns as fit.
 
     None for the lightest boulder, which differs by soil, for a list of designs, or where no soil varies.
@@ -138,7 +136,7 @@ def _by_soil(need: Need, rows: Sequence[Row], width: int, units: str) -> list[li
     left = [text.rjust(max(len(left[0]), *map(len, titles))) for text in left]
     columns = [[*soil, "", "", *(own.get(soil, "") for own in found.values())] for soil in heads]
     each = max(len(text) for column in columns for text in column) + 2
-    most = max(1, (width - len(left[0])) // each)
+    most = max(1, (WIDTH - len(left[0])) // each)
     word, unit = head_of(key.name, units)
     title = f"{'largest' if key.most else 'least'} {word}{f' [{unit}]' if unit else ''} by boulder and soil"
     tables = []
@@ -217,43 +215,42 @@ def _edges(need: Need, units: str, file: str) -> list[str]:
     return [f"edges: {told}. Wider ranges in {file} may hold a lighter boulder"]
 
 
-def need_columns(need: Need, units: str = "si") -> list[Column]:
+def _need_columns(need: Need, units: str) -> list[Column]:
     """Return the columns of a terminal table: varying inputs, the answer, and what follows from it."""
     key = need.key
-    open_ = (key.name, *need.derived)
     unit, size = (key.field.unit, 1.0) if units == "si" else shown_unit(key.field.unit, units)
-    names = [name for name in HEADS if name not in (*open_, BOULDER_MASS.name)]  # which has a column of its own
-    columns = leading(need.sweep, need.arrow, names, units)
+    hidden = (key.name, *need.derived, BOULDER_MASS.name)  # the mass has a column of its own
+    columns = leading(need.sweep, need.arrow, [name for name in HEADS if name not in hidden], units)
     if key.name == BOULDER_MASS.name:
         columns.append((("mass", unit), _answer(key, "", size)))
-        columns += [(head_of(name, units), _size(name)) for name in (*SIDES, "embedment_depth_m")]
-        columns += [_margin_or_chance(need), _GRADE]
-        columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
-        return [*columns, *_volumes(units)]
-    columns.append((head_of(key.name, units), _answer(key, "", size)))
-    if key.name == "embedment_depth_m":
-        columns.append((("ratio", "d/H"), _ratio))
-        columns.append((("above", unit), _above_ground))
-    columns += [_mass(units), _margin_or_chance(need), _GRADE]
+        columns += [(head_of(name, units), _where_it_passes(_length(name))) for name in (*SIDES, DEPTH)]
+    else:
+        columns.append((head_of(key.name, units), _answer(key, "", size)))
+        if key.name == DEPTH:
+            columns.append((("ratio", "d/H"), _where_it_passes(lambda row: f"{row[DEPTH] / row[HEIGHT]:.3f}")))
+            columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
+        columns.append(_mass(units))
+    if "p_pass" in need.arrow.column_names:
+        columns.append((("P(pass)", ""), _where_it_passes(lambda row: f"{row['p_pass']:.3f}")))
+    else:
+        columns.append((("margin", ""), _where_it_passes(_margin)))
+    columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
     columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
-    return [*columns, *_volumes(units)]
+    return [*columns, *((head, _where_it_passes(cell)) for head, cell in volume_columns(units))]
 
 
-def _volumes(units: str) -> list[Column]:
-    """Return the columns of volumes, empty where nothing passes."""
-
-    def where_it_passes(cell: Cell) -> Cell:
-        return lambda row: "" if row["passes_at"] is None else cell(row)
-
-    return [(head, where_it_passes(cell)) for head, cell in volume_columns(units)]
+def _where_it_passes(cell: Cell) -> Cell:
+    """Return a formatter that leaves a cell empty where nothing passes."""
+    return lambda row: "" if row["passes_at"] is None else cell(row)
 
 
-_GRADE: Column = (GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-")
-
-
-def _size(name: str) -> Cell:
+def _length(name: str) -> Cell:
     """Return a formatter for a side of the boulder or its depth."""
-    return lambda row: "" if row["passes_at"] is None else f"{row[name]:.3f}"
+    return lambda row: f"{row[name]:.3f}"
+
+
+def _margin(row: Row) -> str:
+    return "" if row["margin"] is None else f"{row['margin']:.1%}"
 
 
 def _answer(key: Key, suffix: str, size: float) -> Cell:
@@ -270,33 +267,8 @@ def _answer(key: Key, suffix: str, size: float) -> Cell:
     return cell
 
 
-def _ratio(row: Row) -> str:
-    if row["passes_at"] is None:
-        return ""
-    return f"{row['embedment_depth_m'] / row['boulder_height_m']:.3f}"
-
-
-def _above_ground(row: Row) -> str:
-    if row["passes_at"] is None:
-        return ""
-    return f"{row['boulder_height_m'] - row['embedment_depth_m']:.2f}"
-
-
 def _mass(units: str) -> Column:
     """Return the column of the mass of the boulder: tonnes, or pounds."""
     if units == "us":
         return ("mass", "lb"), lambda row: f"{row['boulder_mass_kg']:.0f}"
     return ("mass", "t"), lambda row: f"{row['boulder_mass_kg'] / 1000:.1f}"
-
-
-def _margin_or_chance(need: Need) -> Column:
-    """Return the column of the margin at the answer, or of the probability of passing if one is asked for."""
-    if "p_pass" in need.arrow.column_names:
-        return ("P(pass)", ""), lambda row: "" if row["passes_at"] is None else f"{row['p_pass']:.3f}"
-    return ("margin", ""), _margin
-
-
-def _margin(row: Row) -> str:
-    if row["margin"] is None or row["passes_at"] is None:
-        return ""
-    return f"{row['margin']:.1%}"

@@ -21,13 +21,14 @@ if TYPE_CHECKING:
 
     from boulder_sweep.answers.doubts import Doubt
     from boulder_sweep.answers.reserves import Reserve, Reserves
+    from boulder_sweep.answers.result import Result
     from boulder_sweep.answers.uncertainty import Uncertainty
     from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.model import Model
 
 WIDTH = 80
 MOST_LINES = 40
-"""Most rows shown; of longer tables, evenly spaced ones."""
+"""Most rows of a plain table; of longer ones evenly spaced rows are shown, or all boulder by soil."""
 HEADS = {
     "boulder_length_m": ("L", "m"),
     "boulder_width_m": ("W", "m"),
@@ -85,8 +86,7 @@ def grade_lines(rows: Iterable[Row]) -> list[str]:
 
     occurring = {(row["robustness"], meaning_of(row)) for row in rows if row["robustness"]}
     ranked = sorted(occurring, key=lambda found: (GRADES.index(found[0]), found[1]))
-    words = [f"{word}: {meaning}" for word, meaning in ranked]
-    return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
+    return wrapped(f"{word}: {meaning}" for word, meaning in ranked)
 
 
 def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:
@@ -96,20 +96,38 @@ def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "s
         words.append(f"rock: {quantity_text('kg/m^3', units, ROCK_KG_M3)} assumed (boulder.density); no pass is robust")
     occurring = set(reasons)
     words += [f"undecided ({reason}): {advice}" for reason, advice in WAY_OUT.items() if reason in occurring]
-    return [line for text in words for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
+    return wrapped(words)
 
 
-def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
+def wrapped(texts: Iterable[str]) -> list[str]:
+    """Return texts as lines of at most `WIDTH`."""
+    return [line for text in texts for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
+
+
+def _rows_lines(found: Result, own: Sequence[Column], units: str) -> tuple[list[str], list[Row]]:
+    """Return designs as lines, and those shown: their varying inputs and these columns, of all or evenly spaced ones.
+
+    Columns that do not fit are left out, the least important first.
+    """
+    count = len(found)
+    places: Sequence[int] = range(count)
+    if count > MOST_LINES:
+        places = [place * (count - 1) // (MOST_LINES - 1) for place in range(MOST_LINES)]
+    rows = rows_of(found.arrow.take(list(places)), units)
+    names = [name for name in HEADS if name in found.sweep.plan.given]
+    lines = table_lines([*leading(found.sweep, found.arrow, names, units), *own], rows)
+    if count > MOST_LINES:
+        lines.append(f"({MOST_LINES} of {count:,} rows, evenly spaced; -o writes them all)")
+    return lines, rows
+
+
+def uncertainty_lines(found: Uncertainty, units: str = "si") -> list[str]:
     """Return probabilities as lines: varying inputs, verdict at the means, probability, most influential input.
 
     Parameters
     ----------
     found
         The probabilities.
-    width
-        Width of the terminal; columns that do not fit are left out, the least important first.
-    most
-        Most rows shown.
     units
         ``si`` or ``us``.
 
@@ -118,31 +136,23 @@ def uncertainty_lines(found: Uncertainty, width: int = WIDTH, most: int = MOST_L
     list of str
         Header, one line for each row, and a legend; for a single design, its Sobol indices follow.
     """
-    count = len(found)
-    rows = _shown_rows(found.arrow, most, units)
-    columns = leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
-    columns += [
+    columns: list[Column] = [
         (("at the", "means"), lambda row: str(row["verdict"])),
         *([GRADE] if found.sweep.model.second_opinion else []),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
+        *([(("P(fail)", ""), _failing)] if "p_fail" in found.arrow.column_names else []),
         (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
     ]
-    if "p_fail" in found.arrow.column_names:
-        columns.insert(-2, (("P(fail)", ""), _failing))
-    lines = table_lines(columns, rows, width)
-    if count > most:
-        lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
+    lines, rows = _rows_lines(found, columns, units)
     occurring = {row.get("p_fail_by") for row in rows}
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
     if found.sweep.model.second_opinion:
         lines += grade_lines(rows)
     lines += foot_lines(found.sweep.model, units=units)
-    if count == 1:
-        lines += ["", *_index_lines(found, width)]
-    return lines
+    return [*lines, "", *_index_lines(found)] if len(found) == 1 else lines
 
 
 def _failing(row: Row) -> str:
@@ -151,40 +161,54 @@ def _failing(row: Row) -> str:
     return f"{row['p_fail']:.2g} ({row['p_fail_low']:.2g} to {row['p_fail_high']:.2g})"
 
 
-def doubt_lines(found: Sequence[Doubt], width: int = WIDTH) -> list[str]:
+def _index_lines(found: Uncertainty) -> list[str]:
+    """Return the Sobol indices of one design as lines."""
+
+    def number(name: str) -> Cell:
+        def cell(row: Row) -> str:
+            if row[name] is None:
+                return "-"
+            return f"{row[name]:.2f} ({row[f'{name}_low']:.2f} to {row[f'{name}_high']:.2f})"
+
+        return cell
+
+    columns: list[Column] = [
+        (("Sobol", "index of"), lambda row: str(row["output"])),
+        (("", "input"), lambda row: BY_NAME[row["input"]].path),
+        (("first order", ""), number("first")),
+        (("total", ""), number("total")),
+    ]
+    return table_lines(columns, found.indices.to_pylist())
+
+
+def doubt_lines(found: Sequence[Doubt]) -> list[str]:
     """Return the shares of uncertainty as lines."""
     columns: list[Column] = [
         (("uncertainty of the margin", ""), lambda row: str(row["cause"])),
         (("alone", ""), lambda row: _share(row["alone"])),
         (("with", "interactions"), lambda row: _share(row["total"])),
     ]
-    return table_lines(columns, [asdict(own) for own in found], width)
+    return table_lines(columns, [asdict(own) for own in found])
 
 
 def _share(value: float) -> str:
     return f"{value:.1%}" if value >= 5e-4 else "< 0.05%"
 
 
-def reserve_lines(found: Reserves, width: int = WIDTH, most: int = MOST_LINES, units: str = "si") -> list[str]:
+def reserve_lines(found: Reserves, units: str = "si") -> list[str]:
     """Return what designs withstand as lines: varying inputs, verdict, each value and its distance from the design.
 
     Parameters are those of `uncertainty_lines`.
     """
     from boulder_sweep.answers.reserves import RESERVES
 
-    count = len(found)
-    rows = _shown_rows(found.arrow, most, units)
-    columns = leading(found.sweep, found.arrow, [name for name in HEADS if name in found.sweep.plan.given], units)
-    columns += [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
+    columns: list[Column] = [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
     for reserve, decimals in zip(RESERVES, (2, 0, 2), strict=True):
         field = key_of(reserve.input).field
         size = 1.0 if units == "si" else shown_unit(field.unit, units).size
         columns.append((head_of(field.name, units), _withstood(reserve, field.name, decimals, size)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
-    columns += volume_columns(units)
-    lines = table_lines(columns, rows, width)
-    if count > most:
-        lines.append(f"({most} of {count:,} rows, evenly spaced; -o writes them all)")
+    lines, rows = _rows_lines(found, [*columns, *volume_columns(units)], units)
     lines += volume_lines(lines[0])
     if any(sign in line for line in lines for sign in "≥≤"):
         lines.append("≥, ≤: passes at the worst value tried")
@@ -209,26 +233,6 @@ def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:
     return cell
 
 
-def _index_lines(found: Uncertainty, width: int) -> list[str]:
-    """Lines with the Sobol indices of one design."""
-
-    def number(name: str) -> Cell:
-        def cell(row: Row) -> str:
-            if row[name] is None:
-                return "-"
-            return f"{row[name]:.2f} ({row[f'{name}_low']:.2f} to {row[f'{name}_high']:.2f})"
-
-        return cell
-
-    columns: list[Column] = [
-        (("Sobol", "index of"), lambda row: str(row["output"])),
-        (("", "input"), lambda row: BY_NAME[row["input"]].path),
-        (("first order", ""), number("first")),
-        (("total", ""), number("total")),
-    ]
-    return table_lines(columns, found.indices.to_pylist(), width)
-
-
 def head_of(name: str, units: str) -> tuple[str, str]:
     """Return name and unit over the column of an input."""
     word, unit = HEADS[name]
@@ -237,15 +241,8 @@ def head_of(name: str, units: str) -> tuple[str, str]:
     return word, shown_unit(COLUMNS[name].unit, units).unit
 
 
-def _shown_rows(table: pa.Table, most: int, units: str) -> list[Row]:
-    """Return the rows of a table to show: all, or evenly spaced ones."""
-    count = len(table)
-    places = range(count) if count <= most else [place * (count - 1) // (most - 1) for place in range(most)]
-    return rows_of(table.take(list(places)), units)
-
-
 def rows_of(table: pa.Table, units: str) -> list[Row]:
-    """Return all rows of a table in the units asked for."""
+    """Return all rows of a table in some units."""
     rows = table.to_pylist()
     if units == "si":
         return rows
@@ -254,11 +251,11 @@ def rows_of(table: pa.Table, units: str) -> list[Row]:
     return [{n: value / sizes[n] if isinstance(value, float) else value for n, value in row.items()} for row in rows]
 
 
-def table_lines(columns: Sequence[Column], rows: Sequence[Row], width: int) -> list[str]:
-    """Return a table as lines of limited width; columns that do not fit are left out, starting with the last."""
+def table_lines(columns: Sequence[Column], rows: Sequence[Row]) -> list[str]:
+    """Return a table as lines of at most `WIDTH`; columns that do not fit are left out, starting with the last."""
     texts = [[*head, *(cell(row) for row in rows)] for head, cell in columns]
     widths = [max(map(len, column)) for column in texts]
-    while len(widths) > 1 and sum(widths) + 2 * (len(widths) - 1) > width:
+    while len(widths) > 1 and sum(widths) + 2 * (len(widths) - 1) > WIDTH:
         texts.pop()
         widths.pop()
     lines = table_texts(texts)

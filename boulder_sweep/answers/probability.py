@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.chance import SCRAMBLINGS, Chance, Points, chance
-from boulder_sweep.answers.draws import Draws, threads
+from boulder_sweep.answers.chance import SCRAMBLINGS, Points, Sampled, chance
+from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import Ends, Key
 from boulder_sweep.answers.lightest import DEPTH, RATIO, SIDES, Boulders, LightestQuestion, Sides
 from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import Judges, Remembered, Rows, beyond_reach, ranges, uncertain_rows
+from boulder_sweep.answers.trials import Judges, Remembered, Rows, beyond_reach, ranges, rows_at, uncertain_rows
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import BY_NAME
 
 if TYPE_CHECKING:
@@ -36,6 +37,69 @@ AT_ONCE = 1 << 18
 """Designs drawn at once."""
 
 
+class Sampling:
+    """Designs drawn with some inputs set, of which enough must pass.
+
+    All rows and values use the same points, so that the share that passes depends on the inputs alone.
+
+    Parameters
+    ----------
+    spread
+        The uncertain inputs.
+    judges
+        How designs are judged.
+    probability
+        The required probability of passing.
+    seed
+        Seed of the points.
+    variants
+        Readings of which every sampled design uses one.
+    """
+
+    def __init__(
+        self, spread: Spread, judges: Judges, probability: float, seed: int, variants: tuple[Judges, ...]
+    ) -> None:
+        self.spread, self.judges, self.variants = spread, judges, variants
+        self.probability, self.seed = probability, seed
+        points = Points(len(spread.names) + bool(variants), seed).upto(DRAWN // SCRAMBLINGS)
+        self.points = points.reshape(DRAWN, -1)
+        self.few = points[:, : FEW // SCRAMBLINGS].reshape(FEW, -1)
+
+    def draws(self, rows: Rows) -> Draws:
+        """Return what draws the designs of some rows."""
+        return Draws(rows, self.spread, self.judges, Pool(1), self.variants)
+
+    def often(self, draws: Draws, index: np.ndarray, inputs: Rows, points: np.ndarray) -> np.ndarray:
+        """Return whether designs pass often enough, by some of the points, bool, shape (m,).
+
+        Parameters
+        ----------
+        draws
+            What draws them.
+        index
+            Their rows, shape (m,).
+        inputs
+            Inputs to set, shape (m,) each.
+        points
+            The points.
+        """
+        found = np.empty(len(index), dtype=bool)
+        for start, stop in ranges(len(index), AT_ONCE // len(points)):
+            own = np.repeat(np.arange(start, stop), len(points))
+            passes = draws.passes(index[own], np.tile(points, (stop - start, 1)), **rows_at(inputs, own))
+            found[start:stop] = passes.reshape(-1, len(points)).mean(axis=1) >= self.probability
+        return found
+
+    def chances(self, draws: Draws, inputs: Rows) -> Sampled:
+        """Return the probabilities of passing of all rows with inputs set, from the points and more where needed."""
+
+        def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
+            return draws.passes(index, z, **rows_at(inputs, index))
+
+        count, points = len(next(iter(inputs.values()))), Points(draws.dimensions, self.seed)
+        return chance(event, count, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
+
+
 class ProbabilityQuestion(Question):
     """The smallest, or the largest, value of one input that passes with a given probability, when others are uncertain.
 
@@ -43,12 +107,8 @@ class ProbabilityQuestion(Question):
     ----------
     sweep, key, between, judges
         As of `Question`.
-    probability
-        The required probability of passing.
-    seed
-        Seed of the points.
-    variants
-        Readings of which every sampled design uses one.
+    probability, seed, variants
+        As of `Sampling`.
 
     Raises
     ------
@@ -70,10 +130,7 @@ class ProbabilityQuestion(Question):
         variants: tuple[Judges, ...] = (),
     ) -> None:
         super().__init__(sweep, key, between, judges)
-        self.spread, self.probability, self.seed = Spread(sweep, key.name), probability, seed
-        self.variants = variants
-        points = Points(len(self.spread.names) + bool(variants), seed).upto(DRAWN // SCRAMBLINGS)
-        self.points = points.reshape(DRAWN, -1)
+        self.sampling = Sampling(Spread(sweep, key.name), judges, probability, seed, variants)
 
     def trial(self, rows: Rows) -> Trial:
         """Return the object that tries values in some rows."""
@@ -87,41 +144,29 @@ class ProbabilityQuestion(Question):
 
 
 class ProbabilityTrial(Trial):
-    """Tries values of the input in some rows: whether the designs sampled with them pass often enough.
-
-    All rows and values use the same points, so that the share that passes depends on the value alone.
-    """
+    """Tries values of the input in some rows: whether the designs sampled with them pass often enough."""
 
     def __init__(self, asked: ProbabilityQuestion, rows: Rows) -> None:
         super().__init__(asked.key, asked.judges, rows)
-        self.asked = asked
-        self.draws = Draws(rows, asked.spread, asked.judges, threads(1), asked.variants)
+        self.asked, self.draws = asked, asked.sampling.draws(rows)
 
     def contradicted(self, found: Search) -> np.ndarray:
         """Return no rows: the designs drawn near a limit are judged with the accuracy of the sweep anyway."""
         return np.empty(0, dtype=np.int64)
 
-    def chances(self, places: np.ndarray) -> Chance:
-        """Return the probabilities of passing at some values, from the points of the search and more where needed."""
-        values = self.key.values(places)
-
-        def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-            self.simulated += len(index)
-            return self.draws.passes(index, z, **{self.key.name: values[index]})
-
-        points = Points(self.draws.dimensions, self.asked.seed)
-        return chance(event, len(places), points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
+    def chances(self, places: np.ndarray) -> Sampled:
+        """Return the probabilities of passing at some values, one for each row."""
+        found = self.asked.sampling.chances(self.draws, {self.key.name: self.key.values(places)})
+        self.simulated += int(found.points.sum())
+        return found
 
     def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
         block, judged = self.judged(index, places, quick=True)
-        values = self.key.values(places)
-        z = np.tile(self.asked.points, (len(index), 1))
-        drawn = {self.key.name: np.repeat(values, DRAWN)}
-        passes = self.draws.passes(np.repeat(index, DRAWN), z, **drawn)
-        self.simulated += len(z)
+        sampling = self.asked.sampling
+        often = sampling.often(self.draws, index, {self.key.name: self.key.values(places)}, sampling.points)
+        self.simulated += DRAWN * len(index)
         if self.asked.tried is not None:
             self.asked.tried(len(index))
-        often = passes.reshape(-1, DRAWN).mean(axis=1) >= self.asked.probability
         return np.where(beyond_reach(block, judged), BEYOND, np.where(often, HOLDS, FAILS))
 
 
@@ -133,7 +178,7 @@ class LikelyLightestQuestion(LightestQuestion):
     sweep, key, judges
         As of `LightestQuestion`.
     probability, seed, variants
-        As of `ProbabilityQuestion`.
+        As of `Sampling`.
 
     Raises
     ------
@@ -148,14 +193,12 @@ class LikelyLightestQuestion(LightestQuestion):
         self, sweep: Sweep, key: Key, judges: Judges, probability: float, seed: int, variants: tuple[Judges, ...] = ()
     ) -> None:
         super().__init__(sweep, key, judges)
-        self.spread, self.probability, self.seed, self.variants = Spread(sweep), probability, seed, variants
+        spread = Spread(sweep)
         for name in (*SIDES, DEPTH, RATIO):
-            if name in self.spread.names:
+            if name in spread.names:
                 path = BY_NAME[name].path
                 raise QuestionError(f"--least mass searches for {path}, which has a distribution; give it values")
-        points = Points(len(self.spread.names) + bool(variants), seed).upto(DRAWN // SCRAMBLINGS)
-        self.points = points.reshape(DRAWN, -1)
-        self.few = points[:, : FEW // SCRAMBLINGS].reshape(FEW, -1)
+        self.sampling = Sampling(spread, judges, probability, seed, variants)
 
     def given(self, start: int, stop: int) -> Rows:
         """Return the other inputs of some rows, with the places of named sets that have distributions."""
@@ -165,21 +208,11 @@ class LikelyLightestQuestion(LightestQuestion):
         """Return the object that tries boulders in some rows."""
         return LikelyBoulders(self, rows, side, final)
 
-    def draws(self, rows: Rows) -> Draws:
-        """Return what draws the designs of some rows."""
-        return Draws(rows, self.spread, self.judges, threads(1), self.variants)
-
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``, with the probability of passing of each answer."""
         found = super().answered(start, stop)
-        draws = self.draws(self.given(start, stop))
         sizes = {name: found.block.columns[name].to_numpy() for name in (*SIDES, DEPTH)}
-
-        def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-            return draws.passes(index, z, **{name: values[index] for name, values in sizes.items()})
-
-        points = Points(draws.dimensions, self.seed)
-        chances = chance(event, stop - start, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
+        chances = self.sampling.chances(self.sampling.draws(self.given(start, stop)), sizes)
         return replace(found, chances=chances, simulated=found.simulated + int(chances.points.sum()))
 
 
@@ -188,21 +221,16 @@ class LikelyBoulders(Boulders):
 
     def __init__(self, asked: LikelyLightestQuestion, rows: Rows, side: str, final: Remembered) -> None:
         super().__init__(asked, rows, side, final)
-        self.likely, self.draws = asked, asked.draws(rows)
+        self.sampling, self.draws = asked.sampling, asked.sampling.draws(rows)
 
     def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
         """Return the predicate of `search`."""
         block = self.block(index, places, others)
         reached = ~beyond_reach(block, self.judges.coarse(block))
-        points = self.likely.few if quick else self.likely.points
+        points = self.sampling.few if quick else self.sampling.points
         self.simulated += len(block) + len(points) * int(reached.sum())
         sizes = {name: block.columns[name].to_numpy()[reached] for name in (*SIDES, DEPTH)}
-        rows, often = index[reached], np.empty(int(reached.sum()), dtype=bool)
-        for start, stop in ranges(len(often), AT_ONCE // len(points)):
-            own = np.repeat(np.arange(start, stop), len(points))
-            z = np.tile(points, (stop - start, 1))
-            passes = self.draws.passes(rows[own], z, **{name: values[own] for name, values in sizes.items()})
-            often[start:stop] = passes.reshape(-1, len(points)).mean(axis=1) >= self.likely.probability
+        often = self.sampling.often(self.draws, index[reached], sizes, points)
         codes = np.full(len(index), BEYOND, dtype=np.int8)
         codes[reached] = np.where(often, HOLDS, FAILS)
         return codes

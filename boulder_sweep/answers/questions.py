@@ -9,15 +9,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_coarse
-from boulder_sweep.answers.search import BEYOND, BLOCKED, CELLS, FAILS, FAR, HOLDS, NEVER, NOT_MONOTONE, Search, search
+from boulder_sweep.answers.search import (
+    BEYOND,
+    BLOCKED,
+    CELLS,
+    FAILS,
+    FAR,
+    HOLDS,
+    NEVER,
+    NOT_MONOTONE,
+    Search,
+    search,
+    searched_again,
+)
 from boulder_sweep.answers.trials import (
     Judges,
     Open,
     Remembered,
     Rows,
     beyond_reach,
+    block_at,
     ranges,
-    taken,
     too_low,
     uncertain_rows,
 )
@@ -30,7 +42,7 @@ FAST_OVERTURN_S = 0.3
 one of its neighbours reaches the limit after 0.5 s or later (see tests/answers/test_scan.py)."""
 
 if TYPE_CHECKING:
-    from boulder_sweep.answers.chance import Chance
+    from boulder_sweep.answers.chance import Sampled
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
     from boulder_sweep.settings import Sweep
@@ -70,14 +82,14 @@ class Answers(Brackets):
         All passing intervals, for rows that are not monotone.
     simulated : int
         Designs simulated on the way.
-    chances : Chance or None
+    chances : Sampled or None
         Probabilities of passing at the answers, if one was asked for.
     """
 
     judged: Judged
     stretches: list[str | None]
     simulated: int
-    chances: Chance | None = None
+    chances: Sampled | None = None
 
 
 class Question:
@@ -132,10 +144,8 @@ class Question:
         wrong = trial.contradicted(found)
         block, judged = trial.judged(every, found.shown)
         if len(wrong):
-            ends = first[wrong], last[wrong]
-            part = search(lambda index, places: trial.final(wrong[index], places), *ends, self.cells)
-            found = replaced(found, wrong, part)
-            judged = with_rows(judged, wrong, trial.judged(wrong, part.shown)[1])
+            found = searched_again(trial.final, found, wrong, first, last, self.cells)
+            judged = with_rows(judged, wrong, trial.judged(wrong, found.shown[wrong])[1])
             block = trial.block(every, found.shown)
         return Answers(
             replace(block, labels=self.open.labels(start, stop)),
@@ -168,7 +178,7 @@ class Question:
         none = np.flatnonzero(~found.has_holds)
         if len(none):
             end = range_of(self.sweep, self.key, rows, self.between)[0 if self.key.most else 1]
-            last = taken(rows, none, **{self.key.name: end[none]})
+            last = block_at(rows, none, **{self.key.name: end[none]})
             kind[none] = np.where(too_low(last, self.sweep.criterion.min_overlap_m), BLOCKED, NEVER)
         return kind
 
@@ -198,7 +208,7 @@ class Trial:
 
     def block(self, index: np.ndarray, places: np.ndarray) -> DesignBlock:
         """Return the designs with these values."""
-        return taken(self.rows, index, **{self.key.name: self.key.values(places)})
+        return block_at(self.rows, index, **{self.key.name: self.key.values(places)})
 
     def contradicted(self, found: Search) -> np.ndarray:
         """Return the rows of a quick search that the accuracy of the sweep does not confirm, shape (m,)."""
@@ -211,7 +221,7 @@ class Trial:
         # Rows that are not monotone have several brackets, all of which must be certified.
         return np.flatnonzero(wrong | (found.kind == NOT_MONOTONE))
 
-    def chances(self, places: np.ndarray) -> Chance | None:
+    def chances(self, places: np.ndarray) -> Sampled | None:
         """Return the probabilities of passing at some values, one for each row; None if none is asked for."""
         return None
 
@@ -223,18 +233,6 @@ class Trial:
         codes = np.where(self.judges.holds(judged), HOLDS, FAILS)
         codes[judged["time_to_limit_s"] < FAST_OVERTURN_S] = FAR
         return np.where(beyond_reach(block, judged), BEYOND, codes)
-
-
-def replaced(found: Search, rows: np.ndarray, part: Search) -> Search:
-    """Return a search with some of its rows replaced by those of another."""
-    arrays = {}
-    for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
-        arrays[name] = getattr(found, name).copy()
-        arrays[name][rows] = getattr(part, name)
-    again = set(rows.tolist())
-    changes = {row: edges for row, edges in found.changes.items() if row not in again}
-    changes |= {int(rows[row]): edges for row, edges in part.changes.items()}
-    return Search(**arrays, changes=changes)
 
 
 def _stretches(key: Key, changes: list[tuple[int, int, bool]] | None, first: int, last: int) -> str | None:

@@ -5,22 +5,29 @@ An input is made worse until the design fails or, if the design fails as it is, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.draws import threads
 from boulder_sweep.answers.keys import Key, key_of
-from boulder_sweep.answers.questions import Trial, replaced
-from boulder_sweep.answers.result import Result
-from boulder_sweep.answers.search import FAILS, HOLDS, Search, search
+from boulder_sweep.answers.questions import Trial
+from boulder_sweep.answers.result import (
+    Result,
+    TableColumn,
+    collected,
+    joined_tables,
+    rows_table,
+    to_build,
+    write_parquet,
+)
+from boulder_sweep.answers.search import FAILS, HOLDS, Predicate, contradicted, search, searched_again
 from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location
-from boulder_sweep.runner.pool import call
+from boulder_sweep.runner.pool import Pool, call
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
@@ -78,8 +85,6 @@ class Reserves(Result):
         QuestionError
             It cannot be written.
         """
-        from boulder_sweep.answers.tables import write_parquet
-
         return write_parquet(self.arrow, path)
 
 
@@ -108,24 +113,12 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
     """
-    from boulder_sweep.answers.tables import joined_tables
-    from boulder_sweep.store.provenance import file_metadata, identity
-
     sweep = at_values(sweep)
     judges = judges_of(sweep)
     judges.final.warm_up()
-    if progress is not None:
-        progress(0, sweep.n_designs)
-    tables, done = [], 0
-    pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
-    for table in threads(jobs)(call(_table, sweep, judges, start, stop) for start, stop in pieces):
-        tables.append(table)
-        done += len(table)
-        if progress is not None:
-            progress(done, sweep.n_designs)
-    own = judges.final
-    found = identity(sweep.resolved(), own.readings._asdict(), own.control._asdict(), judges.accuracy.to_dict())
-    return Reserves(sweep, joined_tables(tables, file_metadata(found, "boulder_sweep.answers.reserves")))
+    calls = (call(_table, sweep, judges, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))
+    tables = collected(Pool(jobs)(calls), sweep.n_designs, progress)
+    return Reserves(sweep, joined_tables(tables, sweep, judges, "boulder_sweep.answers.reserves"))
 
 
 def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: float, worst: float) -> np.ndarray:
@@ -156,36 +149,22 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
     backwards = np.where(upwards, last < first, last > first)
     last = np.where(backwards, first, last)
 
-    def predicate(codes: Callable[[np.ndarray, np.ndarray], np.ndarray], index: np.ndarray) -> Any:
+    def change(codes: Predicate) -> Predicate:
         """Search for the change of verdict; for a design that passes, for the first value at which it does not."""
 
-        def changed(inner: np.ndarray, places: np.ndarray) -> np.ndarray:
-            holds = codes(index[inner], places) == HOLDS
-            return np.where(holds != passes[index[inner]], HOLDS, FAILS)
+        def changed(index: np.ndarray, places: np.ndarray) -> np.ndarray:
+            return np.where((codes(index, places) == HOLDS) != passes[index], HOLDS, FAILS)
 
         return changed
 
-    every = np.arange(len(first))
-    found = search(predicate(trial.coarse, every), first, last)
-    wrong = np.flatnonzero(~_certified(trial, found, passes))
-    if len(wrong):
-        part = search(predicate(trial.final, wrong), first[wrong], last[wrong])
-        found = replaced(found, wrong, part)
+    found = search(change(trial.coarse), first, last)
+    wrong = contradicted(change(trial.final), found)
+    found = searched_again(change(trial.final), found, wrong, first, last)
     # `fails` is the last place before the change; for a design that passes, that is the withstood value.
     at = np.where(passes, np.where(found.has_holds, found.fails, last), found.holds)
     at = np.where(passes & found.has_holds & ~found.has_fails, first, at)
     values = np.where(passes | found.has_holds, key.values(at), np.nan)
     return np.where(backwards, np.where(passes, rows[key.name], np.nan), values)
-
-
-def _certified(trial: Trial, found: Search, passes: np.ndarray) -> np.ndarray:
-    """Return whether the accuracy of the sweep confirms both ends of the brackets."""
-    before, behind = np.flatnonzero(found.has_fails), np.flatnonzero(found.has_holds)
-    ends = np.concatenate([before, behind])
-    holds = trial.final(ends, np.concatenate([found.fails[before], found.holds[behind]])) == HOLDS
-    agrees = np.ones(len(passes), dtype=bool)
-    agrees[ends[holds == (passes[ends] == (np.arange(len(ends)) >= len(before)))]] = False
-    return agrees
 
 
 def classes(
@@ -210,14 +189,11 @@ def classes(
 
 def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     """Return the table of the designs ``[start, stop)``."""
-    from boulder_sweep.answers.tables import to_build, with_columns
-    from boulder_sweep.store.schema import part_table
-
     rows = sweep.plan.given_rows(start, stop)
     block = block_of(rows)
     judged = judges.final(block)
     judged, passes = judges.final.graded(judged, block), judges.holds(judged)
-    columns: list[tuple[str, str, str, Any]] = []
+    columns: list[TableColumn] = []
     values = {}
     for own in RESERVES:
         key = key_of(own.input, most=own.worst > own.best)
@@ -230,6 +206,4 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     meaning = "speed of tests to ISO 22343-1 (IWA 14-1) of 7200 kg that is withstood; simulated, which rates no barrier"
     columns.append(("simulated_iso_speed", "", meaning, classes(speed, mass, ISO_SPEEDS, ISO_MASS_KG)))
     columns += to_build(block, sweep)
-    return with_columns(
-        part_table(replace(block, start=start, stop=stop, labels=sweep.block(start, stop).labels), judged, {}), columns
-    )
+    return rows_table(start, replace(block, labels=sweep.block(start, stop).labels), judged, columns)

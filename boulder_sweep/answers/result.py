@@ -1,15 +1,39 @@
-"""What the answers to all questions have in common: a sweep, and a table with a row for each of its designs."""
+"""What the answers to all questions have in common: a sweep, a table with a row for each of its designs, and its file.
+
+Every column of a table has a unit and a meaning.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import io
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boulder_sweep.columns import DESIGN_ID
+from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.quantities import QUANTITIES, quantities
+from boulder_sweep.locations import Location, RemotePath, location_of
+from boulder_sweep.store.files import check_target, replacing
+from boulder_sweep.store.provenance import file_metadata, identity
+from boulder_sweep.text import ProgressCallback, why
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
+    from boulder_sweep.answers.trials import Judges
+    from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.judge.judged import Judged
     from boulder_sweep.settings import Sweep
+
+TableColumn = tuple[str, str, str, Any]
+"""Name, unit, meaning, and n values: numbers, NaN for none; words, None for none; or an array of Arrow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +57,151 @@ class Result:
     @property
     def frame(self) -> pd.DataFrame:
         """The rows as a data frame; units and meanings in ``.attrs``."""
-        from boulder_sweep.answers.tables import frame_of
+        frame = self.arrow.to_pandas()
+        frame.attrs = _attributes(self.arrow)
+        return frame
 
-        return frame_of(self.arrow)
+
+def rows_table(
+    start: int, block: DesignBlock, judged: Judged, columns: Sequence[TableColumn], at: int | None = None
+) -> pa.Table:
+    """Return designs and their outcomes as a table with columns of an answer.
+
+    Parameters
+    ----------
+    start
+        Number of the first row.
+    block, judged
+        n designs and their outcomes.
+    columns
+        The further columns.
+    at
+        Place of the first of them; behind all others by default.
+    """
+    import pyarrow as pa
+
+    from boulder_sweep.store.schema import number_array, part_table, word_array
+
+    def array_of(values: np.ndarray | pa.Array | Sequence[str | None]) -> pa.Array:
+        if isinstance(values, pa.Array):
+            return values
+        if isinstance(values, np.ndarray):
+            return number_array(values, np.isnan(values))
+        known = tuple(dict.fromkeys(text for text in values if text is not None))
+        codes = {None: -1} | {text: code for code, text in enumerate(known)}
+        return word_array(np.array([codes[text] for text in values], dtype=np.int32), known)
+
+    table = part_table(replace(block, start=start, stop=start + len(block)), judged, {})
+    first = table.num_columns if at is None else at
+    for place, (name, unit, meaning, values) in enumerate(columns, first):
+        array = array_of(values)
+        field = pa.field(name, array.type, metadata={"unit": unit, "meaning": meaning})
+        table = table.add_column(place, field, array)
+    return table
+
+
+def to_build(block: DesignBlock, sweep: Sweep) -> list[TableColumn]:
+    """Return what the designs of a block take to build as columns."""
+    rows = {name: column.to_numpy() for name, column in block.columns.items()}
+    found = quantities(rows, sweep.model.shape, sweep.model.ground)
+    return [(own.name, own.unit, own.meaning, found[own.name]) for own in QUANTITIES if own.name not in block.columns]
+
+
+def collected(tables: Iterable[pa.Table], count: int, progress: ProgressCallback | None) -> list[pa.Table]:
+    """Collect tables of `count` rows in all, and report how many are there, first none."""
+    found, done = [], 0
+    if progress is not None:
+        progress(0, count)
+    for table in tables:
+        found.append(table)
+        done += len(table)
+        if progress is not None:
+            progress(done, count)
+    return found
+
+
+def joined_tables(
+    tables: Sequence[pa.Table],
+    sweep: Sweep,
+    judges: Judges,
+    repeat: str,
+    question: Mapping[str, Any] | None = None,
+) -> pa.Table:
+    """Concatenate tables of consecutive rows, and add the metadata of a file, also for pandas.
+
+    Parameters
+    ----------
+    tables
+        The tables.
+    sweep, judges
+        The sweep, and how its designs were judged.
+    repeat
+        Function that answers the same again.
+    question
+        What was asked beside the sweep.
+    """
+    import pyarrow as pa
+
+    from boulder_sweep.store.schema import PANDAS_ATTRIBUTES
+
+    found = identity(sweep.resolved(), *judges.final.settings(), judges.accuracy.to_dict())
+    metadata = file_metadata(found if question is None else found | {"question": question}, repeat)
+    table = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
+    attributes = json.dumps(_attributes(table)).encode()
+    return table.replace_schema_metadata({PANDAS_ATTRIBUTES: attributes, **metadata})
+
+
+def _attributes(table: pa.Table) -> dict[str, dict[str, str]]:
+    """Return units and meanings of the columns of a table."""
+    own = {field.name: field.metadata or {} for field in table.schema}
+    return {
+        f"{entry}s": {name: found.get(entry.encode(), b"").decode() for name, found in own.items()}
+        for entry in ("unit", "meaning")
+    }
+
+
+def write_parquet(table: pa.Table, path: str | Location) -> Location:
+    """Write a table to a Parquet file, by path or URL.
+
+    Raises
+    ------
+    QuestionError
+        The name has another ending, its folder does not exist or holds the result of a run, or it cannot be written.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    target = checked_parquet(path)
+    split = [field.name for field in table.schema if field.name != DESIGN_ID.name and pa.types.is_floating(field.type)]
+    words = [field.name for field in table.schema if pa.types.is_dictionary(field.type)]
+    content = io.BytesIO()
+    try:
+        with replacing(target) if isinstance(target, Path) else nullcontext(content) as file:
+            pq.write_table(
+                table,
+                file,
+                compression="zstd",
+                use_dictionary=words,
+                use_byte_stream_split=split,
+                write_page_checksum=True,
+            )
+        if isinstance(target, RemotePath):
+            target.put(content.getbuffer())
+    except OSError as problem:
+        raise QuestionError(f"{path} cannot be written: {why(problem)}") from problem
+    return target
+
+
+def checked_parquet(path: str | Location) -> Location:
+    """Check and return the path or URL of a Parquet file to be written.
+
+    Raises
+    ------
+    QuestionError
+        The name has another ending, or its folder does not exist or holds the result of a run.
+    """
+    target = location_of(path)
+    if target.suffix.lower() != ".parquet":
+        raise QuestionError(f"{path}: answers are a Parquet file; its name must end in .parquet")
+    check_target(target, QuestionError)
+    return target

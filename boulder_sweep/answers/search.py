@@ -112,6 +112,36 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     return Search(kind, fails, held, has_fails, ~none, shown, changes)
 
 
+def contradicted(predicate: Predicate, found: Search) -> np.ndarray:
+    """Return the rows of a search of which another predicate does not confirm both ends of the bracket, shape (m,)."""
+    failing, holding = np.flatnonzero(found.has_fails), np.flatnonzero(found.has_holds)
+    ends = np.concatenate([failing, holding])
+    holds = predicate(ends, np.concatenate([found.fails[failing], found.holds[holding]])) == HOLDS
+    return np.unique(ends[holds != (np.arange(len(ends)) >= len(failing))])
+
+
+def searched_again(
+    predicate: Predicate, found: Search, rows: np.ndarray, first: np.ndarray, last: np.ndarray, cells: int = CELLS
+) -> Search:
+    """Return a search in which some of the rows are searched again, by another predicate; arguments: see `search`."""
+    if not len(rows):
+        return found
+    part = search(lambda index, places: predicate(rows[index], places), first[rows], last[rows], cells)
+    return _replaced(found, rows, part)
+
+
+def _replaced(found: Search, rows: np.ndarray, part: Search) -> Search:
+    """Return a search with some of its rows replaced by those of another."""
+    arrays = {}
+    for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
+        arrays[name] = getattr(found, name).copy()
+        arrays[name][rows] = getattr(part, name)
+    again = set(rows.tolist())
+    changes = {row: edges for row, edges in found.changes.items() if row not in again}
+    changes |= {int(rows[row]): edges for row, edges in part.changes.items()}
+    return Search(**arrays, changes=changes)
+
+
 def last_before(
     predicate: Predicate, holds: np.ndarray, first: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

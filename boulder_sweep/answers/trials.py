@@ -80,9 +80,14 @@ class Open:
         return {name: values for name, values in given.items() if name not in self._left_out}
 
 
-def taken(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> DesignBlock:
+def rows_at(rows: Rows, index: np.ndarray | slice) -> Rows:
+    """Return some of the rows, by their places, a mask or a slice."""
+    return {name: values[index] for name, values in rows.items()}
+
+
+def block_at(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> DesignBlock:
     """Return some of the designs as a block, with the open inputs filled in."""
-    return block_of({name: values[index] for name, values in rows.items()} | inputs)
+    return block_of(rows_at(rows, index) | inputs)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,10 +181,7 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
             dataclasses.replace(each, control=each.control._replace(longest_horizon=0.0)) for each in (final, coarse)
         )
     if robust:
-        final, coarse = (
-            final.asked(),
-            dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED)),
-        )
+        final, coarse = final.asked(), dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED))
     else:  # asked of the answers alone
         final, coarse = (dataclasses.replace(each, second_opinion=()) for each in (final, coarse))
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:

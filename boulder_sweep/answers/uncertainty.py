@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.answers.chance import FEWEST, FIRST, SCRAMBLINGS, Chance, Points, chance
+from boulder_sweep.answers.chance import (
+    FEWEST,
+    FIRST,
+    SCRAMBLINGS,
+    Chance,
+    Points,
+    Sampled,
+    chance,
+    subset_simulation,
+)
+from boulder_sweep.answers.doubts import Indices, drivers, indices
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
-from boulder_sweep.answers.result import Result
-from boulder_sweep.answers.sensitivity import drivers, indices
+from boulder_sweep.answers.result import (
+    Result,
+    TableColumn,
+    checked_parquet,
+    collected,
+    joined_tables,
+    rows_table,
+    write_parquet,
+)
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.subset import FAILING, Failing, subset_simulation
 from boulder_sweep.answers.trials import Judges, judges_of, ranges, uncertain_rows
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
@@ -35,6 +52,11 @@ SAMPLES = 4096
 """Samples kept of each row for plots and inspection."""
 OUTPUTS = ("passes", "margin")
 """Outputs of the indices: whether a design passes, and its distance from failing."""
+FAILING = ("drawn", "subset", "no_progress", "contradicts")
+"""How a probability of failing was found, or, the last two, why there is none."""
+
+Samples = tuple[Mapping[str, np.ndarray], np.ndarray]
+"""Uncertain inputs of sampled designs, and their distances from failing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +97,6 @@ class Uncertainty(Result):
         QuestionError
             A file cannot be written.
         """
-        from boulder_sweep.answers.tables import checked_parquet, write_parquet
-
         target = checked_parquet(path)
         files = [write_parquet(self.arrow, target)]
         for name, table in (("indices", self.indices), ("samples", self.samples)):
@@ -154,27 +174,43 @@ def uncertainty(
         raise QuestionError(f"--rare takes up to {MOST_INDEXED} designs; this file has {sweep.n_designs:,}")
     asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most, rare)
     asked.judges.final.warm_up()
-    if progress is not None:
-        progress(0, sweep.n_designs)
-    points = Points(len(asked.spread.names), seed)
-    tables, done = [], 0
-    few = sweep.n_designs <= MOST_INDEXED
+    names, points = asked.spread.names, Points(len(asked.spread.names), seed)
     with pool(jobs, backend, scheduler) as workers:
-        for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE):
-            tables.append(_rows(asked, points, workers, start, stop))
-            done += stop - start
-            if progress is not None:
-                progress(done, sweep.n_designs)
-        drawn = [_sensitivity(asked, points, workers, row) for row in range(sweep.n_designs if few else 0)]
-    from boulder_sweep.answers.tables import index_table, joined_tables, sample_table
-
+        pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
+        tables = (_rows(asked, points, workers, start, stop) for start, stop in pieces)
+        found = collected(tables, sweep.n_designs, progress)
+        few = sweep.n_designs if sweep.n_designs <= MOST_INDEXED else 0
+        each = [_sensitivity(asked, points, workers, row) for row in range(few)]
+    question = {
+        "asked": "p_pass",
+        "half_width": width,
+        "confidence": sure,
+        "margin": least_margin,
+        "seed": seed,
+        "most": most,
+    }
     return Uncertainty(
         sweep,
-        joined_tables(tables, asked.metadata()),
-        index_table(asked.spread.names, [own for own, _ in drawn], OUTPUTS),
-        sample_table(asked.spread.names, [own for _, own in drawn]),
+        joined_tables(found, sweep, asked.judges, "boulder_sweep.uncertainty", question),
+        _index_table(names, [own for own, _ in each]),
+        _sample_table(names, [drawn for _, drawn in each]),
         seed,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Failing(Chance):
+    """Probabilities of failing of n rows.
+
+    Attributes
+    ----------
+    estimate, low, high
+        As of `Chance`.
+    by : ndarray of int32, shape (n,)
+        Index in `FAILING`.
+    """
+
+    by: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,31 +227,14 @@ class _Asked:
     rare: bool
 
     def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
+        """Return what samples the designs of the rows ``[start, stop)``."""
         rows = uncertain_rows(self.sweep, self.sweep.plan.given_rows(start, stop), start, stop)
         return Draws(rows, self.spread, self.judges, parallel)
 
-    def metadata(self) -> dict[bytes, bytes]:
-        """Return the metadata of a file."""
-        from boulder_sweep.store.provenance import file_metadata, identity
-
-        own = self.judges.final
-        found = identity(
-            self.sweep.resolved(), own.readings._asdict(), own.control._asdict(), self.judges.accuracy.to_dict()
-        )
-        question = {
-            "asked": "p_pass",
-            "half_width": self.half_width,
-            "confidence": self.confidence,
-            "margin": self.judges.least_margin,
-            "seed": self.seed,
-            "most": self.most,
-        }
-        return file_metadata(found | {"question": question}, "boulder_sweep.uncertainty")
-
 
 def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) -> pa.Table:
-    """Return the table of the rows ``[start, stop)``."""
-    from boulder_sweep.answers.tables import chance_table
+    """Return the table of the rows ``[start, stop)``: inputs, outcome at the means, probability, main input."""
+    from boulder_sweep.store.schema import word_array
 
     draws = asked.draws(start, stop, parallel)
     n = stop - start
@@ -235,10 +254,31 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     judged = asked.judges.final(block)
     if asked.sweep.model.second_opinion:
         judged = asked.judges.final.graded(judged, block)
-    return chance_table(start, block, judged, found, driver, asked.spread.words, failing)
+    driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
+    columns: list[TableColumn] = [
+        ("p_pass", "1", "chance that the design passes", found.estimate),
+        ("p_pass_low", "1", "lower end of the interval of p_pass", found.low),
+        ("p_pass_high", "1", "upper end of the interval of p_pass", found.high),
+        ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
+        ("p_pass_designs", "1", "designs drawn for p_pass", found.points),
+    ]
+    if failing is not None:
+        meaning = "chance that the design does not pass; null where p_fail_by says why"
+        by_meaning = (
+            "subset: by subset simulation; drawn: by the designs drawn for p_pass; no_progress: no step of the "
+            "simulation came nearer to the rare designs; contradicts: its interval and that of p_pass "
+            "exclude each other"
+        )
+        columns += [
+            ("p_fail", "1", meaning, failing.estimate),
+            ("p_fail_low", "1", "lower end of the interval of p_fail", failing.low),
+            ("p_fail_high", "1", "upper end of the interval of p_fail", failing.high),
+            ("p_fail_by", "", by_meaning, word_array(failing.by, FAILING)),
+        ]
+    return rows_table(start, block, judged, columns)
 
 
-def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Failing:
+def rare_failing(asked: _Asked, draws: Draws, found: Sampled) -> Failing:
     """Return the probabilities of failing: `found` if enough designs fall on each side, else from subset simulation."""
     passing = found.estimate * found.points
     few = np.flatnonzero(np.minimum(passing, found.points - passing) < FEWEST)
@@ -263,7 +303,7 @@ def rare_failing(asked: _Asked, draws: Draws, found: Chance) -> Failing:
     return Failing(estimate, low, high, by)
 
 
-def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tuple[Any, Any]:
+def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tuple[Indices, Samples]:
     """Return the indices of one design, and samples of it."""
     draws = asked.draws(row, row + 1, parallel)
 
@@ -276,3 +316,34 @@ def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tup
     index = np.zeros(SAMPLES, dtype=np.int64)
     given = draws.given(index, z, {})
     return decided, ({name: given[name] for name in asked.spread.names}, draws.distance(index, z))
+
+
+def _index_table(names: Sequence[str], found: Sequence[Indices]) -> pa.Table:
+    """Return Sobol indices as a table, one row for each design, output and input."""
+    import pyarrow as pa
+
+    from boulder_sweep.store.schema import number_array
+
+    rows = [(design, output, name) for design in range(len(found)) for output in OUTPUTS for name in names]
+    designs, outputs, inputs = (list(column) for column in zip(*rows, strict=True)) if rows else ([], [], [])
+    columns = {
+        "design_id": pa.array(designs, pa.int64()),
+        "output": pa.array(outputs, pa.string()).dictionary_encode(),
+        "input": pa.array(inputs, pa.string()).dictionary_encode(),
+    }
+    for field in fields(Indices):
+        values = np.concatenate([*(getattr(own, field.name).ravel() for own in found), np.empty(0)])
+        columns[field.name] = number_array(values, np.isnan(values))
+    return pa.table(columns)
+
+
+def _sample_table(names: Sequence[str], drawn: Sequence[Samples]) -> pa.Table:
+    """Return sampled designs as a table: number of the design, uncertain inputs, distance from failing."""
+    import pyarrow as pa
+
+    counts = [len(distance) for _, distance in drawn]
+    columns = {"design_id": pa.array(np.repeat(np.arange(len(drawn)), counts))}
+    for name in names:
+        columns[name] = pa.array(np.concatenate([*(inputs[name] for inputs, _ in drawn), np.empty(0)]))
+    columns["distance"] = pa.array(np.concatenate([*(distance for _, distance in drawn), np.empty(0)]))
+    return pa.table(columns)

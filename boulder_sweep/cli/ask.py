@@ -216,7 +216,7 @@ def _show_published(grid: str | None, units: str, as_json: bool) -> int:
     if grid is not None or units != "si":
         other = "GRID" if grid is not None else f"--units {units}"
         raise click.UsageError(f"--published lists spreads as their sources state them; leave out {other}")
-    from boulder_sweep.answers.published import PUBLISHED
+    from boulder_sweep.answers.spread import PUBLISHED
 
     if as_json:
         show(json.dumps({"published": [spread._asdict() for spread in PUBLISHED]}))

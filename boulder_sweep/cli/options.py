@@ -137,7 +137,7 @@ def refuse_units_of_json(units: str, as_json: bool) -> None:
 def refuse_unwritable(table: str | None, picture: str | None = None) -> None:
     """Refuse a table or a picture that cannot be written, before anything is computed; None where none is wanted."""
     if table is not None:
-        from boulder_sweep.answers.tables import checked_parquet
+        from boulder_sweep.answers.result import checked_parquet
 
         checked_parquet(table)
     if picture is not None:

@@ -185,7 +185,7 @@ def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]
     words = "" if unit == "m" else f", unit: {unit}"
     return [
         f"at {site}, least depth{cases}:",
-        *table_lines(columns, rows, 80),
+        *table_lines(columns, rows),
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
         "above: height over the ground; mass: of what is left after the cut",
         *rest,
@@ -251,7 +251,7 @@ def standing_lines(found: ScannedStone) -> list[str]:
         column(("rests", "uncut"), lambda own: f"{own.rests:.0%}"),
         column(("fit", "m"), lambda own: f"{own.profile.error:.3f}"),
     ]
-    return [*table_lines(columns, rows, 80), *_legend(found.standings)]
+    return [*table_lines(columns, rows), *_legend(found.standings)]
 
 
 def settings_lines(found: ScannedStone, own: Standing) -> list[str]:

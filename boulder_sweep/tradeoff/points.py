@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from boulder_kernels import OutcomeTable, Status
+from boulder_kernels import Control, OutcomeTable, Readings, Status
 from boulder_kernels.control import STEP_RATIO
-from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
+from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED, Judged
+from boulder_sweep.judge.pilot import simulated
+from boulder_sweep.judge.verdict import Limits, judge
 
-if TYPE_CHECKING:
-    from boulder_sweep.judge.judged import Judged
-
-
+FEWEST_DESIGNS = 64
+"""Smallest number of designs for sums over elements, which cost up to a thousand times as much."""
+_SHORTEST_TIMING_S = 0.05
 ROUNDING_DEG = 1e-9
 """Errors below it are rounding, of the finer solution as well [deg]."""
 
@@ -123,21 +127,50 @@ class Point:
         return {**self.method._asdict(), **own}
 
 
-class Spread(NamedTuple):
-    """How large the errors of many designs are."""
+@dataclass(frozen=True)
+class Sample:
+    """The designs that all methods simulate, and how their outcomes are judged."""
 
-    rms: float
-    p99: float
-    largest: float
+    designs: Designs
+    readings: Readings
+    limits: Limits
+    control: Control
+
+    def solve(self, method: Method) -> OutcomeTable:
+        """Simulate the designs by one method, whatever readings it names."""
+        control = self.control._replace(
+            h=1e-3 * method.step_ms,
+            elements=method.soil_elements,
+            error_estimate=method.error_estimate,
+            locate_yield=method.locate_yield,
+            paired=not method.checked,
+        )
+        return simulated(self.designs, self.readings, control)
+
+    def measured(self, method: Method, known: OutcomeTable, accuracy: str) -> Point:
+        """Simulate the designs by one method, long enough to time it, and compare."""
+        rows = _part(self.designs.size, method.soil_elements)
+        fewer = self.rows(rows)
+        spent, best = 0.0, math.inf
+        fewer.rows(np.arange(1)).solve(method)  # compiles, and fills the caches
+        while spent < _SHORTEST_TIMING_S:
+            begun = time.thread_time()
+            out = fewer.solve(method)
+            took = time.thread_time() - begun
+            spent, best = spent + took, min(best, took)
+        ref = type(known)(*(column[rows] for column in known))
+        both = ((own, judge(own, fewer.designs, self.limits)) for own in (out, ref))
+        return compared(method, accuracy, 1e6 * best / len(rows), *both)
+
+    def rows(self, chosen: np.ndarray) -> Sample:
+        """Return a sample of some of the designs, by their places."""
+        return replace(self, designs=self.designs.rows(chosen))
 
 
-def spread(errors: np.ndarray) -> Spread:
-    """Return root mean square, 99 % quantile and largest of some errors; zeros where there are none."""
-    if not errors.size:
-        return Spread(0.0, 0.0, 0.0)
-    return Spread(
-        float(np.sqrt(np.mean(errors**2))), float(np.quantile(errors, 0.99, method="higher")), float(errors.max())
-    )
+def _part(count: int, elements: int) -> np.ndarray:
+    """Rows of the sample that are simulated with so many elements, spread evenly."""
+    wanted = count if not elements else max(FEWEST_DESIGNS, count * ELEMENTS_AS_FAST // elements)
+    return np.unique(np.linspace(0, count - 1, min(wanted, count)).astype(np.int64))
 
 
 def compared(
@@ -162,9 +195,7 @@ def compared(
     standing = both & (out.status != limit) & (ref.status != limit)
     alike = both & ((out.status == limit) == (ref.status == limit))
     errors = np.degrees(np.abs(out.theta_max - ref.theta_max))[standing]
-    rotation = spread(errors)
     boulder, truck = np.abs(out.x_b_max - ref.x_b_max), np.abs(out.x_v_max - ref.x_v_max)
-    displacement = spread(np.maximum(boulder, truck)[alike])
     verdicts = judged.verdict, truth.verdict
     estimated_p99_9_deg, covered = _estimates(method, out, errors, standing)
     decided = np.isin(verdicts[0], (PASS, FAIL)) & np.isin(verdicts[1], (PASS, FAIL))
@@ -173,13 +204,24 @@ def compared(
         accuracy,
         len(out.status),
         cpu_us,
-        *rotation,
-        *displacement,
+        *_sizes(errors),
+        *_sizes(np.maximum(boulder, truck)[alike]),
         flips=int((decided & (verdicts[0] != verdicts[1])).sum()),
         undecided=int((verdicts[0] == UNDECIDED).sum()),
         not_computed=int((np.isfinite(ref.theta_max) & ~np.isfinite(out.theta_max)).sum()),
         estimated_p99_9_deg=estimated_p99_9_deg,
         covered=covered,
+    )
+
+
+def _sizes(errors: np.ndarray) -> tuple[float, float, float]:
+    """Return root mean square, 99 % quantile and largest of some errors; zeros where there are none."""
+    if not errors.size:
+        return 0.0, 0.0, 0.0
+    return (
+        float(np.sqrt(np.mean(errors**2))),
+        float(np.quantile(errors, 0.99, method="higher")),
+        float(errors.max()),
     )
 
 

@@ -11,8 +11,8 @@ from boulder_sweep import load, need, uncertainty
 from boulder_sweep.answers.doubts import doubts
 from boulder_sweep.answers.need_printing import need_lines
 from boulder_sweep.answers.printing import doubt_lines, reserve_lines, uncertainty_lines
-from boulder_sweep.answers.published import PUBLISHED
 from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.spread import PUBLISHED
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.distributions import Distribution, SetDistributions

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from boulder_sweep.answers.draws import WORST, Draws, _distance_of, threads
+from boulder_sweep.answers.draws import WORST, Draws, _distance_of
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.judge.judged import ERROR, FAIL, PASS, UNDECIDED, not_computed
+from boulder_sweep.runner.pool import Pool
 from tests.answers.designs import site
 from tests.runner.grids import grid
 
@@ -24,7 +25,7 @@ def test_an_undecided_design_without_a_margin_is_as_good_as_at_its_limit():
 def test_the_reserve_shrinks_towards_the_bumper_and_goes_on_shrinking_beyond():
     uncertain = {"site": "embedment_depth: {mean: 2.5 m, sd: 0.5 m}", "height": "3.2 m", "friction": "44 deg"}
     sweep = site(**uncertain)
-    draws = Draws(sweep.plan.given_rows(0, 1), Spread(sweep), judges_of(sweep), threads(1))
+    draws = Draws(sweep.plan.given_rows(0, 1), Spread(sweep), judges_of(sweep), Pool(1))
     depths = np.linspace(2.25, 3.6, 271)  # held at first, then little overlap, no contact, buried
     index, z = np.zeros(len(depths), dtype=int), ((depths - 2.5) / 0.5)[:, None]
     found = draws.reserve(index, z)

@@ -12,9 +12,9 @@ import pytest
 from scipy.special import ndtr, ndtri
 
 import boulder_sweep
+from boulder_sweep.answers.chance import Chance
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import uncertainty_lines
-from boulder_sweep.answers.subset import Rare
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.settings import load_text
@@ -104,7 +104,7 @@ def test_no_probability_of_failing_is_better_than_a_wrong_one() -> None:
 def test_a_probability_that_contradicts_what_was_drawn_is_not_given(
     estimate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rare = Rare(*(np.array([value]) for value in (estimate, estimate, estimate + 1e-12)))
+    rare = Chance(*(np.array([value]) for value in (estimate, estimate, estimate + 1e-12)))
     monkeypatch.setattr("boulder_sweep.answers.uncertainty.subset_simulation", lambda *_, **__: rare)
     few = site(**UNCERTAIN | {"friction": "{mean: 43.5 deg, sd: 2.5 deg}"})  # some of 512 designs fail
     found = uncertainty(few, rare=True).frame.iloc[0]

@@ -26,7 +26,7 @@ GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
 def timed_once() -> Iterator[None]:
     """Time every method by one simulation: no test depends on how long it takes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("boulder_sweep.tradeoff.study._SHORTEST_TIMING_S", 1e-9)
+        patch.setattr("boulder_sweep.tradeoff.points._SHORTEST_TIMING_S", 1e-9)
         yield
 
 
