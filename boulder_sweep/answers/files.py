@@ -16,7 +16,7 @@ from boulder_sweep.answers.trials import Open
 from boulder_sweep.columns import BOULDER_MASS, COLUMNS
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.impact.explanation import model_of
-from boulder_sweep.judge.evaluation import known_control
+from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME

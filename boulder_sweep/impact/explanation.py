@@ -15,7 +15,8 @@ import numpy as np
 from boulder_kernels import Control, Readings
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OutcomeColumn
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.judge.evaluation import Evaluation, known_control
+from boulder_sweep.judge.accuracy import known_control
+from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of

@@ -26,10 +26,10 @@ from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcom
 from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
 from boulder_sweep.columns import AT_REST, BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
 from boulder_sweep.impact.trajectory import Motion, Trajectory
-from boulder_sweep.judge.evaluation import evaluation_of, readings_of
+from boulder_sweep.judge.accuracy import accuracy_of, readings_of
+from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, OVERTURNS, Judged
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import judge

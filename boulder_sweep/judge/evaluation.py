@@ -7,7 +7,7 @@ that cannot be computed are not simulated; they come back with their reason.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,25 +18,19 @@ from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
+from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import RowStates, finer_controls
 from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
-from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS, Ground
+from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, Ground
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
-    from boulder_sweep.judge.accuracy import Accuracy
     from boulder_sweep.settings import Sweep
-
-OUTLINES_IN_LANES = 100_000
-"""Below so many designs boulders of several pieces are simulated one after another: lanes are twice as fast, but take a
-minute and a half longer to compile for eight pieces, and are mostly idle where few rows are late."""
-LONGEST_HORIZON = 10.0
-"""A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 
 Simulate = Callable[..., OutcomeTable]
 """Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
@@ -278,31 +272,4 @@ def evaluation_of(
         second_opinion=sweep.model.second_opinion if can_be_asked(sweep) else (),
         askable=can_be_asked(sweep),
         shape=sweep.model.shape,
-    )
-
-
-def readings_of(sweep: Sweep) -> Readings:
-    """Return the readings of a sweep's model as the kernels name them."""
-    return Readings(*sweep.model.readings.corrected)
-
-
-def known_control(recorded: Mapping[str, Any]) -> Control:
-    """Return the control that a table records, without entries of another version that this one does not know."""
-    return Control(**{name: value for name, value in recorded.items() if name in Control._fields})
-
-
-def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
-    """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate."""
-    shape = sweep.model.shape
-    return Control(
-        h=accuracy.steps.step_s,
-        horizon=float(sweep.solver.horizon_s),
-        theta_limit=math.radians(sweep.criterion.max_rotation_deg),
-        elements=int(sweep.model.elements),
-        error_estimate=accuracy.error_estimate,
-        locate_yield=accuracy.steps.locate_yield,
-        longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
-        unloading=UNLOADINGS.index(sweep.model.unloading),
-        paired=accuracy.paired,
-        side_by_side=shape.is_box or len(shape.points) == 2 or sweep.n_designs >= OUTLINES_IN_LANES,
     )

@@ -13,8 +13,7 @@ from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.impact.history import EnergyLedger, ledger_of
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.judge.accuracy import Steps
-from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.accuracy import Steps, accuracy_of
 from boulder_sweep.settings.model import ACCURACIES, Model, ReadingChoice, SolverSettings
 from docs.studies.random_designs import random_designs
 

@@ -13,9 +13,9 @@ from boulder_kernels.layered import LayeredTable
 from boulder_sweep.cli.simulate import why_lines
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.impact.history import soil_profile
+from boulder_sweep.judge.accuracy import accuracy_of, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import Designs
-from boulder_sweep.judge.pilot import accuracy_of, sampled_designs, simulated
+from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.settings.model import Ground, Layer
 from boulder_sweep.soils import LAWS, layers_of, slope_factor, with_soil
 from tests import oracle

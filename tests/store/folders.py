@@ -10,8 +10,8 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner.computing import verdict_counts
 from boulder_sweep.store.manifest import MANIFEST_NAME, Manifest
 from boulder_sweep.store.opening import open_output
