@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from boulder_sweep.crash_tests.cases import NAMES, crash_test
-from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.statements import (
+from boulder_sweep.crash_tests.cases import (
     CLOSE_UNTIL_S,
+    NAMES,
     Convergence,
     Statement,
     convergence,
+    crash_test,
     statement_table,
     statements,
 )
+from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.simulation import simulate

@@ -1,6 +1,4 @@
-"""From the requested accuracy to time steps, by name or by a pilot run on a sample of the designs, and to the control
-of the integrator.
-"""
+"""From the requested accuracy to the control of the integrator: time steps by name, or by a pilot run on a sample."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Designs as the judge takes them: in the units of the kernels, with what only the verdict asks for beside; and samples
-of the designs of a sweep.
+"""Designs as the judge takes them, whole blocks and samples of a sweep.
+
+They are in the units of the kernels, with what only the verdict asks for beside.
 """
 
 from __future__ import annotations
