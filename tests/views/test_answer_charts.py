@@ -1,4 +1,4 @@
-"""What charts of answers say: of the question, of which design a probability is, its numbers where it is small or none."""
+"""What charts of answers say: of the question, of which design a probability is, and numbers that are small or none."""
 
 from __future__ import annotations
 
