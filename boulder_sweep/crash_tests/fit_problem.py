@@ -24,12 +24,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from boulder_sweep.crash_tests.measured import Pulse
 from boulder_sweep.crash_tests.rigid_wall import RigidWall, StiffeningWall
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 RESPONSES: dict[str, Callable[[RigidWall, np.ndarray], np.ndarray]] = {
     "displacement": RigidWall.displacement,
@@ -133,6 +136,15 @@ class FitProblem:
         low = [math.log(0.01 / last), math.log(RATIO_BOUNDS[0]), 1e-9]
         high = [math.log(2000.0 / last), math.log(RATIO_BOUNDS[1]), 1e4]
         return np.array(low[: len(start)]), np.array(high[: len(start)])
+
+    def solved(
+        self, start: np.ndarray, scales: dict[str, float], bounds: tuple[np.ndarray, np.ndarray], tolerance: float
+    ) -> OptimizeResult:
+        """Solve from a start within bounds."""
+        from scipy.optimize import least_squares  # heavy, and only fits need it
+
+        tight = {"xtol": tolerance, "ftol": tolerance, "gtol": tolerance}
+        return least_squares(self.residuals, np.clip(start, *bounds), bounds=bounds, args=(scales,), **tight)
 
     def covariance(self, unknowns: np.ndarray, scales: dict[str, float]) -> np.ndarray:
         """Covariance of the unknowns, shape (p, p).

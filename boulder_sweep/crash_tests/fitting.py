@@ -194,21 +194,11 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
         if value is not None and not 0.0 < value < math.inf:
             raise FitError(f"the {name} of the vehicle must be positive, not {value:g}")
     problem = FitProblem(pulse, float(mass_kg), speed_m_s)
-    from scipy.optimize import least_squares  # heavy, and only this function needs it
-
     scales = {name: problem.range(name) for name in pulse.signals}
     unknowns = problem.start(scales)
     bounds = problem.bounds(unknowns)
     for _ in range(PASSES):
-        solved = least_squares(
-            problem.residuals,
-            np.clip(unknowns, *bounds),
-            bounds=bounds,
-            args=(scales,),
-            xtol=1e-14,
-            ftol=1e-14,
-            gtol=1e-14,
-        )
+        solved = problem.solved(unknowns, scales, bounds, 1e-14)
         unknowns = solved.x
         residuals = problem.by_signal(unknowns)
         scales = problem.scatter(residuals)
@@ -320,8 +310,6 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
 
 def _solve(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -> tuple[np.ndarray, dict[str, float]]:
     """Solve from several starts, and once more from the best with the weights of its own scatter."""
-    from scipy.optimize import least_squares  # heavy, and only this function needs it
-
     crush = one.wall.max_displacement_m
     rate = math.sqrt(one.wall.spring_N_m / one.wall.mass_kg)
     known = [math.log(rate), math.log(one.wall.damper_N_s_m / (rate * one.wall.mass_kg))]
@@ -329,15 +317,10 @@ def _solve(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) ->
     low, high = problem.bounds(np.array(known))
     low = np.append(low, [math.log(RATIOS[0]), SHARES[0] * crush])
     high = np.append(high, [math.log(RATIOS[1]), SHARES[1] * crush])
-
-    def solved(start: np.ndarray) -> Any:
-        tight = {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12}
-        return least_squares(problem.residuals, np.clip(start, low, high), bounds=(low, high), args=(scales,), **tight)
-
     starts = [np.array([*known, math.log(ratio), share * crush]) for ratio, share in STARTS]
-    best = min((solved(start) for start in starts), key=lambda fit: fit.cost)
+    best = min((problem.solved(start, scales, (low, high), 1e-12) for start in starts), key=lambda fit: fit.cost)
     scales = problem.scatter(problem.by_signal(best.x))
-    return solved(best.x).x, scales
+    return problem.solved(best.x, scales, (low, high), 1e-12).x, scales
 
 
 def _gain(one: VehicleFit, misfits: dict[str, SignalMisfit], residuals: dict[str, np.ndarray]) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -155,7 +155,8 @@ def _rows(file: Path) -> list[_Row]:
     check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
-            lines = list(islice(_filled_lines(stream), MOST_ROWS + 2))
+            filled = ((number, text) for number, text in enumerate(stream, 1) if _holds_something(text))
+            lines = list(islice(filled, MOST_ROWS + 2))
     except UnicodeDecodeError:
         raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
     except OSError as error:
@@ -170,11 +171,6 @@ def _rows(file: Path) -> list[_Row]:
         return [_Row(file, *line, delimiter, row) for line, row in zip(lines, cells, strict=True)]
     except (csv.Error, ValueError):
         raise refuse(label, "cannot be read as CSV: a cell runs over the end of its line") from None
-
-
-def _filled_lines(stream: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """Yield the lines that hold something, each with its number."""
-    return ((number, text) for number, text in enumerate(stream, 1) if _holds_something(text))
 
 
 def _holds_something(text: str) -> bool:

@@ -140,19 +140,8 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
 
 def deviation_table(by_preset: dict[str, list[Deviation]]) -> Table:
     """Return deviations by preset as a table."""
-    table = Table(
-        (
-            "signal",
-            "readings",
-            "up to [s]",
-            "values",
-            "RMS error",
-            "largest error",
-            "measured peak",
-            "simulated peak",
-            "peak error",
-        )
-    )
+    what, errors = ("signal", "readings", "up to [s]", "values"), ("RMS error", "largest error")
+    table = Table((*what, *errors, "measured peak", "simulated peak", "peak error"))
     for preset, deviations in by_preset.items():
         for d in deviations:
             digits = {"deg": 2, "m/s^2": 1}.get(d.unit, 4)
@@ -267,7 +256,7 @@ def _of_trajectory(name: str, trajectory: Trajectory) -> Form:
 
 def _of_opinion(sweep: Sweep, law: str, horizon_s: float) -> Form:
     """Return a second opinion: the impact with friction and vertical motion under another law of the soil."""
-    designs = designs_of(sweep.block(0, 1), None, sweep.model.resistance, sweep.model.ground, sweep.model.shape)
+    designs = designs_of(sweep.block(0, 1), None, sweep.model)
     table = with_law(designs.table, law, sweep.model.resistance)
     limit = math.radians(sweep.criterion.max_rotation_deg)
     times = np.linspace(0.0, horizon_s, min(round(horizon_s / SAMPLE_S) + 1, MOST_TIMES))

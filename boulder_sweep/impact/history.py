@@ -188,8 +188,6 @@ class SoilProfile:
 
     depth_m: np.ndarray
     """Depth of the middle of each slice below the soil line."""
-    displacement_m: np.ndarray
-    """Displacement of the soil there (Eq 22)."""
     force_N: np.ndarray
     """Force of each slice on the boulder, spring and drag (Eq 19)."""
 
@@ -216,13 +214,13 @@ def soil_profile(record: Record, sample: int, slices: int, c: Constants) -> Soil
     velocity = k.B - k.slope_v * ratio
     if not isinstance(c, Constants):
         pressed = _pressed_at(ratio, displacement, velocity, at_sample(c, sample)) / slices
-        return SoilProfile(ratio * c.d, displacement, -pressed)
+        return SoilProfile(ratio * c.d, -pressed)
     height = c.d / slices
     force = [
         -(spring_force(float(u), float(r * c.d), height, c) + drag_force(float(v), height, c))
         for u, v, r in zip(displacement, velocity, ratio, strict=True)
     ]
-    return SoilProfile(ratio * c.d, displacement, np.array(force))
+    return SoilProfile(ratio * c.d, np.array(force))
 
 
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:

@@ -119,7 +119,7 @@ def simulate(
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    designs = designs_of(block, None, sweep.model.resistance, sweep.model.ground, sweep.model.shape)
+    designs = designs_of(block, None, sweep.model)
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
     decided = evaluation.judged(designs)

@@ -6,6 +6,7 @@ They are in the units of the kernels, with what only the verdict asks for beside
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,8 +17,7 @@ from boulder_kernels.layered import OutlinedTable
 from boulder_kernels.outline import FAR, HEIGHT, NEAR
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import LEAST_SOLIDITY, SECOND_SPRING, solidity_of
-from boulder_sweep.settings.model import RESISTANCES, Ground
-from boulder_sweep.settings.shape import Shape
+from boulder_sweep.settings.model import Model
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
@@ -103,9 +103,7 @@ class Designs(NamedTuple):
 def designs_of(
     block: DesignBlock,
     rows: np.ndarray | None = None,
-    resistance: str = RESISTANCES[0],
-    ground: Ground | None = None,
-    shape: Shape | None = None,
+    model: Model | None = None,
 ) -> Designs:
     """Return the designs of a block.
 
@@ -115,13 +113,12 @@ def designs_of(
         Inputs of n rows under the names and units of the table.
     rows
         Which of them (bool, shape (n,)); all by default.
-    resistance
-        Law of the ultimate resistance of the soil.
-    ground
-        Layers, water, cohesion and slope of the soil; none by default.
-    shape
-        Shape of the boulders; boxes by default.
+    model
+        What is not in the block: the law of the soil's resistance, its layers, water, cohesion and slope, and the shape
+        of the boulders. By default the paper's law, the usual soil, and boxes.
     """
+    model = model or Model()
+    shape = model.shape
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
     springs = None
@@ -129,7 +126,7 @@ def designs_of(
         springs = SecondSprings(
             _values(block, SECOND_SPRING, rows), _values(block, "vehicle_second_spring_from_m", rows)
         )
-    fills, rocks, shape = None, None, shape or Shape()
+    fills, rocks = None, None
     if not shape.is_box:
         fills = np.full(len(columns["L"]), shape.filled)
     if BOULDER_MASS in block.columns:
@@ -139,7 +136,7 @@ def designs_of(
         # What is simulated has the mass of the boulder.
         volume = sides[0] * sides[1] * sides[2]
         columns["rho_b"] = mass / (volume if shape.is_box else volume * shape.filled)
-    table = with_soil(DesignTable(**columns), resistance, ground or Ground(), shape=shape)
+    table = with_soil(DesignTable(**columns), model.resistance, model.ground, shape=shape)
     return Designs(table, _values(block, "bed_offset_m", rows), springs, fills, rocks)
 
 
@@ -210,13 +207,13 @@ def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:
 
 
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
-    """Return about this many designs of a sweep, without those that cannot be computed."""
-    return designs_of(*_sampled(sweep, count), sweep.model.resistance, sweep.model.ground)
+    """Return about this many designs of a sweep, without those that cannot be computed; stones as boxes."""
+    return designs_of(*_sampled(sweep, count), replace(sweep.model, profile=(), taper=1.0))
 
 
 def plain_designs(sweep: Sweep, count: int) -> Designs:
-    """Return the same designs in the soil that their inputs describe, by the paper's law of the resistance."""
-    return designs_of(*_sampled(sweep, count), shape=sweep.model.shape)
+    """Return the same designs in the soil that their inputs describe, by the paper's law, stones by their profile."""
+    return designs_of(*_sampled(sweep, count), Model(profile=sweep.model.profile, taper=sweep.model.taper))
 
 
 def _sampled(sweep: Sweep, count: int) -> tuple[DesignBlock, np.ndarray]:
