@@ -25,7 +25,8 @@ from boulder_kernels.error_estimates import SAFETY, SAFETY_PRINTED, estimate_err
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
 from boulder_sweep.columns import AT_REST, BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
-from boulder_sweep.impact.trajectory import Motion, Trajectory
+from boulder_sweep.impact.history import Motion
+from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.judge.accuracy import accuracy_of, readings_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of

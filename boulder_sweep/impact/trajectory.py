@@ -10,13 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
-from boulder_kernels.design import Body
-from boulder_kernels.outlined import body_beside, is_outlined
 from boulder_sweep.columns import ColumnSpec
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import HistoryFileError
-from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
+from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, Motion, forces_along, ledger_of
 from boulder_sweep.judge.judged import Judged
 from boulder_sweep.store.files import check_target, replacing
 from boulder_sweep.text import printable, why
@@ -88,32 +85,6 @@ SPENT = _number(
 """Of vehicles with a second spring only."""
 
 _BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY, SPENT)}
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Input and output of the kernels, in their own units."""
-
-    design: Design
-    readings: Readings
-    constants: Constants
-    control: Control
-    record: Record
-    outcome: Outcome
-    second: SecondSpring | None = None
-
-    @property
-    def body(self) -> Body:
-        """The boulder as a rigid body."""
-        return body_beside(self.design, getattr(self.constants, "soil", None))
-
-    @property
-    def outline(self) -> np.ndarray:
-        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; of a box that of the box."""
-        soil, half = getattr(self.constants, "soil", None), 0.5 * self.design.L
-        if soil is not None and is_outlined(soil):
-            return np.asarray(soil.outline)
-        return np.array([[z, self.design.W, half, half] for z in (0.0, self.design.H)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +168,6 @@ class Trajectory:
         x_b, v_b, theta, omega, x_v, v_v = record.states.T
         body = motion.body
         along, up = body.x - c.c_x, body.y - c.c_y
-        forces = forces_along(record, motion.design, motion.readings, c, motion.second)
         return cls(
             name=name,
             design_id=design_id,
@@ -211,7 +181,7 @@ class Trajectory:
             angular_velocity_rad_s=omega,
             vehicle_displacement_m=x_v,
             vehicle_velocity_m_s=v_v,
-            **forces,
+            **forces_along(motion),
             rotation_mode=np.array([MODE_NAMES[int(mode)] for mode in record.turning], dtype=object),
             in_contact=np.where(record.touching, "touching", "coasting").astype(object),
             judged=judged,
@@ -239,8 +209,7 @@ class Trajectory:
 
     def energy(self) -> EnergyLedger:
         """Return where the vehicle's energy is at every sample."""
-        motion = self.motion
-        return ledger_of(motion.record, motion.design, motion.readings, motion.constants, motion.second)
+        return ledger_of(self.motion)
 
     def summary(self) -> dict[str, Any]:
         """Return the outcome in the names and units of the table, with the times of the maxima.
