@@ -21,9 +21,9 @@ from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.sweep import DesignList

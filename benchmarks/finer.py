@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_kernels import SIMULATED, Status
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import load
 
 from .designs import sample

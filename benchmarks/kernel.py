@@ -21,7 +21,7 @@ from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics
 from boulder_kernels.table import some_rows
 from boulder_kernels.workspace import LANES, SIZE, LayeredLanes, TaperedLanes
-from boulder_sweep.judge.evaluation import LONGEST_HORIZON
+from boulder_sweep.judge.accuracy import LONGEST_HORIZON
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.soils import with_law
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from boulder_sweep import run
 from boulder_sweep.columns import OUTCOME_COLUMNS
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 

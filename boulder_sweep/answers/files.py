@@ -21,7 +21,7 @@ from boulder_sweep.columns import BY_NAME as COLUMN_OF
 from boulder_sweep.designs import Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.explanation import model_of
-from boulder_sweep.judge.evaluation import known_control
+from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME

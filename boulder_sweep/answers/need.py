@@ -117,7 +117,7 @@ class Need(Result):
         PictureError
             It cannot be drawn.
         """
-        draw("design_chart", "draw_design_chart", self, path, units=units)
+        draw("answer_charts", "draw_design_chart", self, path, units=units)
 
 
 def need(

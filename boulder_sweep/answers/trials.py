@@ -13,10 +13,9 @@ import numpy as np
 from boulder_kernels._jit import plain
 from boulder_kernels.settling import proof_is_possible
 from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, some
-from boulder_sweep.judge.accuracy import Accuracy, steps_of
+from boulder_sweep.judge.accuracy import Accuracy, accuracy_of, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged, joined
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.robustness import ROBUST
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import SetDistributions

@@ -112,7 +112,7 @@ class Uncertainty(Result):
         PictureError
             It cannot be drawn.
         """
-        draw("chances", "draw_uncertainty", self, path, design_id=design_id, units=units)
+        draw("answer_charts", "draw_uncertainty", self, path, design_id=design_id, units=units)
 
 
 def uncertainty(

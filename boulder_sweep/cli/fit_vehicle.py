@@ -11,8 +11,7 @@ from boulder_sweep.cli.options import OUTPUT, json_option, quantity_of, refuse_u
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
-    from boulder_sweep.crash_tests.fitting import StagedFit
-    from boulder_sweep.crash_tests.pulse import VehicleFit
+    from boulder_sweep.crash_tests.fitting import StagedFit, VehicleFit
 
 EXAMPLES = """\b
 Examples:
@@ -44,7 +43,7 @@ def fit_vehicle(pulse: str, mass: str, speed: str | None, stages: int, plot: str
     mass_kg = quantity_of("--mass", mass, "kg")
     speed_m_s = None if speed is None else quantity_of("--speed", speed, "m/s")
     from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
-    from boulder_sweep.crash_tests.pulse import read_pulse
+    from boulder_sweep.crash_tests.measured import read_pulse
 
     refuse_unwritable(None, plot)
     fit = (fit_pulse if stages == 1 else fit_stages)(read_pulse(pulse), mass_kg, speed_m_s=speed_m_s)

@@ -157,7 +157,7 @@ def refuse_unwritable_history(
             raise click.UsageError(f"{name} is named twice; give each output a name of its own")
     refuse_unwritable(None, plot)
     if trajectory is not None:
-        from boulder_sweep.impact.trajectory_file import checked_history
+        from boulder_sweep.impact.trajectory import checked_history
 
         checked_history(trajectory)
     refuse_unwritable(None, energy)

@@ -108,11 +108,11 @@ def _plot_answers(file: AnswerFile, target: Path, units: str, asked: Sequence[st
         raise click.UsageError(f"{options} choose a part of the result of a run; a chart of answers takes none")
     answers = file.answers()
     if file.kind == NEED:
-        draw("design_chart", "draw_design_chart", answers, target, units=units)
+        draw("answer_charts", "draw_design_chart", answers, target, units=units)
     elif file.kind == UNCERTAINTY and file.rows == 1:
-        draw("chances", "draw_uncertainty", answers, target, units=units)
+        draw("answer_charts", "draw_uncertainty", answers, target, units=units)
     else:
-        draw("design_chart", "draw_answers", answers, target, units=units)
+        draw("answer_charts", "draw_answers", answers, target, units=units)
     show(f"{target}: {counted(file.rows, 'answer')}")
     return 0
 

@@ -60,8 +60,7 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
         content["scores"] = [own.to_dict() for own in scored]
         content["files"] += written
-        from boulder_sweep.crash_tests.measured import deviation_table
-        from boulder_sweep.crash_tests.score import score_table
+        from boulder_sweep.crash_tests.score import deviation_table, score_table
         from boulder_sweep.crash_tests.tables import WIDTH
 
         tables = [deviation_table(overlay).text()]
@@ -85,8 +84,8 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
 def _overlay(measured: str, case: str) -> tuple[dict[str, Any], list[Score], Callable[[Path], str]]:
     """Compare a user's data with both presets, and score them; return a function that draws them into a folder, too."""
     from boulder_sweep.crash_tests.cases import NAMES, crash_test
-    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, compare, read_history
-    from boulder_sweep.crash_tests.score import by_the_paper, forms_of, scores
+    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, read_history
+    from boulder_sweep.crash_tests.score import by_the_paper, compare, forms_of, scores
     from boulder_sweep.judge.quantiles import MEAN, at_values
     from boulder_sweep.settings import load
     from boulder_sweep.settings.model import PRESETS

@@ -1,131 +1,104 @@
-"""Spring and damper of a vehicle from a rigid-wall crash pulse (Eqs 49 to 51).
+"""Spring and damper of a vehicle from a rigid-wall crash pulse (Eqs 49 to 51), and its second spring.
 
-The measured displacement, velocity or acceleration, or several of them at once, is fitted by least squares with the
-exact response of a Maxwell element (`boulder_sweep.crash_tests.rigid_wall`), under-damped or over-damped as the data
-have it. What is fitted are the logarithms of sqrt(k/m) and of c/sqrt(k m), and the speed of impact unless it is given.
+The pulse is fitted by least squares with the exact response of a Maxwell element, under-damped or over-damped as the
+data have it; see `boulder_sweep.crash_tests.fit_problem`.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from boulder_sweep.crash_tests.pulse import RESPONSES, Pulse, SignalMisfit, VehicleFit
+from boulder_sweep.crash_tests.fit_problem import (
+    RATIO_BOUNDS,
+    RESPONSES,
+    FitProblem,
+    SignalMisfit,
+    StagedProblem,
+)
+from boulder_sweep.crash_tests.measured import PULSE_UNITS, Pulse
 from boulder_sweep.crash_tests.rigid_wall import RigidWall, StiffeningWall
-from boulder_sweep.crash_tests.scatter import scatter_of, sum_scatters
+from boulder_sweep.drawing import draw
 from boulder_sweep.errors import FitError
 
-RATIO_BOUNDS = (2e-3, 2e2)
-"""Range of c/sqrt(k m) that is searched; at its ends one of the two elements is as good as rigid."""
 
+@dataclass(frozen=True, eq=False)
+class VehicleFit:
+    """Result of `fit_pulse`.
 
-class FitProblem:
-    """The least-squares problem: unknowns log sqrt(k/m), log(c/sqrt(k m)) and, where not given, v_0."""
+    Attributes
+    ----------
+    pulse : Pulse
+        What was fitted.
+    wall : RigidWall
+        The fitted vehicle: mass, speed, spring, damper.
+    spring_error_N_m, damper_error_N_s_m : float
+        Standard errors. They allow for noise that is correlated in time, by a filter or because it was integrated from
+        an accelerometer, and between the signals; they say nothing about whether a Maxwell element is right at all.
+    speed_error_m_s : float or None
+        Standard error of the speed; None where the speed was given.
+    misfits : dict of str to SignalMisfit
+        By signal.
+    warnings : tuple of str
+        Where the Maxwell element cannot fit, or the pulse does not determine it.
+    """
 
-    least_share = 1e-14
-    """Combinations of unknowns that move the response less than this, as a share of the most, are left out."""
+    pulse: Pulse
+    wall: RigidWall
+    spring_error_N_m: float
+    damper_error_N_s_m: float
+    speed_error_m_s: float | None
+    misfits: dict[str, SignalMisfit]
+    warnings: tuple[str, ...]
 
-    def __init__(self, pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> None:
-        self.pulse = pulse
-        self.mass_kg = mass_kg
-        self.speed_m_s = speed_m_s
-        self.known = {name: np.isfinite(values) for name, values in pulse.signals.items()}
-
-    def range(self, name: str) -> float:
-        """Range of a signal, never zero."""
-        values = self.pulse.signals[name][self.known[name]]
-        return max(float(np.abs(values).max()), float(np.ptp(values)), 1e-12)
-
-    def wall(self, unknowns: np.ndarray) -> RigidWall:
-        """Vehicle that the unknowns stand for."""
-        rate, ratio = math.exp(unknowns[0]), math.exp(unknowns[1])
-        speed = float(unknowns[2]) if self.speed_m_s is None else self.speed_m_s
-        return RigidWall(self.mass_kg, speed, self.mass_kg * rate**2, ratio * rate * self.mass_kg)
-
-    def by_signal(self, unknowns: np.ndarray) -> dict[str, np.ndarray]:
-        """Measured minus computed where there are values, in the units of the signals."""
-        wall = self.wall(unknowns)
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything but the pulse as plain data."""
+        wall = self.wall
         return {
-            name: (values - RESPONSES[name](wall, self.pulse.time_s))[self.known[name]]
-            for name, values in self.pulse.signals.items()
+            "vehicle_mass_kg": wall.mass_kg,
+            "vehicle_spring_N_m": wall.spring_N_m,
+            "vehicle_spring_standard_error_N_m": self.spring_error_N_m,
+            "vehicle_damper_N_s_m": wall.damper_N_s_m,
+            "vehicle_damper_standard_error_N_s_m": self.damper_error_N_s_m,
+            "impact_speed_m_s": wall.speed_m_s,
+            "impact_speed_standard_error_m_s": self.speed_error_m_s,
+            "damping": "over-damped" if wall.over_damped else "under-damped",
+            "a_per_s": wall.a,
+            "b_per_s": None if wall.over_damped else wall.b,
+            "max_displacement_m": wall.max_displacement_m,
+            "peak_force_kN": wall.peak_force / 1e3,
+            "rebound_speed_m_s": -wall.rebound_speed_m_s,
+            "misfit": {
+                f"{name} [{PULSE_UNITS[name]}]": {
+                    "rms": m.rms,
+                    "share_of_range": m.share,
+                    "systematic": m.systematic_share,
+                }
+                for name, m in self.misfits.items()
+            },
+            "warnings": list(self.warnings),
         }
 
-    def residuals(self, unknowns: np.ndarray, scales: dict[str, float]) -> np.ndarray:
-        """Residuals of all signals as multiples of their scales."""
-        return np.concatenate([values / scales[name] for name, values in self.by_signal(unknowns).items()])
+    @property
+    def residuals(self) -> dict[str, np.ndarray]:
+        """Measured minus fitted, by signal; NaN in gaps."""
+        return {
+            name: values - RESPONSES[name](self.wall, self.pulse.time_s) for name, values in self.pulse.signals.items()
+        }
 
-    def scatter(self, residuals: dict[str, np.ndarray]) -> dict[str, float]:
-        """Return the scale of each signal by which its residuals are divided: their root mean square, never zero."""
-        return {name: max(rms(values), 1e-9 * self.range(name)) for name, values in residuals.items()}
+    def plot(self, path: str | Path) -> None:
+        """Draw pulse, fit and residuals.
 
-    def misfits(self, residuals: dict[str, np.ndarray]) -> dict[str, SignalMisfit]:
-        """Describe the residuals of every signal."""
-        return {name: misfit_of(values, self.range(name)) for name, values in residuals.items()}
-
-    def start(self, scales: dict[str, float]) -> np.ndarray:
-        """Best of a grid of vehicles; the response is proportional to the speed, which so follows from each."""
-        last = float(self.pulse.time_s[-1])
-        best, unknowns = math.inf, np.zeros(3)
-        for rate in np.geomspace(0.1, 200.0, 31) / last:
-            for ratio in np.geomspace(*RATIO_BOUNDS, 21):
-                unit = RigidWall(self.mass_kg, 1.0, self.mass_kg * rate**2, ratio * rate * self.mass_kg)
-                shape, data = [], []
-                for name, values in self.pulse.signals.items():
-                    known = self.known[name]
-                    shape.append(RESPONSES[name](unit, self.pulse.time_s)[known] / scales[name])
-                    data.append(values[known] / scales[name])
-                one, other = np.concatenate(shape), np.concatenate(data)
-                speed = self.speed_m_s if self.speed_m_s is not None else max(float(one @ other / (one @ one)), 1e-6)
-                misfit = float(np.sum((other - speed * one) ** 2))
-                if misfit < best:
-                    best, unknowns = misfit, np.array([math.log(rate), math.log(ratio), speed])
-        return unknowns if self.speed_m_s is None else unknowns[:2]
-
-    def bounds(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Range of the unknowns."""
-        last = float(self.pulse.time_s[-1])
-        low = [math.log(0.01 / last), math.log(RATIO_BOUNDS[0]), 1e-9]
-        high = [math.log(2000.0 / last), math.log(RATIO_BOUNDS[1]), 1e4]
-        return np.array(low[: len(start)]), np.array(high[: len(start)])
-
-    def covariance(self, unknowns: np.ndarray, scales: dict[str, float]) -> np.ndarray:
-        """Covariance of the unknowns, shape (p, p).
-
-        The sandwich of least squares, (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, with the covariance Σ of the residuals of all signals as
-        `boulder_sweep.crash_tests.scatter` finds it from them.
+        Raises
+        ------
+        PictureError
+            The picture cannot be written, or matplotlib is not installed.
         """
-        n = len(unknowns)
-        steps = 1e-6 * np.maximum(np.abs(unknowns), 1.0)
-        columns = []
-        for k in range(n):
-            ahead, behind = (unknowns + sign * steps * (np.arange(n) == k) for sign in (1.0, -1.0))
-            up, down = self.by_signal(ahead), self.by_signal(behind)
-            columns.append({name: (up[name] - down[name]) / (2.0 * steps[k]) / scales[name] for name in up})
-        bread, scatters = np.zeros((n, n)), []
-        for name, residuals in self.by_signal(unknowns).items():
-            jacobian = np.stack([column[name] for column in columns], axis=1)
-            bread += jacobian.T @ jacobian
-            times = self.pulse.time_s[self.known[name]]
-            scatters.append(scatter_of(name, times, residuals / scales[name], jacobian))
-        masks = list(self.known.values())
-        middle = sum_scatters(scatters, together=all(np.array_equal(mask, masks[0]) for mask in masks))
-        inverse = np.linalg.pinv(bread, rcond=self.least_share, hermitian=True)
-        return np.asarray(inverse @ middle @ inverse)
-
-    def standard_errors(self, unknowns: np.ndarray, scales: dict[str, float]) -> tuple[float, float, float]:
-        """Standard errors of spring [N/m], damper [N s/m] and speed [m/s]."""
-        n, covariance, wall = len(unknowns), self.covariance(unknowns, scales), self.wall(unknowns)
-        # k = m exp(2 u_0), c = m exp(u_0 + u_1)
-        of_spring = np.eye(n)[0] * 2.0 * wall.spring_N_m
-        of_damper = (np.eye(n)[0] + np.eye(n)[1]) * wall.damper_N_s_m
-        of_speed = np.eye(3, n)[2]
-        spring, damper, speed = (
-            math.sqrt(max(float(g @ covariance @ g), 0.0)) for g in (of_spring, of_damper, of_speed)
-        )
-        return spring, damper, speed
+        draw("crash_curves", "draw_fit", self, path)
 
 
 SYSTEMATIC_SHARE = 0.02
@@ -194,8 +167,6 @@ def warnings_of(
 
 PASSES = 4
 """How often the weights of the signals are renewed from their own scatter."""
-SMOOTHING_SHARE = 0.05
-"""Part of the pulse over which noise is averaged out."""
 
 
 def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -> VehicleFit:
@@ -223,21 +194,11 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
         if value is not None and not 0.0 < value < math.inf:
             raise FitError(f"the {name} of the vehicle must be positive, not {value:g}")
     problem = FitProblem(pulse, float(mass_kg), speed_m_s)
-    from scipy.optimize import least_squares  # heavy, and only this function needs it
-
     scales = {name: problem.range(name) for name in pulse.signals}
     unknowns = problem.start(scales)
     bounds = problem.bounds(unknowns)
     for _ in range(PASSES):
-        solved = least_squares(
-            problem.residuals,
-            np.clip(unknowns, *bounds),
-            bounds=bounds,
-            args=(scales,),
-            xtol=1e-14,
-            ftol=1e-14,
-            gtol=1e-14,
-        )
+        solved = problem.solved(unknowns, scales, bounds, 1e-14)
         unknowns = solved.x
         residuals = problem.by_signal(unknowns)
         scales = problem.scatter(residuals)
@@ -257,21 +218,6 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
     )
 
 
-def rms(values: np.ndarray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def misfit_of(residuals: np.ndarray, span: float) -> SignalMisfit:
-    """Describe the residuals of one signal."""
-    window = max(1, round(SMOOTHING_SHARE * len(residuals)))
-    smooth = np.convolve(residuals, np.full(window, 1.0 / window), mode="valid")
-    scatter = float(residuals @ residuals)
-    correlation = float(residuals[1:] @ residuals[:-1]) / scatter if scatter > 0.0 else 0.0
-    size = rms(residuals)
-    return SignalMisfit(size, size / span, float(np.abs(smooth).max()) / span, correlation)
-
-
 RATIOS = (1.0, 1e3)
 """Range of the second spring over the first that is searched."""
 SHARES = (0.02, 0.98)
@@ -279,19 +225,6 @@ SHARES = (0.02, 0.98)
 STARTS = tuple((ratio, share) for ratio in (1.5, 4.0) for share in (0.25, 0.5, 0.75))
 EXACT = 1e-9
 """A misfit this small, as a share of a signal's range, leaves nothing for a second spring to explain."""
-
-
-class StagedProblem(FitProblem):
-    """The least-squares problem with two springs: log(k_2/k_v) and s_2 come after the unknowns of `FitProblem`."""
-
-    least_share = 0.0
-    """None is left out: where the force peaks as the second spring begins, its beginning hardly shows."""
-
-    def wall(self, unknowns: np.ndarray) -> StiffeningWall:
-        """Vehicle that the unknowns stand for."""
-        one = super().wall(unknowns[:-2])
-        second = one.spring_N_m * math.exp(unknowns[-2])
-        return StiffeningWall(one.mass_kg, one.speed_m_s, one.spring_N_m, one.damper_N_s_m, second, float(unknowns[-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -377,8 +310,6 @@ def fit_stages(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) 
 
 def _solve(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) -> tuple[np.ndarray, dict[str, float]]:
     """Solve from several starts, and once more from the best with the weights of its own scatter."""
-    from scipy.optimize import least_squares  # heavy, and only this function needs it
-
     crush = one.wall.max_displacement_m
     rate = math.sqrt(one.wall.spring_N_m / one.wall.mass_kg)
     known = [math.log(rate), math.log(one.wall.damper_N_s_m / (rate * one.wall.mass_kg))]
@@ -386,15 +317,10 @@ def _solve(problem: StagedProblem, one: VehicleFit, scales: dict[str, float]) ->
     low, high = problem.bounds(np.array(known))
     low = np.append(low, [math.log(RATIOS[0]), SHARES[0] * crush])
     high = np.append(high, [math.log(RATIOS[1]), SHARES[1] * crush])
-
-    def solved(start: np.ndarray) -> Any:
-        tight = {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12}
-        return least_squares(problem.residuals, np.clip(start, low, high), bounds=(low, high), args=(scales,), **tight)
-
     starts = [np.array([*known, math.log(ratio), share * crush]) for ratio, share in STARTS]
-    best = min((solved(start) for start in starts), key=lambda fit: fit.cost)
+    best = min((problem.solved(start, scales, (low, high), 1e-12) for start in starts), key=lambda fit: fit.cost)
     scales = problem.scatter(problem.by_signal(best.x))
-    return solved(best.x).x, scales
+    return problem.solved(best.x, scales, (low, high), 1e-12).x, scales
 
 
 def _gain(one: VehicleFit, misfits: dict[str, SignalMisfit], residuals: dict[str, np.ndarray]) -> float:

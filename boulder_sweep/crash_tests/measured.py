@@ -1,4 +1,4 @@
-"""Measured time histories: a CSV file whose header names quantities and their units, and a simulation beside it.
+"""Measured time histories: a CSV file whose header names quantities and their units; a rigid-wall pulse is one.
 
 ``time [ms], displacement [mm], acceleration [g]``: the name of a quantity, then its unit in brackets or parentheses, or
 behind an underline as in ``time_s`` and ``vehicle_displacement_m``. Empty cells are gaps in a track. Lines that begin
@@ -8,18 +8,16 @@ with # are skipped.
 from __future__ import annotations
 
 import csv
-import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from boulder_sweep.crash_tests.tables import Table, number
-from boulder_sweep.errors import ComparisonError
+from boulder_sweep.errors import FitError
 from boulder_sweep.settings.numbers import NumberError, split_number
 from boulder_sweep.settings.problems import (
     Position,
@@ -31,10 +29,6 @@ from boulder_sweep.settings.problems import (
     shorten,
 )
 from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
-
-if TYPE_CHECKING:
-    from boulder_sweep.impact.trajectory import Trajectory
-
 
 MOST_ROWS, MOST_COLUMNS = 2_000_000, 1000
 MAX_BYTES = 500_000_000
@@ -161,7 +155,8 @@ def _rows(file: Path) -> list[_Row]:
     check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
-            lines = list(islice(_filled_lines(stream), MOST_ROWS + 2))
+            filled = ((number, text) for number, text in enumerate(stream, 1) if _holds_something(text))
+            lines = list(islice(filled, MOST_ROWS + 2))
     except UnicodeDecodeError:
         raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
     except OSError as error:
@@ -176,11 +171,6 @@ def _rows(file: Path) -> list[_Row]:
         return [_Row(file, *line, delimiter, row) for line, row in zip(lines, cells, strict=True)]
     except (csv.Error, ValueError):
         raise refuse(label, "cannot be read as CSV: a cell runs over the end of its line") from None
-
-
-def _filled_lines(stream: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """Yield the lines that hold something, each with its number."""
-    return ((number, text) for number, text in enumerate(stream, 1) if _holds_something(text))
 
 
 def _holds_something(text: str) -> bool:
@@ -275,140 +265,81 @@ def _check_time(rows: list[_Row], column: int, time: np.ndarray, problems: Probl
         problems.add(rows[row + 1].position(column), TIME.name, message)
 
 
-UNITS = {signal.name: signal.unit for signal in TEST_SIGNALS if signal is not TIME}
+PULSE_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+FEWEST_SAMPLES = 8
+SIZES = (1e-9, 1e9)
+"""Least and greatest peak of a signal that is accepted, in its unit: far beyond any impact."""
 
 
-@dataclass(frozen=True)
-class Deviation:
-    """How far the simulation is from one measured signal.
+@dataclass(frozen=True, eq=False)
+class Pulse:
+    """A rigid-wall crash pulse.
 
     Attributes
     ----------
-    signal, unit : str
-        What was measured.
-    until_s : float
-        End of the time compared [s].
-    samples : int
-        Measured values compared.
-    rms : float
-        Root mean square of simulated minus measured.
-    largest : float
-        Largest difference, with its sign.
-    measured_peak, simulated_peak : float
-        Largest values up to that time.
+    name : str
+        Where it comes from.
+    time_s : ndarray, shape (n,)
+        Times since first touch [s], ascending, from 0 on.
+    signals : dict of str to ndarray, shape (n,)
+        ``displacement`` [m], ``velocity`` [m/s], ``acceleration`` [m/s^2], one or more; NaN in gaps.
     """
 
-    signal: str
-    unit: str
-    until_s: float
-    samples: int
-    rms: float
-    largest: float
-    measured_peak: float
-    simulated_peak: float
-
-    @property
-    def peak_error(self) -> float:
-        """Simulated peak minus measured peak, as a share of the measured one."""
-        if self.measured_peak == 0.0:
-            return math.nan
-        return (self.simulated_peak - self.measured_peak) / abs(self.measured_peak)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
-        error = self.peak_error
-        return {**asdict(self), "peak_error": None if math.isnan(error) else error}
+    name: str
+    time_s: np.ndarray
+    signals: dict[str, np.ndarray]
 
 
-def simulated_signal(trajectory: Trajectory, name: str) -> np.ndarray:
-    """Return what a measured signal is compared with; the boulder's own centre, as a camera tracks it."""
-    if name == "rotation":
-        return np.degrees(trajectory.rotation_rad)
-    if name == "boulder_displacement":
-        return trajectory.boulder_centre_displacement_m
-    if name == VEHICLE_ACCELERATION.name:
-        return trajectory.vehicle_acceleration_m_s2
-    return trajectory.vehicle_displacement_m
-
-
-def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
-    """Compare a simulation with measured signals, over the whole time and up to the rotation limit.
-
-    Parameters
-    ----------
-    trajectory
-        The simulation.
-    measured
-        Signals of `TEST_SIGNALS`; gaps are left out.
-
-    Returns
-    -------
-    list of Deviation
-        For every signal one over the time that both cover, and where the simulated boulder passes its rotation limit a
-        second one up to then, because the model does not hold beyond.
+def read_pulse(path: str | Path) -> Pulse:
+    """Read a crash pulse from a CSV file; see `boulder_sweep.crash_tests.measured` for its header.
 
     Raises
     ------
-    ComparisonError
-        No measured value lies within the simulated time.
+    SettingsError
+        The file is not valid.
+    FitError
+        Its signals contradict the direction of an impact.
     """
-    end = float(trajectory.time_s[-1]) if len(trajectory) else 0.0
-    limit = trajectory.motion.outcome.t_limit
-    deviations = []
-    for name, values in measured.signals.items():
-        for until in (end, limit) if math.isfinite(limit) else (end,):
-            inside = np.isfinite(values) & (measured.time_s >= 0.0) & (measured.time_s <= until)
-            if not inside.any():
-                continue
-            times, data = measured.time_s[inside], values[inside]
-            simulated = np.interp(times, trajectory.time_s, simulated_signal(trajectory, name))
-            error = simulated - data
-            deviations.append(
-                Deviation(
-                    signal=name,
-                    unit=UNITS[name],
-                    until_s=until,
-                    samples=len(data),
-                    rms=float(np.sqrt(np.mean(error**2))),
-                    largest=float(error[np.argmax(np.abs(error))]),
-                    measured_peak=_peak(data),
-                    simulated_peak=_peak(simulated),
-                )
-            )
-    if not deviations:
-        raise ComparisonError(
-            f"{measured.path}: no measured value lies within the simulated time, 0 to {end:g} s; "
-            f"time counts from first touch"
+    return pulse_of(read_history(path, PULSE_SIGNALS))
+
+
+def pulse_of(history: TimeHistory) -> Pulse:
+    """Return the part of a measured history from first touch on; a deceleration becomes an acceleration.
+
+    Raises
+    ------
+    FitError
+        Fewer than 8 samples are left, the vehicle seems to be accelerated by the wall or to move away from it, or a
+        signal does not change or has a size that no impact has.
+    """
+    signals = dict(history.signals)
+    if "deceleration" in signals:
+        if "acceleration" in signals:
+            raise FitError(f"{history.path}: holds both acceleration and deceleration; give one of them")
+        signals["acceleration"] = -signals.pop("deceleration")
+    after = history.time_s >= 0.0
+    time = history.time_s[after]
+    signals = {name: values[after] for name, values in signals.items()}
+    for name, values in signals.items():
+        if np.isfinite(values).sum() < FEWEST_SAMPLES:
+            raise FitError(f"{history.path}: {name} has fewer than {FEWEST_SAMPLES} values from first touch (t = 0) on")
+        _check_size(f"{history.path}: the {name}", values, name)
+    if "acceleration" in signals and np.nanmean(signals["acceleration"]) > 0.0:
+        raise FitError(
+            f"{history.path}: the acceleration is positive, as if the wall pushed the vehicle on; "
+            f"if it counts slowing down as positive, name the column deceleration"
         )
-    return deviations
+    for name, values in signals.items():
+        # The first that noise does not explain: the rebound, which is negative, comes later.
+        if name != "acceleration" and values[np.abs(values) >= 0.25 * np.nanmax(np.abs(values))][0] < 0.0:
+            raise FitError(f"{history.path}: the {name} is negative at first; it counts as positive towards the wall")
+    return Pulse(str(history.path), time, signals)
 
 
-def deviation_table(by_preset: dict[str, list[Deviation]]) -> Table:
-    """Return deviations by preset as a table."""
-    table = Table(
-        (
-            "signal",
-            "readings",
-            "up to [s]",
-            "values",
-            "RMS error",
-            "largest error",
-            "measured peak",
-            "simulated peak",
-            "peak error",
-        )
-    )
-    for preset, deviations in by_preset.items():
-        for d in deviations:
-            digits = {"deg": 2, "m/s^2": 1}.get(d.unit, 4)
-            unit = "°" if d.unit == "deg" else f" {d.unit}"
-            share = "-" if math.isnan(d.peak_error) else f"{d.peak_error:+.1%}"
-            texts = (number(value, digits) + unit for value in (d.rms, d.largest, d.measured_peak, d.simulated_peak))
-            label = d.signal.replace("_", " ")
-            table.add(label, preset.replace("_", " "), f"{d.until_s:.3f}", str(d.samples), *texts, share)
-    return table
-
-
-def _peak(values: np.ndarray) -> float:
-    """Value of the largest magnitude, with its sign."""
-    return float(values[np.argmax(np.abs(values))])
+def _check_size(label: str, values: np.ndarray, name: str) -> None:
+    """Refuse a signal without motion, or of a size that no impact has; a constant deceleration stops a vehicle too."""
+    size, unit = float(np.nanmax(np.abs(values))), PULSE_UNITS[name]
+    if size == 0.0 or (name != "acceleration" and np.nanmin(values) == np.nanmax(values)):
+        raise FitError(f"{label} does not change; it must show how the wall stops the vehicle")
+    if not SIZES[0] <= size <= SIZES[1]:
+        raise FitError(f"{label} reaches {size:.3g} {unit}, which is not that of an impact; check the column's unit")

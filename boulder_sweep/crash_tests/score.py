@@ -17,8 +17,9 @@ import numpy as np
 
 from boulder_kernels import Status
 from boulder_kernels.second_opinion import HeaveControl, HeaveRecord, second_opinions
-from boulder_sweep.crash_tests.measured import BOULDER, ROTATION, UNITS, TimeHistory, simulated_signal
+from boulder_sweep.crash_tests.measured import BOULDER, ROTATION, TEST_SIGNALS, TIME, VEHICLE_ACCELERATION, TimeHistory
 from boulder_sweep.crash_tests.tables import Table, number
+from boulder_sweep.errors import ComparisonError
 from boulder_sweep.impact.simulation import SAMPLE_S, simulate
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.robustness import can_be_asked
@@ -28,6 +29,134 @@ from boulder_sweep.soils import with_law
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
     from boulder_sweep.settings import Sweep
+
+UNITS = {signal.name: signal.unit for signal in TEST_SIGNALS if signal is not TIME}
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far the simulation is from one measured signal.
+
+    Attributes
+    ----------
+    signal, unit : str
+        What was measured.
+    until_s : float
+        End of the time compared [s].
+    samples : int
+        Measured values compared.
+    rms : float
+        Root mean square of simulated minus measured.
+    largest : float
+        Largest difference, with its sign.
+    measured_peak, simulated_peak : float
+        Largest values up to that time.
+    """
+
+    signal: str
+    unit: str
+    until_s: float
+    samples: int
+    rms: float
+    largest: float
+    measured_peak: float
+    simulated_peak: float
+
+    @property
+    def peak_error(self) -> float:
+        """Simulated peak minus measured peak, as a share of the measured one."""
+        if self.measured_peak == 0.0:
+            return math.nan
+        return (self.simulated_peak - self.measured_peak) / abs(self.measured_peak)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        error = self.peak_error
+        return {**asdict(self), "peak_error": None if math.isnan(error) else error}
+
+
+def simulated_signal(trajectory: Trajectory, name: str) -> np.ndarray:
+    """Return what a measured signal is compared with; the boulder's own centre, as a camera tracks it."""
+    if name == "rotation":
+        return np.degrees(trajectory.rotation_rad)
+    if name == "boulder_displacement":
+        return trajectory.boulder_centre_displacement_m
+    if name == VEHICLE_ACCELERATION.name:
+        return trajectory.vehicle_acceleration_m_s2
+    return trajectory.vehicle_displacement_m
+
+
+def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
+    """Compare a simulation with measured signals, over the whole time and up to the rotation limit.
+
+    Parameters
+    ----------
+    trajectory
+        The simulation.
+    measured
+        Signals of `TEST_SIGNALS`; gaps are left out.
+
+    Returns
+    -------
+    list of Deviation
+        For every signal one over the time that both cover, and where the simulated boulder passes its rotation limit a
+        second one up to then, because the model does not hold beyond.
+
+    Raises
+    ------
+    ComparisonError
+        No measured value lies within the simulated time.
+    """
+    end = float(trajectory.time_s[-1]) if len(trajectory) else 0.0
+    limit = trajectory.motion.outcome.t_limit
+    deviations = []
+    for name, values in measured.signals.items():
+        for until in (end, limit) if math.isfinite(limit) else (end,):
+            inside = np.isfinite(values) & (measured.time_s >= 0.0) & (measured.time_s <= until)
+            if not inside.any():
+                continue
+            times, data = measured.time_s[inside], values[inside]
+            simulated = np.interp(times, trajectory.time_s, simulated_signal(trajectory, name))
+            error = simulated - data
+            deviations.append(
+                Deviation(
+                    signal=name,
+                    unit=UNITS[name],
+                    until_s=until,
+                    samples=len(data),
+                    rms=float(np.sqrt(np.mean(error**2))),
+                    largest=float(error[np.argmax(np.abs(error))]),
+                    measured_peak=_peak(data),
+                    simulated_peak=_peak(simulated),
+                )
+            )
+    if not deviations:
+        raise ComparisonError(
+            f"{measured.path}: no measured value lies within the simulated time, 0 to {end:g} s; "
+            f"time counts from first touch"
+        )
+    return deviations
+
+
+def deviation_table(by_preset: dict[str, list[Deviation]]) -> Table:
+    """Return deviations by preset as a table."""
+    what, errors = ("signal", "readings", "up to [s]", "values"), ("RMS error", "largest error")
+    table = Table((*what, *errors, "measured peak", "simulated peak", "peak error"))
+    for preset, deviations in by_preset.items():
+        for d in deviations:
+            digits = {"deg": 2, "m/s^2": 1}.get(d.unit, 4)
+            unit = "°" if d.unit == "deg" else f" {d.unit}"
+            share = "-" if math.isnan(d.peak_error) else f"{d.peak_error:+.1%}"
+            texts = (number(value, digits) + unit for value in (d.rms, d.largest, d.measured_peak, d.simulated_peak))
+            label = d.signal.replace("_", " ")
+            table.add(label, preset.replace("_", " "), f"{d.until_s:.3f}", str(d.samples), *texts, share)
+    return table
+
+
+def _peak(values: np.ndarray) -> float:
+    """Value of the largest magnitude, with its sign."""
+    return float(values[np.argmax(np.abs(values))])
+
 
 TIME_TO_LIMIT = "time to the limit"
 MOST_TIMES = 20_000
@@ -127,7 +256,7 @@ def _of_trajectory(name: str, trajectory: Trajectory) -> Form:
 
 def _of_opinion(sweep: Sweep, law: str, horizon_s: float) -> Form:
     """Return a second opinion: the impact with friction and vertical motion under another law of the soil."""
-    designs = designs_of(sweep.block(0, 1), None, sweep.model.resistance, sweep.model.ground, sweep.model.shape)
+    designs = designs_of(sweep.block(0, 1), None, sweep.model)
     table = with_law(designs.table, law, sweep.model.resistance)
     limit = math.radians(sweep.criterion.max_rotation_deg)
     times = np.linspace(0.0, horizon_s, min(round(horizon_s / SAMPLE_S) + 1, MOST_TIMES))

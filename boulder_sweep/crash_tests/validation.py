@@ -9,16 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from boulder_sweep.crash_tests.cases import NAMES, crash_test
-from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.statements import (
+from boulder_sweep.crash_tests.cases import (
     CLOSE_UNTIL_S,
+    NAMES,
     Convergence,
     Statement,
     convergence,
+    crash_test,
+    rigid_wall_test,
     statement_table,
     statements,
 )
+from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.drawing import draw
 from boulder_sweep.impact.simulation import simulate
@@ -63,21 +65,9 @@ class Validation:
 
     def table(self) -> Table:
         """Return both tests under both presets."""
-        table = Table(
-            (
-                "test",
-                "readings",
-                "verdict",
-                "max rotation [deg]",
-                "at [s]",
-                "20° at [s]",
-                "max x_b [m]",
-                "max boulder centre [m]",
-                "max vehicle [m]",
-                "at [s]",
-                "peak force [kN]",
-            )
-        )
+        rotation = ("max rotation [deg]", "at [s]", "20° at [s]")
+        moved = ("max x_b [m]", "max boulder centre [m]", "max vehicle [m]", "at [s]")
+        table = Table(("test", "readings", "verdict", *rotation, *moved, "peak force [kN]"))
         for (test, preset), row in self.rows().items():
             table.add(
                 NAMES[test],
@@ -102,16 +92,8 @@ class Validation:
         """Return the report for a terminal."""
         moving = any(row["vehicle_still_moving"] for row in self.rows().values())
         footnote = ["* still moving at the end of the simulated time"] if moving else []
-        return "\n".join(
-            [
-                self.table().text(),
-                *footnote,
-                "",
-                statement_table(self.statements).text(),
-                "",
-                self.convergence.table().text(),
-            ]
-        )
+        tables = [statement_table(self.statements), self.convergence.table()]
+        return "\n".join([self.table().text(), *footnote, *(f"\n{table.text()}" for table in tables)])
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the time histories as plain data."""
@@ -144,8 +126,6 @@ def validate(out: str | Path | None = None) -> Validation:
     PictureError
         The folder cannot be written, or matplotlib is not installed.
     """
-    from boulder_sweep.crash_tests.cases import rigid_wall_test
-
     trajectories = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
     study = convergence()
     wall = rigid_wall_test()

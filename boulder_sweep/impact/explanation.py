@@ -15,7 +15,8 @@ import numpy as np
 from boulder_kernels import Control, Readings
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OutcomeColumn
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.judge.evaluation import Evaluation, known_control
+from boulder_sweep.judge.accuracy import known_control
+from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
@@ -138,19 +139,9 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         return Explanation(name=folder.name, recomputed={}, changed=(), trajectory=None, unfamiliar=why, **own)
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
-    model = sweep.model
-    laws = model.second_opinion if can_be_asked(sweep) else ()
-    evaluation = Evaluation(
-        readings,
-        control,
-        limits,
-        resistance=model.resistance,
-        ground=model.ground,
-        second_opinion=laws,
-        shape=model.shape,
-    )
-    judged = evaluation(block)
-    again = part_table(block, judged, {}).to_pylist()[0]
+    laws = sweep.model.second_opinion if can_be_asked(sweep) else ()
+    evaluation = Evaluation(readings, control, limits, model=sweep.model, second_opinion=laws)
+    again = part_table(block, evaluation(block), {}).to_pylist()[0]
     computable = not block.reasons[0]
     return Explanation(
         name=sweep.name,

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Constants, Design, Readings, Record, SecondSpring
+from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
+from boulder_kernels.design import Body
 from boulder_kernels.dynamics import (
     FREE,
     HELD,
@@ -19,7 +20,7 @@ from boulder_kernels.dynamics import (
     Acceleration,
 )
 from boulder_kernels.layered import SoilLayers
-from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
+from boulder_kernels.outlined import OutlinedElements, OutlinedPieces, body_beside, is_outlined
 from boulder_kernels.plastic import PlasticConstants, at_sample
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
 from boulder_kernels.time_history import Stored, evaluate_samples
@@ -35,6 +36,32 @@ MODE_NAMES = {
 }
 """Mode of rotation in words: gravity reading ``seated`` or ``turning``; printed reading ``held`` (the restoring
 moment equals the net moment), ``limited`` (it is at its limit), ``free`` (there is none)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Input and output of the kernels, in their own units."""
+
+    design: Design
+    readings: Readings
+    constants: Constants
+    control: Control
+    record: Record
+    outcome: Outcome
+    second: SecondSpring | None = None
+
+    @property
+    def body(self) -> Body:
+        """The boulder as a rigid body."""
+        return body_beside(self.design, getattr(self.constants, "soil", None))
+
+    @property
+    def outline(self) -> np.ndarray:
+        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outlined`; of a box that of the box."""
+        soil, half = getattr(self.constants, "soil", None), 0.5 * self.design.L
+        if soil is not None and is_outlined(soil):
+            return np.asarray(soil.outline)
+        return np.array([[z, self.design.W, half, half] for z in (0.0, self.design.H)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,29 +121,23 @@ class EnergyLedger:
         return largest / self.initial if largest > 0.0 else 0.0
 
 
-def forces_along(
-    record: Record, design: Design, readings: Readings, c: Constants, second: SecondSpring | None = None
-) -> dict[str, np.ndarray]:
+def forces_along(motion: Motion) -> dict[str, np.ndarray]:
     """Evaluate the forces at the samples of a record.
 
     Parameters
     ----------
-    record
+    motion
         The recorded motion, n samples.
-    design, readings, c
-        The design, its readings and the constants of its motion.
-    second
-        Second spring of the vehicle, if it has one.
 
     Returns
     -------
     dict of str to ndarray
         Arrays of shape (n,) by the names of the trajectory's columns.
     """
-    (a_b, alpha_b, a_v, M), _, _ = _evaluated(record, design, readings, c, second)
-    theta = record.states[:, 2]
+    (a_b, alpha_b, a_v, M), _, _ = _evaluated(motion)
+    c, theta = motion.constants, motion.record.states[:, 2]
     # As printed the truck is pulled back by a force that the boulder does not feel: only contact counts here.
-    F_v = np.where(record.touching, -design.m_v * a_v, 0.0)
+    F_v = np.where(motion.record.touching, -motion.design.m_v * a_v, 0.0)
     M_v = F_v * (c.h * np.cos(theta) + c.g_x * np.sin(theta))
     return {
         "vehicle_acceleration_m_s2": a_v,
@@ -128,28 +149,22 @@ def forces_along(
     }
 
 
-def ledger_of(
-    record: Record, design: Design, readings: Readings, c: Constants, second: SecondSpring | None = None
-) -> EnergyLedger:
+def ledger_of(motion: Motion) -> EnergyLedger:
     """Draw up the energy ledger at the samples of a record.
 
     Parameters
     ----------
-    record
+    motion
         The recorded motion, n samples, with the energies exchanged.
-    design, readings, c
-        The design, its readings and the constants of its motion.
-    second
-        Second spring of the vehicle, if it has one.
 
     Returns
     -------
     EnergyLedger
         Arrays of shape (n,).
     """
-    _, stored, (spent, before, since) = _evaluated(record, design, readings, c, second)
+    _, stored, (spent, before, since) = _evaluated(motion)
     truck, linear, angular, elastic, spring, potential = stored
-    drag, damper, restoring, pull = record.exchanged.T
+    drag, damper, restoring, pull = motion.record.exchanged.T
     parts = {
         "vehicle_kinetic_J": truck,
         "crush_spring_J": spring,
@@ -160,24 +175,23 @@ def ledger_of(
         "soil_elastic_J": elastic - since,
         "soil_plastic_J": before + since,
         "soil_drag_J": drag.copy(),
-        "gravity_J": potential if readings.restoring_gravity else restoring.copy(),
+        "gravity_J": potential if motion.readings.restoring_gravity else restoring.copy(),
         "pull_J": -pull,
     }
     at_first_touch = truck[0] if len(truck) else 0.0
     residual = np.sum(list(parts.values()), axis=0) - at_first_touch
-    return EnergyLedger(time_s=record.times, **parts, residual_J=residual)
+    return EnergyLedger(time_s=motion.record.times, **parts, residual_J=residual)
 
 
-def _evaluated(
-    record: Record, design: Design, readings: Readings, c: Constants, second: SecondSpring | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return rates, stored and spent energies at the samples of a record, see `evaluate_samples`."""
+    record, c, m_v = motion.record, motion.constants, motion.design.m_v
     n = len(record.times)
     rates, stored, spent = (np.empty((count, n)) for count in (len(Acceleration._fields), len(Stored._fields), 3))
     if not len(record.offset):
         record = record._replace(offset=np.zeros(n))
     if n:
-        evaluate_samples(record, at_sample(c, 0), second, design.m_v, readings, rates, stored, spent)
+        evaluate_samples(record, at_sample(c, 0), motion.second, m_v, motion.readings, rates, stored, spent)
     return rates, stored, spent
 
 
@@ -187,27 +201,24 @@ class SoilProfile:
 
     depth_m: np.ndarray
     """Depth of the middle of each slice below the soil line."""
-    displacement_m: np.ndarray
-    """Displacement of the soil there (Eq 22)."""
     force_N: np.ndarray
     """Force of each slice on the boulder, spring and drag (Eq 19)."""
 
 
-def soil_profile(record: Record, sample: int, slices: int, c: Constants) -> SoilProfile:
+def soil_profile(motion: Motion, sample: int, slices: int) -> SoilProfile:
     """Cut the soil along the buried face into slices of equal height at one sample.
 
     Parameters
     ----------
-    record
+    motion
         The recorded motion.
     sample
         Which sample.
     slices
         How many slices; each stands for the soil element in its middle.
-    c
-        Constants of the motion.
     """
-    x_b, v_b, theta, omega, _, _ = (float(value) for value in record.states[sample])
+    c = motion.constants
+    x_b, v_b, theta, omega, _, _ = (float(value) for value in motion.record.states[sample])
     versine = 2.0 * np.sin(0.5 * theta) ** 2
     k = soil_kinematics(x_b, v_b, omega, float(np.sin(theta)), float(versine), c)
     ratio = (np.arange(slices) + 0.5) / slices
@@ -215,13 +226,13 @@ def soil_profile(record: Record, sample: int, slices: int, c: Constants) -> Soil
     velocity = k.B - k.slope_v * ratio
     if not isinstance(c, Constants):
         pressed = _pressed_at(ratio, displacement, velocity, at_sample(c, sample)) / slices
-        return SoilProfile(ratio * c.d, displacement, -pressed)
+        return SoilProfile(ratio * c.d, -pressed)
     height = c.d / slices
     force = [
         -(spring_force(float(u), float(r * c.d), height, c) + drag_force(float(v), height, c))
         for u, v, r in zip(displacement, velocity, ratio, strict=True)
     ]
-    return SoilProfile(ratio * c.d, displacement, np.array(force))
+    return SoilProfile(ratio * c.d, np.array(force))
 
 
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:

@@ -25,11 +25,12 @@ from boulder_kernels.error_estimates import SAFETY, SAFETY_PRINTED, estimate_err
 from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
 from boulder_sweep.columns import AT_REST, BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
-from boulder_sweep.impact.trajectory import Motion, Trajectory
-from boulder_sweep.judge.evaluation import evaluation_of, readings_of
+from boulder_sweep.impact.history import Motion
+from boulder_sweep.impact.trajectory import Trajectory
+from boulder_sweep.judge.accuracy import accuracy_of, readings_of
+from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, OVERTURNS, Judged
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.verdict import judge
@@ -119,7 +120,7 @@ def simulate(
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    designs = designs_of(block, None, sweep.model.resistance, sweep.model.ground, sweep.model.shape)
+    designs = designs_of(block, None, sweep.model)
     one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
     decided = evaluation.judged(designs)

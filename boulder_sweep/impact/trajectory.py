@@ -1,4 +1,4 @@
-"""The time history of one impact: arrays in SI units, their summary, and methods to draw and save them."""
+"""The time history of one impact: arrays in SI units, the register of its columns, summary, drawings and files."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
-from boulder_kernels.design import Body
-from boulder_kernels.outlined import body_beside, is_outlined
+from boulder_sweep.columns import ColumnSpec
 from boulder_sweep.drawing import draw
-from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, forces_along, ledger_of
-from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY, SPENT
+from boulder_sweep.errors import HistoryFileError
+from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, Motion, forces_along, ledger_of
 from boulder_sweep.judge.judged import Judged
-from boulder_sweep.text import printable
+from boulder_sweep.store.files import check_target, replacing
+from boulder_sweep.text import printable, why
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -30,30 +29,62 @@ _PEAK_TIMES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Input and output of the kernels, in their own units."""
+def _number(name: str, unit: str, meaning: str) -> ColumnSpec:
+    return ColumnSpec(name, "float64", unit, meaning)
 
-    design: Design
-    readings: Readings
-    constants: Constants
-    control: Control
-    record: Record
-    outcome: Outcome
-    second: SecondSpring | None = None
 
-    @property
-    def body(self) -> Body:
-        """The boulder as a rigid body."""
-        return body_beside(self.design, getattr(self.constants, "soil", None))
+HISTORY: tuple[ColumnSpec, ...] = (
+    _number("time_s", "s", "time since the first touch"),
+    _number("boulder_displacement_m", "m", "displacement x_b of the common centre of mass of boulder and soil wedge"),
+    _number(
+        "boulder_centre_displacement_m",
+        "m",
+        "displacement of the boulder's own centre of mass, as a camera tracks it (Eqs 53 to 55, corrected)",
+    ),
+    _number("boulder_velocity_m_s", "m/s", "velocity of the common centre of mass"),
+    _number("rotation_rad", "rad", "rotation theta_b of the boulder, positive with its top away from the vehicle"),
+    _number("angular_velocity_rad_s", "rad/s", "angular velocity of the boulder"),
+    _number("vehicle_displacement_m", "m", "displacement x_v of the vehicle"),
+    _number("vehicle_velocity_m_s", "m/s", "velocity of the vehicle"),
+    _number("vehicle_acceleration_m_s2", "m/s^2", "acceleration of the vehicle"),
+    _number("contact_force_N", "N", "force F_v of the vehicle on the boulder (Eq 47)"),
+    _number("contact_moment_N_m", "N*m", "its moment M_v about the common centre of mass (Eq 48)"),
+    _number("soil_force_N", "N", "sum of the soil's forces on the boulder (Eq 19)"),
+    _number("soil_moment_N_m", "N*m", "sum of the soil's moments about the common centre of mass (Eq 20)"),
+    _number("restoring_moment_N_m", "N*m", "restoring moment M_R of the boulder's weight (Eqs 37 to 39)"),
+    ColumnSpec("rotation_mode", "dictionary", "", "seated, turning, held, limited or free"),
+    ColumnSpec("in_contact", "dictionary", "", "touching or coasting"),
+)
 
-    @property
-    def outline(self) -> np.ndarray:
-        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outlined`; of a box that of the box."""
-        soil, half = getattr(self.constants, "soil", None), 0.5 * self.design.L
-        if soil is not None and is_outlined(soil):
-            return np.asarray(soil.outline)
-        return np.array([[z, self.design.W, half, half] for z in (0.0, self.design.H)])
+ENERGY: tuple[ColumnSpec, ...] = (
+    _number("energy_vehicle_kinetic_J", "J", "kinetic energy of the vehicle"),
+    _number("energy_crush_spring_J", "J", "stored in the spring of the vehicle's front"),
+    _number("energy_crush_damper_J", "J", "dissipated in the damper of the vehicle's front: permanent crush"),
+    _number("energy_boulder_linear_J", "J", "kinetic energy of boulder and soil wedge in translation"),
+    _number("energy_boulder_angular_J", "J", "kinetic energy of boulder and soil wedge in rotation"),
+    _number("energy_soil_elastic_J", "J", "stored in the springs of the soil"),
+    _number("energy_soil_plastic_J", "J", "plastic work of the soil; 0 in elastic soil"),
+    _number("energy_soil_drag_J", "J", "dissipated by the drag of the soil"),
+    _number(
+        "energy_gravity_J",
+        "J",
+        "done against the boulder's weight: potential energy of the gravity couple; as printed the work of M_R",
+    ),
+    _number(
+        "energy_pull_J",
+        "J",
+        "printed separation only: work of the pull on the vehicle that nothing on the boulder answers, negative "
+        "where energy appears from nowhere",
+    ),
+    _number("energy_residual_J", "J", "sum of all parts minus the vehicle's energy at first touch"),
+)
+
+SPENT = _number(
+    "energy_crush_spent_J", "J", "spent where the second spring of the vehicle's front took over: permanent crush"
+)
+"""Of vehicles with a second spring only."""
+
+_BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY, SPENT)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +168,6 @@ class Trajectory:
         x_b, v_b, theta, omega, x_v, v_v = record.states.T
         body = motion.body
         along, up = body.x - c.c_x, body.y - c.c_y
-        forces = forces_along(record, motion.design, motion.readings, c, motion.second)
         return cls(
             name=name,
             design_id=design_id,
@@ -151,7 +181,7 @@ class Trajectory:
             angular_velocity_rad_s=omega,
             vehicle_displacement_m=x_v,
             vehicle_velocity_m_s=v_v,
-            **forces,
+            **forces_along(motion),
             rotation_mode=np.array([MODE_NAMES[int(mode)] for mode in record.turning], dtype=object),
             in_contact=np.where(record.touching, "touching", "coasting").astype(object),
             judged=judged,
@@ -179,8 +209,7 @@ class Trajectory:
 
     def energy(self) -> EnergyLedger:
         """Return where the vehicle's energy is at every sample."""
-        motion = self.motion
-        return ledger_of(motion.record, motion.design, motion.readings, motion.constants, motion.second)
+        return ledger_of(self.motion)
 
     def summary(self) -> dict[str, Any]:
         """Return the outcome in the names and units of the table, with the times of the maxima.
@@ -213,14 +242,25 @@ class Trajectory:
         return found
 
     def to_arrow(self, *, energy: bool = False) -> pa.Table:
-        """Return the time history as an Arrow table with unit and meaning of every column in its field metadata."""
-        # pyarrow is heavy, and only files need it.
-        from boulder_sweep.impact.trajectory_file import arrow_table
+        """Return the time history as an Arrow table.
+
+        Unit and meaning of every column stand in its field metadata; settings, versions and the call that repeats it in
+        the metadata of the file, see `boulder_sweep.store.provenance.file_metadata`.
+        """
+        import pyarrow as pa  # heavy, and only files need it
+
         from boulder_sweep.store.provenance import file_metadata, identity
 
+        types = {"float64": pa.float64(), "dictionary": pa.dictionary(pa.int32(), pa.string())}
+        fields, arrays = [], []
+        for name, values in self.columns(energy=energy).items():
+            spec = _BY_NAME[name]
+            array = pa.array(values)
+            arrays.append(array.dictionary_encode() if spec.type == "dictionary" else array)
+            fields.append(pa.field(name, types[spec.type], metadata={"unit": spec.unit, "meaning": spec.meaning}))
         found = identity(self.settings, self.settings["model"]["readings"], self.motion.control._asdict())
         repeat = f"boulder_sweep.simulate({self.name!r}, {self.design_id})"
-        return arrow_table(self.columns(energy=energy), file_metadata(found, repeat))
+        return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=file_metadata(found, repeat)))
 
     def to_parquet(self, path: str | Path, *, energy: bool = False) -> None:
         """Write the time history to a Parquet file.
@@ -237,9 +277,15 @@ class Trajectory:
         HistoryFileError
             The name does not end in ``.parquet``, its folder does not exist, or it cannot be written.
         """
-        from boulder_sweep.impact.trajectory_file import write  # pyarrow is heavy, and only files need it
+        import pyarrow.parquet as pq  # heavy, and only files need it
 
-        write(self.to_arrow(energy=energy), path)
+        table = self.to_arrow(energy=energy)
+        target = checked_history(path)
+        try:
+            with replacing(target) as file:
+                pq.write_table(table, file, compression="zstd", write_page_checksum=True)
+        except OSError as problem:
+            raise HistoryFileError(f"{path} cannot be written: {why(problem)}") from problem
 
     def plot(self, path: str | Path, *, units: str = "si") -> None:
         """Draw rotation, displacements and force over time.
@@ -283,3 +329,18 @@ def _plain(value: Any) -> float | None:
     """Number for JSON; None for NaN."""
     number = float(value)
     return number if math.isfinite(number) else None
+
+
+def checked_history(path: str | Path) -> Path:
+    """Return the path of a time history if it can be written there.
+
+    Raises
+    ------
+    HistoryFileError
+        The name has another ending, its folder does not exist or holds the result of a run, or it cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ".parquet":
+        raise HistoryFileError(f"{path}: a time history is a Parquet file; its name must end in .parquet")
+    check_target(target, HistoryFileError)
+    return target

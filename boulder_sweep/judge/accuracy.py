@@ -1,11 +1,20 @@
-"""From the requested accuracy to a time step, and how it is reported."""
+"""From the requested accuracy to the control of the integrator: time steps by name, or by a pilot run on a sample."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from boulder_kernels.table import finer_step
+import numpy as np
+
+from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
+from boulder_kernels.table import finer_step, is_paired
+from boulder_sweep.judge.inputs import Designs, sampled_designs
+from boulder_sweep.settings.model import UNLOADINGS
+from boulder_sweep.soils import is_layered
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -32,10 +41,21 @@ LADDER = (
     *(Steps(1e-3 * step, locate_yield=True) for step in (0.75, 0.5625, 0.375, 0.1875)),
 )
 """Steps a pilot run chooses from, cheapest first. Still longer steps save little because events dominate the cost."""
-
-
 ELEMENTS_AS_FAST = 16
 """Number of soil elements that cost about as much as the closed form."""
+OUTLINES_IN_LANES = 100_000
+"""Below so many designs boulders of several pieces are simulated one after another: lanes are twice as fast, but take a
+minute and a half longer to compile for eight pieces, and are mostly idle where few rows are late."""
+LONGEST_HORIZON = 10.0
+"""A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
+DESIGNS = 4096
+"""Designs of a pilot run, soil in closed form."""
+FEWEST_DESIGNS = 256
+"""Smallest number of designs, for any number of soil elements."""
+QUANTILE = 0.999
+"""Fraction of the designs whose estimated error must not exceed the requested accuracy."""
+AT_ONCE, AT_ONCE_CLOSED = 256, 4096
+"""Designs simulated per call, with element sums and in closed form: an interruption waits for the current call."""
 
 
 @dataclass(frozen=True)
@@ -92,3 +112,121 @@ class Accuracy:
 def steps_of(sweep: Sweep) -> dict[str, Steps]:
     """Return the steps of the named accuracies for the readings of a sweep."""
     return STEPS_PRINTED if sweep.model.readings.restoring == "printed" else STEPS
+
+
+def readings_of(sweep: Sweep) -> Readings:
+    """Return the readings of a sweep's model as the kernels name them."""
+    return Readings(*sweep.model.readings.corrected)
+
+
+def known_control(recorded: Mapping[str, Any]) -> Control:
+    """Return the control that a table records, without entries of another version that this one does not know."""
+    return Control(**{name: value for name, value in recorded.items() if name in Control._fields})
+
+
+def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
+    """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate."""
+    shape = sweep.model.shape
+    return Control(
+        h=accuracy.steps.step_s,
+        horizon=float(sweep.solver.horizon_s),
+        theta_limit=math.radians(sweep.criterion.max_rotation_deg),
+        elements=int(sweep.model.elements),
+        error_estimate=accuracy.error_estimate,
+        locate_yield=accuracy.steps.locate_yield,
+        longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
+        unloading=UNLOADINGS.index(sweep.model.unloading),
+        paired=accuracy.paired,
+        side_by_side=shape.is_box or len(shape.points) == 2 or sweep.n_designs >= OUTLINES_IN_LANES,
+    )
+
+
+def accuracy_of(sweep: Sweep) -> Accuracy:
+    """Return how accurately a sweep is computed.
+
+    If the accuracy is a number, a pilot run on a sample of the sweep chooses the step. The sample, and therefore the
+    step, depends only on the settings.
+
+    Parameters
+    ----------
+    sweep
+        The sweep, with a step, a named accuracy, or a tolerance [deg].
+    """
+    solver = sweep.solver
+    if solver.step_s is not None:
+        return Accuracy("step", Steps(solver.step_s), error_estimate=False)
+    if isinstance(solver.accuracy, float):
+        return pilot(sweep, solver.accuracy)
+    name = str(solver.accuracy)
+    found = Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
+    model = sweep.model
+    layered = is_layered(model.resistance, model.ground, model.shape)
+    paired = is_paired(readings_of(sweep), control_of(sweep, found), layered=layered)
+    return replace(found, paired=found.error_estimate and paired)
+
+
+@lru_cache(maxsize=8)
+def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
+    """Choose the step of a sweep by a pilot run on a sample of its designs.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    wanted_deg
+        Tolerance of the rotation [deg], to be met by a fraction `QUANTILE` of the designs.
+
+    Returns
+    -------
+    Accuracy
+        The first steps of `LADDER` that meet it, or those that come closest if none does.
+    """
+    designs = sampled_designs(sweep, pilot_size(sweep.model.elements))
+    readings = readings_of(sweep)
+    found: list[tuple[float, int]] = []
+    for rung, steps in enumerate(LADDER):
+        control = control_of(sweep, Accuracy("", steps, error_estimate=True, paired=True))
+        # Rounded, so that a processor that differs in the last bits finds the same.
+        achieved = float(f"{estimated_error_deg(designs, readings, control):.3g}")
+        found.append((achieved, rung))
+        if achieved <= wanted_deg:
+            break
+    achieved, rung = min(found)
+    return Accuracy(
+        asked=f"{wanted_deg:g} deg",
+        steps=LADDER[rung],
+        error_estimate=True,
+        achieved_deg=achieved,
+        pilot_designs=designs.size,
+        met=achieved <= wanted_deg,
+        paired=True,
+    )
+
+
+def pilot_size(elements: int) -> int:
+    """Return the number of designs in a pilot run, by the number of soil elements (0: closed form)."""
+    return max(FEWEST_DESIGNS, DESIGNS * ELEMENTS_AS_FAST // max(elements, ELEMENTS_AS_FAST))
+
+
+def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
+    """Simulate designs in pieces, so that an interruption takes effect soon."""
+    size = AT_ONCE if control.elements or designs.laws else AT_ONCE_CLOSED
+    rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
+    pieces = [simulate_table(some.table, readings, control, *some.laws) for some in rows]
+    return type(pieces[0])(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+
+
+def estimated_error_deg(designs: Designs, readings: Readings, control: Control) -> float:
+    """Quantile of the estimated errors of the rotation [deg]; 0 where no error could be estimated.
+
+    A boulder that overturns has no error of its largest rotation, but its other errors stand for one: those of the
+    displacements, over the embedment depth or half the height of the boulder, as `estimate_errors` compares them.
+    """
+    outcomes = simulated(designs, readings, control)
+    arm = np.maximum(designs.table.d, 0.5 * designs.table.H)
+    limit = (outcomes.status == Status.LIMIT) & np.isfinite(outcomes.theta_error)
+    errors = np.where(limit, outcomes.x_error / arm, outcomes.theta_error)
+    counts = ~np.isnan(errors)
+    if not counts.any():
+        return 0.0
+    return math.degrees(float(np.quantile(errors[counts], QUANTILE, method="higher")))

@@ -7,7 +7,7 @@ that cannot be computed are not simulated; they come back with their reason.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,25 +18,18 @@ from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
+from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import RowStates, finer_controls
 from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judge, limits_of
-from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS, Ground
-from boulder_sweep.settings.shape import Shape
+from boulder_sweep.settings.model import SECOND_OPINIONS, Model
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
-    from boulder_sweep.judge.accuracy import Accuracy
     from boulder_sweep.settings import Sweep
-
-OUTLINES_IN_LANES = 100_000
-"""Below so many designs boulders of several pieces are simulated one after another: lanes are twice as fast, but take a
-minute and a half longer to compile for eight pieces, and are mostly idle where few rows are late."""
-LONGEST_HORIZON = 10.0
-"""A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 
 Simulate = Callable[..., OutcomeTable]
 """Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
@@ -69,20 +62,16 @@ class Evaluation:
         Function that simulates a table of designs.
     only
         Outcome columns wanted, verdict and reason among them; all of the table where empty.
-    resistance
-        Law of the ultimate resistance of the soil.
+    model
+        Resistance, layers, water, cohesion and slope of the soil, and shape of the boulders.
     second_spring
         Whether the vehicles have a second spring, for which other kernels are compiled.
-    ground
-        Layers, water, cohesion and slope of the soil.
     least_margin
         Margin that a question asks for, from 0 to less than 1; see `judged`.
     second_opinion
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
     askable
         Whether second opinions know such designs.
-    shape
-        Shape of the boulders.
     """
 
     readings: Readings
@@ -90,13 +79,11 @@ class Evaluation:
     limits: Limits
     simulate: Simulate = by_kernels
     only: tuple[str, ...] = ()
-    resistance: str = RESISTANCES[0]
+    model: Model = field(default_factory=Model)
     second_spring: bool = False
-    ground: Ground = field(default_factory=Ground)
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
     askable: bool = False
-    shape: Shape = field(default_factory=Shape)
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -127,7 +114,7 @@ class Evaluation:
 
     def designs(self, block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
         """Return the designs of a block, or some of them, as the kernels take them."""
-        return designs_of(block, rows, self.resistance, self.ground, self.shape)
+        return designs_of(block, rows, self.model)
 
     def judged(self, designs: Designs) -> Judged:
         """Simulate and judge designs that can be computed.
@@ -171,7 +158,7 @@ class Evaluation:
             return judged
         limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
         passes = designs.rows(judged.verdict == PASS)
-        return with_second_opinions(judged, passes, self.second_opinion, self.resistance, limits, self.longest_s)
+        return with_second_opinions(judged, passes, self.second_opinion, self.model.resistance, limits, self.longest_s)
 
     def asked(self) -> Evaluation:
         """Return the same with every second opinion, where they can be asked."""
@@ -183,7 +170,7 @@ class Evaluation:
         if not self.askable or not passing.any():
             return judged
         passes = self.designs(block, passing)
-        return with_second_opinions(judged, passes, SECOND_OPINIONS, self.resistance, self.limits, self.longest_s)
+        return with_second_opinions(judged, passes, SECOND_OPINIONS, self.model.resistance, self.limits, self.longest_s)
 
     @property
     def longest_s(self) -> float:
@@ -231,7 +218,8 @@ class Evaluation:
     def warm_up(self) -> None:
         """Load or compile the kernels by simulating one step of a plain design."""
         springs = PLAIN_SPRINGS if self.second_spring else None
-        table = with_soil(PLAIN_DESIGN.table, self.resistance, self.ground, shape=self.shape)
+        model = self.model
+        table = with_soil(PLAIN_DESIGN.table, model.resistance, model.ground, shape=model.shape)
         plain = PLAIN_DESIGN._replace(table=table, springs=springs)
         self.simulate(plain.table, self.readings, self.control._replace(horizon=self.control.h), *plain.laws)
         if self.second_opinion:
@@ -267,42 +255,14 @@ def evaluation_of(
     sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels, *, proved: bool = True
 ) -> Evaluation:
     """Return how the designs of a sweep are simulated, with a given accuracy, and judged; `proved` as of `Limits`."""
+    askable = can_be_asked(sweep)
     return Evaluation(
         readings=readings_of(sweep),
         control=control_of(sweep, accuracy),
         limits=limits_of(sweep, proved=proved),
         simulate=simulate,
-        resistance=sweep.model.resistance,
+        model=sweep.model,
         second_spring=SECOND_SPRING in sweep.plan.columns,
-        ground=sweep.model.ground,
-        second_opinion=sweep.model.second_opinion if can_be_asked(sweep) else (),
-        askable=can_be_asked(sweep),
-        shape=sweep.model.shape,
-    )
-
-
-def readings_of(sweep: Sweep) -> Readings:
-    """Return the readings of a sweep's model as the kernels name them."""
-    return Readings(*sweep.model.readings.corrected)
-
-
-def known_control(recorded: Mapping[str, Any]) -> Control:
-    """Return the control that a table records, without entries of another version that this one does not know."""
-    return Control(**{name: value for name, value in recorded.items() if name in Control._fields})
-
-
-def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
-    """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate."""
-    shape = sweep.model.shape
-    return Control(
-        h=accuracy.steps.step_s,
-        horizon=float(sweep.solver.horizon_s),
-        theta_limit=math.radians(sweep.criterion.max_rotation_deg),
-        elements=int(sweep.model.elements),
-        error_estimate=accuracy.error_estimate,
-        locate_yield=accuracy.steps.locate_yield,
-        longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
-        unloading=UNLOADINGS.index(sweep.model.unloading),
-        paired=accuracy.paired,
-        side_by_side=shape.is_box or len(shape.points) == 2 or sweep.n_designs >= OUTLINES_IN_LANES,
+        second_opinion=sweep.model.second_opinion if askable else (),
+        askable=askable,
     )

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import ELASTIC, DesignTable, Readings, as_printed, corrected
-from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED
+from boulder_sweep.judge.accuracy import QUANTILE, STEPS, STEPS_PRINTED, accuracy_of, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.inputs import plain_designs, sampled_designs
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import QUANTILE, accuracy_of, plain_designs, sampled_designs, simulated
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.judge.verdict import judge

@@ -1,7 +1,13 @@
-"""Designs as the judge takes them: in the units of the kernels, with what only the verdict asks for beside."""
+"""Designs as the judge takes them, whole blocks and samples of a sweep.
+
+They are in the units of the kernels, with what only the verdict asks for beside.
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,12 +17,12 @@ from boulder_kernels.layered import OutlinedTable
 from boulder_kernels.outlined import FAR, HEIGHT, NEAR
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import LEAST_SOLIDITY, SECOND_SPRING, solidity_of
-from boulder_sweep.settings.model import RESISTANCES, Ground
-from boulder_sweep.settings.shape import Shape
+from boulder_sweep.settings.model import Model
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.settings import Sweep
 
 SOURCES = {
     "L": "boulder_length_m",
@@ -97,9 +103,7 @@ class Designs(NamedTuple):
 def designs_of(
     block: DesignBlock,
     rows: np.ndarray | None = None,
-    resistance: str = RESISTANCES[0],
-    ground: Ground | None = None,
-    shape: Shape | None = None,
+    model: Model | None = None,
 ) -> Designs:
     """Return the designs of a block.
 
@@ -109,13 +113,12 @@ def designs_of(
         Inputs of n rows under the names and units of the table.
     rows
         Which of them (bool, shape (n,)); all by default.
-    resistance
-        Law of the ultimate resistance of the soil.
-    ground
-        Layers, water, cohesion and slope of the soil; none by default.
-    shape
-        Shape of the boulders; boxes by default.
+    model
+        What is not in the block: the law of the soil's resistance, its layers, water, cohesion and slope, and the shape
+        of the boulders. By default the paper's law, the usual soil, and boxes.
     """
+    model = model or Model()
+    shape = model.shape
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
     springs = None
@@ -123,7 +126,7 @@ def designs_of(
         springs = SecondSprings(
             _values(block, SECOND_SPRING, rows), _values(block, "vehicle_second_spring_from_m", rows)
         )
-    fills, rocks, shape = None, None, shape or Shape()
+    fills, rocks = None, None
     if not shape.is_box:
         fills = np.full(len(columns["L"]), shape.filled)
     if BOULDER_MASS in block.columns:
@@ -133,7 +136,7 @@ def designs_of(
         # What is simulated has the mass of the boulder.
         volume = sides[0] * sides[1] * sides[2]
         columns["rho_b"] = mass / (volume if shape.is_box else volume * shape.filled)
-    table = with_soil(DesignTable(**columns), resistance, ground or Ground(), shape=shape)
+    table = with_soil(DesignTable(**columns), model.resistance, model.ground, shape=shape)
     return Designs(table, _values(block, "bed_offset_m", rows), springs, fills, rocks)
 
 
@@ -145,3 +148,75 @@ def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarra
     else:
         values = column.values[rows] if column.codes is None else column.values[column.codes[rows]]
     return np.ascontiguousarray(values, dtype=np.float64)
+
+
+MOST_CORNERS = 64
+"""Corners of a grid that a sample holds at most."""
+
+
+def sampled_rows(sweep: Sweep, count: int) -> np.ndarray:
+    """Choose rows of a sweep.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    count
+        Approximate number of rows; all rows if the sweep has no more.
+
+    Returns
+    -------
+    ndarray of int64, shape (n,)
+        Row numbers, ascending, each once: the corners of the grid, and rows along a sequence that fills all axes
+        evenly at once (every axis is cut into as many strata as it has values). A list of designs has one axis.
+    """
+    lengths = sweep.plan.lengths
+    if sweep.n_designs <= count:
+        return np.arange(sweep.n_designs)
+    places = _corners(lengths, min(count, MOST_CORNERS))
+    spread = _spread(lengths, count - len(places))
+    rows = np.concatenate([np.array(places, dtype=np.int64).reshape(-1, len(lengths)), spread]) @ np.array(
+        sweep.plan.strides, dtype=np.int64
+    )
+    return np.unique(rows)
+
+
+def _corners(lengths: tuple[int, ...], most: int) -> list[tuple[int, ...]]:
+    """Places of the corners; if there are too many, both ends and their neighbours along one axis."""
+    ends = [(0, length - 1) if length > 1 else (0,) for length in lengths]
+    if math.prod(len(pair) for pair in ends) <= most:
+        return list(product(*ends))
+    first, last = tuple(pair[0] for pair in ends), tuple(pair[-1] for pair in ends)
+    found = [first, last]
+    for axis in range(len(ends)):
+        found.append((*first[:axis], last[axis], *first[axis + 1 :]))
+        found.append((*last[:axis], first[axis], *last[axis + 1 :]))
+    return found[:most]
+
+
+def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:
+    """Places along Roberts' sequence, whose steps are powers of the root of x^(k+1) = x + 1, shape (count, k)."""
+    k = len(lengths)
+    root = 2.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (k + 1))
+    steps = root ** -np.arange(1.0, k + 1.0)
+    along = (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0
+    sizes = np.array(lengths, dtype=np.int64)
+    return np.minimum((along * sizes).astype(np.int64), sizes - 1)
+
+
+def sampled_designs(sweep: Sweep, count: int) -> Designs:
+    """Return about this many designs of a sweep, without those that cannot be computed; stones as boxes."""
+    return designs_of(*_sampled(sweep, count), replace(sweep.model, profile=(), taper=1.0))
+
+
+def plain_designs(sweep: Sweep, count: int) -> Designs:
+    """Return the same designs in the soil that their inputs describe, by the paper's law, stones by their profile."""
+    return designs_of(*_sampled(sweep, count), Model(profile=sweep.model.profile, taper=sweep.model.taper))
+
+
+def _sampled(sweep: Sweep, count: int) -> tuple[DesignBlock, np.ndarray]:
+    """Return a block of about this many designs, and which of them can be computed."""
+    block = sweep.plan.selection(sampled_rows(sweep, count))
+    return block, np.asarray(block.reasons.codes) == 0

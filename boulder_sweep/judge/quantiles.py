@@ -16,7 +16,7 @@ import numpy as np
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.pilot import sampled_rows
+from boulder_sweep.judge.inputs import sampled_rows
 from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shown_units import quantity_text

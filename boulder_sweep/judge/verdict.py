@@ -155,7 +155,8 @@ def judge(
         if only and spec.name not in only:
             continue
         if spec.name == "validity":
-            facts = _with_flags(facts)
+            flags, named = flagged(facts)
+            facts = facts._replace(validity=flags, words=facts.words | {"validity": named})
         if spec.name == "robustness":
             facts = facts._replace(robustness=grades_without_asking(facts))
         values = spec.value(facts)
@@ -188,7 +189,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     failed = rule == verdicts.NOT_COMPUTED
     reasons: tuple[str, ...] = REASONS
     if failed.any():
-        reason[failed], reasons = _error_reasons(status[failed], _is_one_of(status[failed], SIMULATED))
+        reason[failed], reasons = _error_reasons(status[failed])
     standing, overturned = rule >= verdicts.PENETRATION, rule == verdicts.OVERTURNS
     computed = standing | overturned
     rated = standing & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
@@ -217,12 +218,6 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     )
 
 
-def _with_flags(facts: Facts) -> Facts:
-    """Return what is known with the flags found out."""
-    flags, named = flagged(facts)
-    return facts._replace(validity=flags, words=facts.words | {"validity": named})
-
-
 def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
     """Return the limits of a sweep; `proved` as of `Limits`."""
     preset = sweep.model.preset
@@ -239,11 +234,6 @@ def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
     )
 
 
-def _is_one_of(status: np.ndarray, kinds: tuple[Status, ...]) -> np.ndarray:
-    """Which rows ended in one of some ways, bool; many times as fast as `numpy.isin` for so few."""
-    return np.logical_or.reduce([status == kind for kind in kinds])
-
-
 def _ratings(penetration: np.ndarray) -> np.ndarray:
     """Code of the best rating that each penetration [m] achieves; -1 beyond the last and for NaN."""
     codes = np.zeros(penetration.shape, dtype=np.int32)
@@ -253,8 +243,10 @@ def _ratings(penetration: np.ndarray) -> np.ndarray:
     return codes
 
 
-def _error_reasons(status: np.ndarray, not_finite: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+def _error_reasons(status: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
     """Reason codes of rows that could not be computed, and the reasons they index."""
+    # Many times as fast as `numpy.isin` for so few.
+    not_finite = np.logical_or.reduce([status == kind for kind in SIMULATED])
     texts = {int(kind): text for kind, text in STATUS_REASONS.items()}
     rows = {
         texts.get(int(kind), f"the kernels ended with the unknown status {kind}"): status == kind

@@ -15,8 +15,8 @@ import numpy as np
 from boulder_sweep.answers.files import UNCERTAINTY, AnswerFile, kind_of
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.explanation import one_design
-from boulder_sweep.judge.evaluation import evaluation_of, known_control
-from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.accuracy import accuracy_of, known_control
+from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.quantities import NEEDED, quantities_by
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME

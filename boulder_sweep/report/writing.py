@@ -11,8 +11,7 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
-from boulder_sweep.judge.evaluation import control_of, known_control, readings_of
-from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.accuracy import accuracy_of, control_of, known_control, readings_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import answer_of

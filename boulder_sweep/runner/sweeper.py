@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boulder_sweep.errors import ClusterLostError, ComputationError, Interrupted
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from boulder_sweep.errors import ScanError
-from boulder_sweep.stones.fitting import Profile, fitted, sides_of
+from boulder_sweep.stones.profiles import Profile, Sections, doubled_share, fitted, sections_of, sides_of
 from boulder_sweep.stones.rock import LEAST_FOOT, is_flat
-from boulder_sweep.stones.sections import Sections, doubled_share, sections_of
 
 if TYPE_CHECKING:
     from boulder_sweep.stones.solid import Solid

@@ -12,10 +12,9 @@ import numpy as np
 
 from boulder_kernels import Control, OutcomeTable, Readings, Status
 from boulder_kernels.control import STEP_RATIO
-from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, simulated
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED, Judged
-from boulder_sweep.judge.pilot import simulated
 from boulder_sweep.judge.verdict import Limits, judge
 
 FEWEST_DESIGNS = 64

@@ -21,9 +21,9 @@ from boulder_kernels._jit import plain
 from boulder_kernels.settling import proof_is_possible
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import NothingToMeasureError
-from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps
-from boulder_sweep.judge.evaluation import evaluation_of, readings_of
-from boulder_sweep.judge.pilot import sampled_designs
+from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps, readings_of
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.runner.pool import THREADING, pool
 from boulder_sweep.settings.model import UNLOADINGS

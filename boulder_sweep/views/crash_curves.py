@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.crash_tests.cases import NAMES
-from boulder_sweep.crash_tests.measured import simulated_signal
-from boulder_sweep.crash_tests.pulse import RESPONSES, UNITS
+from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES, PAPERS_N
+from boulder_sweep.crash_tests.fit_problem import RESPONSES
+from boulder_sweep.crash_tests.measured import PULSE_UNITS
 from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
-from boulder_sweep.crash_tests.statements import CLOSE_UNTIL_S, PAPERS_N
+from boulder_sweep.crash_tests.score import simulated_signal
 from boulder_sweep.store.files import replacing
 from boulder_sweep.views import figures
 from boulder_sweep.views.figures import BLACK, BLUE, GREY, ORANGE
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from boulder_sweep.crash_tests.cases import Convergence
+    from boulder_sweep.crash_tests.fitting import VehicleFit
     from boulder_sweep.crash_tests.measured import TimeHistory
-    from boulder_sweep.crash_tests.pulse import VehicleFit
     from boulder_sweep.crash_tests.rigid_wall import RigidWall
-    from boulder_sweep.crash_tests.statements import Convergence
     from boulder_sweep.crash_tests.validation import Validation
     from boulder_sweep.impact.trajectory import Trajectory
 
@@ -239,7 +239,7 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
     with figures.figure(path, max(3.4 * len(names), 5.6), 4.9) as fig:
         grid = fig.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(2.4, 1.0))
         for (above, below), name in zip(grid.T, names, strict=True):
-            unit = UNITS[name].replace("^2", "²")
+            unit = PULSE_UNITS[name].replace("^2", "²")
             above.plot(fit.pulse.time_s, fit.pulse.signals[name], ".", color=GREY, markersize=3.0, label="measured")
             above.plot(fine, RESPONSES[name](fit.wall, fine), color=ORANGE, label="Maxwell element")
             above.set_title(name.capitalize())

@@ -201,7 +201,7 @@ class SideView:
     def _soil_forces(self, sample: int) -> list[Shape]:
         motion = self.trajectory.motion
         c = motion.constants
-        profile = soil_profile(motion.record, sample, SLICES, c)
+        profile = soil_profile(motion, sample, SLICES)
         arrows = []
         for z, force in zip(profile.depth_m, profile.force_N, strict=True):
             length = float(force) * self.metres_per_newton

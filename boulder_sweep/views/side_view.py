@@ -88,34 +88,26 @@ def draw(axes: Axes, shapes: Iterable[Shape], *, behind: bool = False) -> list[A
     for shape in shapes:
         style = STYLES[shape.style]
         dash: Any = (0, style.dash) if style.dash else "-"
-        if shape.kind == "polygon":
-            patch: Any = Polygon(shape.points, facecolor=style.fill, edgecolor=style.line, linewidth=style.width)
-            artists.append(axes.add_patch(patch))
-        elif shape.kind == "circle":
-            patch = Circle(shape.points[0], shape.radius, facecolor=style.fill, edgecolor=style.line)
-            artists.append(axes.add_patch(patch))
+        if shape.kind == "text":
+            drawn: Any = axes.text(*shape.points[0], shape.text, fontsize=style.size, color=style.line, va="bottom")
+        elif shape.kind == "line":
+            x, y = zip(*shape.points, strict=True)
+            drawn = axes.add_line(Line2D(x, y, color=style.line, linewidth=style.width, linestyle=dash))
         elif shape.kind == "arrow":
             (x0, y0), (x1, y1) = shape.points
             head = min(HEAD_PT, HEAD_PT_PER_M * float(np.hypot(x1 - x0, y1 - y0)))
-            patch = FancyArrowPatch(
-                *shape.points,
-                arrowstyle="-|>",
-                mutation_scale=head,
-                shrinkA=0.0,
-                shrinkB=0.0,
-                color=style.line,
-                linewidth=style.width,
-            )
-            artists.append(axes.add_patch(patch))
-        elif shape.kind == "line":
-            x, y = zip(*shape.points, strict=True)
-            line = Line2D(x, y, color=style.line, linewidth=style.width, linestyle=dash)
-            artists.append(axes.add_line(line))
+            look: Any = {"arrowstyle": "-|>", "mutation_scale": head, "shrinkA": 0.0, "shrinkB": 0.0}
+            arrow = FancyArrowPatch(*shape.points, **look, color=style.line, linewidth=style.width)
+            drawn = axes.add_patch(arrow)
+        elif shape.kind == "circle":
+            circle = Circle(shape.points[0], shape.radius, facecolor=style.fill, edgecolor=style.line)
+            drawn = axes.add_patch(circle)
         else:
-            text = axes.text(*shape.points[0], shape.text, fontsize=style.size, color=style.line, va="bottom")
-            artists.append(text)
-        artists[-1].set_zorder(order)
-        artists[-1].set_clip_on(True)
+            polygon = Polygon(shape.points, facecolor=style.fill, edgecolor=style.line, linewidth=style.width)
+            drawn = axes.add_patch(polygon)
+        drawn.set_zorder(order)
+        drawn.set_clip_on(True)
+        artists.append(drawn)
         order += 0.001
     return artists
 
@@ -247,18 +239,8 @@ def _write_mp4(trajectory: Trajectory, target: Path, passing: Path, progress: Pr
     command = [
         *("ffmpeg", "-y", "-loglevel", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(FRAMES_PER_S), "-i", "-"),
-        *(
-            "-an",
-            "-c:v",
-            "libx264",
-            "-pix_fmt",
-            "yuv420p",
-            "-movflags",
-            "+faststart",
-            "-f",
-            "mp4",
-            str(passing.absolute()),
-        ),
+        *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
+        *("-f", "mp4", str(passing.absolute())),
     ]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None

@@ -14,7 +14,7 @@ from boulder_kernels.design import G, design_at, passive_pressure_coefficient
 from boulder_kernels.soil import spring_force
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.judge.pilot import sampled_designs
+from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.soils import with_law
 

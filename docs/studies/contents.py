@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
-from boulder_sweep.crash_tests.cases import rigid_wall_test
-from boulder_sweep.crash_tests.statements import statement_table
+from boulder_sweep.crash_tests.cases import rigid_wall_test, statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
 from docs.studies import (

@@ -12,7 +12,7 @@ import numpy as np
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps, finer_step
-from boulder_sweep.judge.pilot import sampled_designs
+from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.settings import load
 from docs.studies.random_designs import random_designs
 

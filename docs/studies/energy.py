@@ -11,10 +11,9 @@ import numpy as np
 from boulder_kernels import Control, Readings, Record, as_printed, constants_of, corrected, simulate_design
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.impact.history import EnergyLedger, ledger_of
+from boulder_sweep.impact.history import EnergyLedger, Motion, ledger_of
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.judge.accuracy import Steps
-from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.accuracy import Steps, accuracy_of
 from boulder_sweep.settings.model import ACCURACIES, Model, ReadingChoice, SolverSettings
 from docs.studies.random_designs import random_designs
 
@@ -124,10 +123,11 @@ def audit(preset: str, steps: Steps, count: int = AUDIT_DESIGNS, seed: int = 0) 
     residuals = np.empty(count)
     for row, design in enumerate(random_designs(count, seed)):
         record = _blank_record()
-        simulate_design(design, readings, control, record)
+        outcome = simulate_design(design, readings, control, record)
         reached = np.isfinite(record.states).all(axis=1)
         kept = Record(*(field[reached] for field in record[:-1]))
-        residuals[row] = ledger_of(kept, design, readings, constants_of(design, readings, 0)).largest_residual
+        motion = Motion(design, readings, constants_of(design, readings, 0), control, kept, outcome)
+        residuals[row] = ledger_of(motion).largest_residual
     return residuals
 
 

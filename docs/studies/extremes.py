@@ -11,8 +11,8 @@ from boulder_kernels import Control, Status, corrected
 from boulder_sweep.columns import INPUT_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.designs import block_of
-from boulder_sweep.judge.accuracy import STEPS
-from boulder_sweep.judge.evaluation import LONGEST_HORIZON, Evaluation
+from boulder_sweep.judge.accuracy import LONGEST_HORIZON, STEPS
+from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, UNDECIDED, Judged
 from boulder_sweep.judge.verdict import STATUS_REASONS, Limits, judge

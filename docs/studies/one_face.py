@@ -14,9 +14,10 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, corrected, simulate_table
 from boulder_kernels.design import Constants, constants_of, design_at
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of, sampled_designs
 from boulder_sweep.settings import load
 
 SAMPLE = 600

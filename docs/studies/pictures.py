@@ -10,7 +10,7 @@ from PIL import Image
 from boulder_sweep import load, need, read, run
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.fitting import fit_pulse
-from boulder_sweep.crash_tests.pulse import read_pulse
+from boulder_sweep.crash_tests.measured import read_pulse
 from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.settings.overrides import ALL_OPINIONS

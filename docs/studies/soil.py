@@ -10,9 +10,10 @@ import numpy as np
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of, sampled_designs
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import RESISTANCES, Ground, Layer
 from boulder_sweep.soils import coefficients

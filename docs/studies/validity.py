@@ -12,9 +12,10 @@ from boulder_kernels.dynamics import State
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
-from boulder_sweep.judge.pilot import accuracy_of, sampled_designs
+from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.judge.validity import FLAGS
 from boulder_sweep.settings import load
 

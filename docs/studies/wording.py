@@ -7,13 +7,13 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.crash_tests.statements import PAPERS_N
+from boulder_sweep.crash_tests.cases import PAPERS_N
 from boulder_sweep.settings import load
 from boulder_sweep.settings.model import SWITCHES
 from docs.studies.example_pulse import example_pulse
 
 if TYPE_CHECKING:
-    from boulder_sweep.crash_tests.statements import Convergence
+    from boulder_sweep.crash_tests.cases import Convergence
     from docs.studies.energy import Balance
     from docs.studies.readings import ReadingRow, ReadingsStudy
 
@@ -126,7 +126,7 @@ def fit_text() -> str:
     """What ``sweep fit-vehicle`` prints for the example."""
     from boulder_sweep.cli.fit_vehicle import lines
     from boulder_sweep.crash_tests.fitting import fit_pulse
-    from boulder_sweep.crash_tests.pulse import read_pulse
+    from boulder_sweep.crash_tests.measured import read_pulse
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "pulse.csv"

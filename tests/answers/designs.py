@@ -9,9 +9,9 @@ import pandas as pd
 
 from boulder_sweep.answers.need import Need
 from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
 

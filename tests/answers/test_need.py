@@ -297,7 +297,7 @@ def test_one_height_tells_what_is_blocked_from_what_never_passes(question: dict,
 def test_a_curve_of_the_chart_holds_one_ratio_of_embedment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The table holds depths; the file gives ratios, of which the chart shows one and says which."""
     curves = []
-    monkeypatch.setattr("boulder_sweep.views.design_chart._curve", lambda *words: curves.append(words[2]))
+    monkeypatch.setattr("boulder_sweep.views.answer_charts._curve", lambda *words: curves.append(words[2]))
     monkeypatch.setattr("matplotlib.axes.Axes.legend", lambda *_, **__: None)  # of no curve
     sweep = site(height="[3, 3.2, 3.4] m", friction="40 deg", site="embedment_ratio: [0.6, 0.65, 0.7]")
     need(sweep, most="speed").plot(tmp_path / "chart.png")

@@ -13,9 +13,9 @@ from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.printing import reserve_lines
 from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, classes, reserves
 from boulder_sweep.columns import INPUT_COLUMNS
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.sweep import DesignList

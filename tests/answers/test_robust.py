@@ -13,9 +13,9 @@ from boulder_sweep.answers.printing import reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.robustness import ROBUST
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from tests.answers.designs import site

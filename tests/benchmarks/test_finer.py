@@ -10,9 +10,9 @@ import pytest
 
 from benchmarks import finer
 from benchmarks.designs import sample
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import Designs
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import load
 
 pytestmark = pytest.mark.compiled

@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from boulder_sweep.crash_tests.cases import rigid_wall_test
-from boulder_sweep.crash_tests.fitting import fit_pulse
-from boulder_sweep.crash_tests.measured import TimeHistory
-from boulder_sweep.crash_tests.pulse import RESPONSES, Pulse, VehicleFit, pulse_of, read_pulse
+from boulder_sweep.crash_tests.fit_problem import RESPONSES
+from boulder_sweep.crash_tests.fitting import VehicleFit, fit_pulse
+from boulder_sweep.crash_tests.measured import Pulse, TimeHistory, pulse_of, read_pulse
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.errors import FitError
 from docs.studies.example_pulse import example_pulse

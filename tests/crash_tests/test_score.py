@@ -12,8 +12,16 @@ import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.soil import closed_form, soil_kinematics
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.crash_tests.measured import TEST_SIGNALS, TimeHistory, read_history, simulated_signal
-from boulder_sweep.crash_tests.score import Form, by_the_paper, forms_of, score_table, scores, time_of_limit
+from boulder_sweep.crash_tests.measured import TEST_SIGNALS, TimeHistory, read_history
+from boulder_sweep.crash_tests.score import (
+    Form,
+    by_the_paper,
+    forms_of,
+    score_table,
+    scores,
+    simulated_signal,
+    time_of_limit,
+)
 from boulder_sweep.settings import Sweep, load
 from tests import oracle
 from tests.conftest import Trajectories

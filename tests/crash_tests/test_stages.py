@@ -11,8 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from boulder_sweep.cli.main import execute
+from boulder_sweep.crash_tests.fit_problem import RESPONSES
 from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
-from boulder_sweep.crash_tests.pulse import RESPONSES, Pulse
+from boulder_sweep.crash_tests.measured import Pulse
 from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
 from boulder_sweep.errors import FitError
 from boulder_sweep.settings import load

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from boulder_sweep.crash_tests.measured import TimeHistory, compare, deviation_table
-from boulder_sweep.crash_tests.statements import convergence, statements
+from boulder_sweep.crash_tests.cases import convergence, statements
+from boulder_sweep.crash_tests.measured import TimeHistory
+from boulder_sweep.crash_tests.score import compare, deviation_table
 from boulder_sweep.crash_tests.validation import Validation, validate
 from boulder_sweep.errors import ComparisonError
 from tests.conftest import Command, Trajectories

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from boulder_kernels.design import G, design_at, passive_pressure_coefficient
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.judge.pilot import sampled_designs
+from boulder_sweep.judge.inputs import sampled_designs
 from docs.studies.against_tests import api_sand, drag_share, model_soil, openpile_table, pushed
 
 RWG = design_at(sampled_designs(crash_test("rwg"), 1).table, 0)

@@ -25,8 +25,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 import pyarrow as pa
 
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.manifest import load

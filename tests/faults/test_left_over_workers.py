@@ -7,8 +7,8 @@ import shutil
 
 import pytest
 
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner import remote
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.runner.workers import Computation

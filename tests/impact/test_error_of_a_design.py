@@ -14,9 +14,9 @@ from boulder_sweep.columns import VERDICTS
 from boulder_sweep.impact import simulation
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge import evaluation
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings.model import PRESETS
 
 CONFIGS = Path(__file__).parents[2] / "configs"

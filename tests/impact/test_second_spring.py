@@ -11,7 +11,7 @@ from boulder_sweep import Trajectory
 from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import SECOND_SPRING_COLUMNS
 from boulder_sweep.impact.explanation import explain
-from boulder_sweep.impact.trajectory_columns import SPENT
+from boulder_sweep.impact.trajectory import SPENT
 from boulder_sweep.settings import Sweep, load
 from tests import oracle
 from tests.kernels.samples import inputs_of

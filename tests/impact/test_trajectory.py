@@ -14,9 +14,9 @@ import boulder_sweep
 from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.impact.trajectory_columns import ENERGY, HISTORY
+from boulder_sweep.impact.trajectory import ENERGY, HISTORY
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings.model import PRESETS, ReadingChoice
 from tests import oracle
 from tests.conftest import Trajectories

@@ -11,8 +11,7 @@ from boulder_sweep.cli.simulate import explain as explain_command
 from boulder_sweep.columns import AT_REST
 from boulder_sweep.errors import NothingToMeasureError
 from boulder_sweep.impact.explanation import explain
-from boulder_sweep.judge.evaluation import control_of
-from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.accuracy import accuracy_of, control_of
 from boulder_sweep.settings.model import PLASTIC_ELEMENTS
 from boulder_sweep.settings.problems import SettingsError
 from boulder_sweep.tradeoff.study import measure

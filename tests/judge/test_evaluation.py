@@ -10,10 +10,10 @@ import pytest
 
 from boulder_kernels import simulate_table
 from boulder_sweep.columns import VERDICTS
-from boulder_sweep.judge.evaluation import by_kernels, control_of, evaluation_of, readings_of
+from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
+from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import load_text
 from tests.runner.grids import grid, partly_impossible, plausible
 

@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.firmness import CHANGES, firmness_of
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings.model import ReadingChoice
 from boulder_sweep.store.manifest import load as load_manifest

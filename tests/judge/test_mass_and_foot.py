@@ -11,9 +11,9 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.problems import SettingsError
 

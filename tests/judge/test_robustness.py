@@ -13,10 +13,10 @@ from boulder_kernels import Status
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import GRADES, STANDINGS
 from boulder_sweep.judge import robustness
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import PASS, Judged
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.robustness import FREE, SENSITIVE, is_free
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.settings import load

@@ -12,8 +12,7 @@ import boulder_sweep
 from boulder_kernels import Control, corrected, simulate_table
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.explanation import explain
-from boulder_sweep.judge.evaluation import OUTLINES_IN_LANES, control_of
-from boulder_sweep.judge.pilot import accuracy_of
+from boulder_sweep.judge.accuracy import OUTLINES_IN_LANES, accuracy_of, control_of
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import Shape, tapered

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.runner import sweeper
 from boulder_sweep.runner.estimate import (
     LARGEST_BLOCK,

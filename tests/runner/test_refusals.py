@@ -82,8 +82,8 @@ def test_an_output_that_cannot_be_written(tmp_path, name):
 def test_an_output_that_exists(tmp_path, monkeypatch):
     out = tmp_path / "out"
     with monkeypatch.context() as patch:
+        from boulder_sweep.judge.accuracy import accuracy_of
         from boulder_sweep.judge.evaluation import evaluation_of
-        from boulder_sweep.judge.pilot import accuracy_of
         from tests.runner.grids import plausible
 
         patch.setattr(sweeper, "accuracy_of", accuracy_of)

@@ -124,8 +124,8 @@ def test_the_size_of_parts_changes_no_bit(finished, tmp_path):
 
 def test_blocks_change_no_bit(finished):
     """The rows computed one by one are those computed at once."""
+    from boulder_sweep.judge.accuracy import accuracy_of
     from boulder_sweep.judge.evaluation import evaluation_of
-    from boulder_sweep.judge.pilot import accuracy_of
     from boulder_sweep.store.schema import encode, part_table
 
     sweep = grid()

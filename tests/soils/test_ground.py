@@ -14,9 +14,9 @@ from boulder_kernels.layered import LayeredTable
 from boulder_sweep.cli.simulate import why_lines
 from boulder_sweep.impact.explanation import explain
 from boulder_sweep.impact.history import soil_profile
+from boulder_sweep.judge.accuracy import accuracy_of, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import Designs
-from boulder_sweep.judge.pilot import accuracy_of, sampled_designs, simulated
+from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.settings.model import RESISTANCES, Ground, Layer
 from boulder_sweep.soils import SLICES, ground_of, with_soil
 from tests import oracle
@@ -137,7 +137,7 @@ def check_layers(folder: Path, name: str, *more: str) -> float:
     history = boulder_sweep.simulate(sweep)
     assert history.summary()["max_rotation_deg"] >= found.stored["max_rotation_deg"]
     assert history.energy().largest_residual < 1e-6
-    profile = soil_profile(history.motion.record, 100, 4000, history.motion.constants)
+    profile = soil_profile(history.motion, 100, 4000)
     assert profile.force_N.sum() == pytest.approx(history.soil_force_N[100], rel=2e-2)
     return float(found.stored["peak_force_kN"])
 
@@ -155,7 +155,7 @@ def test_run_simulate_and_explain_agree_by_elements_and_with_other_laws(tmp_path
     assert explain(tmp_path / "plastic", 0).unequal == ()
     history = boulder_sweep.simulate(sweep)
     assert history.energy().largest_residual < 1e-4
-    profile = soil_profile(history.motion.record, 600, 60, history.motion.constants)
+    profile = soil_profile(history.motion, 600, 60)
     assert profile.force_N.sum() == pytest.approx(history.soil_force_N[600], rel=1e-9)
     stiffer = ("vehicle.second_spring=9 MN/m", "vehicle.second_spring_from=0.5 m")
     sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, *stiffer))

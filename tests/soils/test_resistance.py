@@ -15,7 +15,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import PRESETS, RESISTANCES
+from boulder_sweep.settings.model import PRESETS, RESISTANCES, Model
 from boulder_sweep.soils import coefficients, with_law
 from boulder_sweep.views.wording import LAW_WORDS, design_line
 from tests import oracle
@@ -76,7 +76,7 @@ def test_the_energy_ledger_closes(law: str) -> None:
 def test_the_papers_law_leaves_every_bit_alone() -> None:
     sweep = site()
     block = sweep.block(0, sweep.n_designs)
-    plain, named = designs_of(block), designs_of(block, None, "kp_squared")
+    plain, named = designs_of(block), designs_of(block, None, Model(resistance="kp_squared"))
     assert all(np.array_equal(a, b) for a, b in zip(plain.table, named.table, strict=True))
     table = plain.table
     assert with_law(table, "kp_squared") is table

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from boulder_sweep.errors import ScanError
-from boulder_sweep.stones.fitting import MOST_PIECES, fitted, sides_of
+from boulder_sweep.stones.profiles import MOST_PIECES, doubled_share, fitted, sections_of, sides_of
 from boulder_sweep.stones.rock import LEAST_FOOT
-from boulder_sweep.stones.sections import doubled_share, sections_of
 from boulder_sweep.stones.standing import MOST_CUT, Stone, has_foot
 from tests.stones.shapes import box, cylinder, frustum, rock, solid, sphere, stone
 from tests.stones.test_solid import moved
@@ -248,7 +247,7 @@ def test_more_pieces_fit_better():
     errors = []
     for pieces in (1, 2, 4, 8):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("boulder_sweep.stones.fitting.MOST_PIECES", pieces)
+            patch.setattr("boulder_sweep.stones.profiles.MOST_PIECES", pieces)
             errors.append(fitted(found, 0.0, top, own.volume).error)
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 0.3 * errors[0]

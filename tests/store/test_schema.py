@@ -13,9 +13,9 @@ import pytest
 
 from boulder_sweep.columns import BY_NAME, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OUTCOME_COLUMNS
 from boulder_sweep.designs import Column, DesignBlock
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import Judged
-from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.store.schema import encode, judged_rows, part_table, table_schema
 from tests.runner.grids import partly_impossible, plausible
 

@@ -61,7 +61,7 @@ def test_forces_share_one_scale(held: Trajectory) -> None:
     assert lengths(of_style(shapes, "contact_force")) == pytest.approx([held.contact_force_N[sample] * scale])
     (weight,) = of_style(shapes, "weight")
     assert weight.points[0][1] - weight.points[1][1] == pytest.approx(24754.6 * 9.80665 * scale, rel=1e-5)
-    profile = soil_profile(held.motion.record, sample, SLICES, held.motion.constants)
+    profile = soil_profile(held.motion, sample, SLICES)
     drawn = lengths(of_style(shapes, "soil_force"))
     strong = np.abs(profile.force_N * scale) > 0.03
     assert drawn == pytest.approx(profile.force_N[strong] * scale)
@@ -74,7 +74,7 @@ def test_forces_share_one_scale(held: Trajectory) -> None:
 def test_soil_slices_add_up_to_the_force_of_the_soil(held: Trajectory, overturned: Trajectory) -> None:
     for trajectory in (held, overturned):
         for sample in (0, 50, 120, 300):
-            profile = soil_profile(trajectory.motion.record, sample, 4000, trajectory.motion.constants)
+            profile = soil_profile(trajectory.motion, sample, 4000)
             total = trajectory.soil_force_N[sample]
             assert profile.force_N.sum() == pytest.approx(total, abs=1e-5 * (1e4 + np.abs(profile.force_N).sum()))
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from boulder_kernels.table import finer_step
-from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED
-from boulder_sweep.judge.evaluation import control_of
-from boulder_sweep.judge.pilot import accuracy_of, pilot, pilot_size, sampled_rows
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, accuracy_of, control_of, pilot, pilot_size
+from boulder_sweep.judge.inputs import sampled_rows
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.store.manifest import load as load_manifest

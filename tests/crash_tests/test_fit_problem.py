@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from boulder_sweep.crash_tests.cases import rigid_wall_test
+from boulder_sweep.crash_tests.fit_problem import Scatter, integrate_noise, scatter_of, sum_scatters
 from boulder_sweep.crash_tests.fitting import fit_pulse
-from boulder_sweep.crash_tests.pulse import Pulse
-from boulder_sweep.crash_tests.scatter import Scatter, integrate_noise, scatter_of, sum_scatters
+from boulder_sweep.crash_tests.measured import Pulse
 
 PAPER = rigid_wall_test()
 TIMES = np.arange(200) * 1e-3
