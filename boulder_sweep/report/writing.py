@@ -1,8 +1,12 @@
-"""From a result, or a settings file, to the page on disk."""
+"""From a result, or a settings file, to the page on disk, as HTML or printed to PDF by a Chromium on the machine."""
 
 from __future__ import annotations
 
 import dataclasses
+import os
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,11 +20,8 @@ from boulder_sweep.judge.pilot import accuracy_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import answers_table
-from boulder_sweep.report.printing import print_page
-from boulder_sweep.report.reading import read_rows
-from boulder_sweep.report.rows import MOST_ELEMENTS, thinned
-from boulder_sweep.report.sentences import Named
+from boulder_sweep.report.asked import Named, answers_table
+from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
@@ -34,6 +35,27 @@ from boulder_sweep.views.wording import UNLOADING_WORDS, name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
+BROWSERS = (
+    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge", "microsoft-edge"),
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+    "/Applications/Chromium.app/Contents/MacOS/Chromium",
+    r"C:\Program Files\Google\Chrome\Application\chrome.exe",
+    r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
+)
+"""Executables that print, the first found is taken."""
+PLAYWRIGHT = (
+    "chromium-*/chrome-linux*/chrome",
+    "chromium-*/chrome-mac*/*.app/Contents/MacOS/*",
+    "chromium-*/*/chrome.exe",
+)
+"""Where Playwright keeps its browser, within its folder."""
+PLAYWRIGHT_FOLDERS = (".cache/ms-playwright", "Library/Caches/ms-playwright", "AppData/Local/ms-playwright")
+HELP = "install Chromium or Chrome, or write the page as .html and print it from a browser"
+MOST_SECONDS = 600
+"""After so long a browser that has not printed the page hangs and is ended; it works for five seconds, of which a busy
+machine makes minutes."""
+SETTLED_MS = 30_000
+"""Time of the page that passes before it is printed; the browser skips it while nothing happens."""
 
 
 def write_report(
@@ -92,7 +114,7 @@ def write_report(
         chosen = [_shown(one, rows.row(one.number)) for one in named]
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
-    identity, kept = rows.finished.identity, thinned(rows)
+    identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
     try:
         settings, control = completed(identity["settings"]), known_control(identity["control"])
@@ -107,7 +129,6 @@ def write_report(
             sentences=answer.sentences,
             answers=answers_table(rows),
             rows=rows,
-            kept=kept,
             chosen=chosen,
             facts=_facts(
                 identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)
@@ -277,3 +298,73 @@ def _written(page: Path, text: str) -> Path:
     except OSError as problem:
         raise ReportError(f"{page} cannot be written: {why(problem)}") from problem
     return page
+
+
+def browser() -> str:
+    """Return the executable of a Chromium.
+
+    Raises
+    ------
+    ReportError
+        There is none.
+    """
+    named = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if named:
+        return named
+    folders = [Path.home() / folder for folder in PLAYWRIGHT_FOLDERS]
+    found = [path for folder in folders for pattern in PLAYWRIGHT for path in sorted(folder.glob(pattern))]
+    if not found:
+        raise ReportError(f"a PDF is printed by Chromium, which was not found: {HELP}")
+    return str(found[-1])
+
+
+def print_page(html: str, target: Path) -> None:
+    """Print a page.
+
+    Parameters
+    ----------
+    html
+        The page.
+    target
+        The PDF; written as a whole or not at all.
+
+    Raises
+    ------
+    ReportError
+        There is no Chromium, it does not print the page, or the file cannot be written.
+    """
+    program = browser()
+    with tempfile.TemporaryDirectory(prefix="boulder-sweep-", ignore_cleanup_errors=True) as folder:
+        page, printed = Path(folder, "page.html"), Path(folder, "page.pdf")
+        page.write_text(html, encoding="utf-8")
+        # As root, as in a container, Chromium does not start with its sandbox.
+        as_root = hasattr(os, "geteuid") and os.geteuid() == 0
+        words = [
+            program,
+            "--headless",
+            "--disable-gpu",
+            "--disable-dev-shm-usage",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            *(["--no-sandbox"] if as_root else []),
+            f"--user-data-dir={Path(folder, 'profile')}",
+            "--no-pdf-header-footer",
+            f"--virtual-time-budget={SETTLED_MS}",
+            "--window-size=1200,900",
+            f"--print-to-pdf={printed}",
+            page.as_uri(),
+        ]
+        try:
+            ended = subprocess.run(words, capture_output=True, timeout=MOST_SECONDS, check=False)
+        except subprocess.TimeoutExpired:
+            raise ReportError(f"{program} did not print the page within {MOST_SECONDS} s: {HELP}") from None
+        except OSError as problem:
+            raise ReportError(f"{program} does not start ({why(problem)}): {HELP}") from problem
+        if not printed.exists() or not printed.stat().st_size:
+            raise ReportError(f"{program} did not print the page (it ended with code {ended.returncode}): {HELP}")
+        try:
+            put_file(target.parent, target.name, printed.read_bytes())
+        except OSError as problem:
+            raise ReportError(f"{target} cannot be written: {why(problem)}") from problem

@@ -19,10 +19,9 @@ from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import answers_table
+from boulder_sweep.report.asked import Quantity, answers_table
 from boulder_sweep.report.comparison import compare
-from boulder_sweep.report.reading import read_rows
-from boulder_sweep.report.sentences import Quantity
+from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from tests.answers.designs import site
 from tests.conftest import Command

@@ -178,7 +178,7 @@ BY_ITSELF = {
     "cli/output.py": "nowhere",
     "cli/progress.py": "its own cache",
     "report/build.py": "for developers",
-    "report/printing.py": "a folder of its own for the browser",
+    "report/writing.py": "a folder of its own for the browser",
 }
 
 
