@@ -21,12 +21,7 @@ from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRI
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
-from boulder_sweep.judge.validity import (
-    FLAGS,
-    TESTED_OVERLAP_M,
-    TESTED_ROTATION_DEG,
-    usual_range,
-)
+from boulder_sweep.judge.validity import FLAGS, TESTED_OVERLAP_M, TESTED_ROTATION_DEG, usual_range
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
@@ -46,9 +41,9 @@ from boulder_sweep.settings.notes import (
     api_curve,
     terzaghi_curve,
 )
-from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, describe, needed
+from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, needed
 from boulder_sweep.settings.shape import Shape
-from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
+from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text, shown_unit
 from boulder_sweep.soils import SLICES, is_layered
 from boulder_sweep.views.wording import REASON_WORDS
 
@@ -87,7 +82,6 @@ ANGLES = np.arange(20.0, 61.0)
 
 def page_data(
     *,
-    title: str,
     settings: Mapping[str, Any],
     control: Control,
     readings: Readings,
@@ -101,7 +95,7 @@ def page_data(
     simulated = control._replace(elements=min(control.elements, MOST_ELEMENTS))
     simulated = simulated._replace(paired=is_paired(readings, simulated, layered=is_layered(law, ground, shape)))
     return {
-        "title": title,
+        "title": str(settings["name"]),
         "units": units,
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
@@ -372,8 +366,7 @@ def _ground_entries(ground: Ground, system: str) -> list[str]:
 
 def _quantity(value: float, unit: str, system: str) -> str:
     """A value in a unit of the table with the unit that it is shown in, to six digits."""
-    shown = shown_unit(unit, system)
-    return describe(value / shown.size, shown.unit)
+    return quantity_text(unit, system, value, digits=".6g")
 
 
 def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str, list[str]]:
@@ -381,9 +374,7 @@ def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str,
     criterion, model, solver = (settings[name] for name in ("criterion", "model", "solver"))
     taper = Shape.of_model(settings["model"]).taper
     soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
-    readings = model["preset"]
-    if readings == "mixed":
-        readings = "{" + ", ".join(f"{name}: {value}" for name, value in model["readings"].items()) + "}"
+    readings = f"{{{reading_words(settings)}}}" if model["preset"] == "mixed" else model["preset"]
     asked = solver["accuracy"] or (f"{solver['accuracy_deg']} deg" if solver["accuracy_deg"] is not None else None)
     accuracy = f"step: {solver['step_s']} s" if asked is None else f"accuracy: {asked}"
     limits = [

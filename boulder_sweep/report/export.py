@@ -141,13 +141,10 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
             for place, one in enumerate(value, 1):
                 lines += [f"{indent}{name} {place}:", *setting_lines(one, f"{indent}  ")]
         else:
-            shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in _as_list(value))
+            values = value if isinstance(value, list) else [value]
+            shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in values)
             lines.append(f"{indent}{name}: {shown}")
     return lines
-
-
-def _as_list(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else [value]
 
 
 def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:

@@ -44,8 +44,8 @@ LEFT, RIGHT = 5.4, 4.0
 """How much is drawn before and behind the boulder [m]: room for constants of the soil there, and dimensions here."""
 SKY, BELOW = 0.5, 0.5
 """Room above what stands, and below the boulder [m]."""
-TEXT, LINE = 0.26, 0.34
-"""Height of letters, and distance of lines [m]."""
+LINE = 0.34
+"""Distance of lines of text [m]."""
 CAB_M = 0.85
 """How far the cab stands above the hood."""
 

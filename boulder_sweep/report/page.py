@@ -27,10 +27,7 @@ if TYPE_CHECKING:
     from boulder_sweep.report.rows import Rows
 
 ASSETS = Path(__file__).with_name("assets")
-SCRIPTS = (
-    *("kernel", "verdict", "outline", "simulator", "units", "plots", "scene", "maps"),
-    *("walker", "controls", "choices", "player", "texts", "page"),
-)
+SCRIPTS = ("kernel", "verdict", "simulator", "texts", "plots", "scene", "maps", "controls", "page")
 """Our own script, in this order."""
 NOTHING: Mapping[str, str] = {}
 MAIN = (
@@ -48,7 +45,6 @@ MAIN = (
 
 def assembled(
     *,
-    title: str,
     settings: Mapping[str, Any],
     control: Control,
     readings: Readings,
@@ -66,10 +62,8 @@ def assembled(
 
     Parameters
     ----------
-    title
-        Title of the page.
     settings
-        Resolved settings of the sweep.
+        Resolved settings of the sweep, whose name is the title of the page.
     control, readings
         How its designs are simulated.
     start
@@ -108,15 +102,7 @@ def assembled(
         document.add_root(plot)
     docs, items = standalone_docs_json_and_render_items(list(document.roots))
     places = {plot.id: f"figure-{plot.name}" for plot in document.roots}
-    data = page_data(
-        title=title,
-        settings=settings,
-        control=control,
-        readings=readings,
-        start=start,
-        chosen=chosen,
-        units=units,
-    )
+    data = page_data(settings=settings, control=control, readings=readings, start=start, chosen=chosen, units=units)
     data["rows"] = table
     data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": places} for item in items]}
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
@@ -129,7 +115,7 @@ def assembled(
         undefined=jinja2.StrictUndefined,
     )
     return environment.get_template("page.html").render(
-        title=title,
+        title=data["title"],
         sentences=sentences,
         answers=answers,
         panels=panels,
@@ -160,12 +146,9 @@ def assembled(
 
 def _policy(*scripts: str) -> str:
     """Content-Security-Policy of the page: its own scripts, no connections."""
-    hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
+    digests = [hashlib.sha256(script.encode()).digest() for script in scripts]
+    hashes = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
     return (
         f"default-src 'none'; script-src {hashes} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; "
         "img-src data: blob:; font-src data:; connect-src 'none'; form-action 'none'; base-uri 'none'"
     )
-
-
-def _sha256(text: str) -> str:
-    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

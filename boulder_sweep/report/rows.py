@@ -6,7 +6,7 @@ If the designs come from axes, their inputs follow from the settings; a table is
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -56,6 +56,11 @@ def label_of(name: str) -> str:
     if name not in BY_NAME:
         return name
     return BY_NAME[name].path.replace(".", " ").replace("_", " ").removeprefix("site ")
+
+
+def inputs_of(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the inputs among the columns of a row."""
+    return {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
 
 
 class NamedSets(NamedTuple):
@@ -263,10 +268,9 @@ class Rows:
         if row["verdict"] != "pass" or row.get("robustness") not in ("open", None):
             return row.get("robustness")
         identity = self.finished.identity
-        inputs = {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
         try:
             control = known_control(identity["control"])
-            sweep = one_design(completed(identity["settings"]), inputs, control, row["step_s"] or control.h)
+            sweep = one_design(completed(identity["settings"]), inputs_of(row), control, row["step_s"] or control.h)
         except (LookupError, TypeError, ValueError):
             return row.get("robustness")
         evaluation, block = evaluation_of(sweep, accuracy_of(sweep)), sweep.block(0, 1)

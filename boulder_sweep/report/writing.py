@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.evaluation import control_of, known_control, readings_of
@@ -21,7 +20,7 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import Named, answers_table
-from boulder_sweep.report.rows import MOST_ELEMENTS, read_rows
+from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
@@ -29,7 +28,8 @@ from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.site_data import derived_words
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.files import check_target, put_file
-from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
+from boulder_sweep.store.provenance import identity as identity_of
+from boulder_sweep.store.provenance import versions
 from boulder_sweep.text import counted, printable, why
 from boulder_sweep.views.wording import UNLOADING_WORDS, name_of, value_text
 
@@ -120,7 +120,6 @@ def write_report(
         settings, control = completed(identity["settings"]), known_control(identity["control"])
         readings = Readings(**identity["readings"])
         text = assembled(
-            title=str(settings["name"]),
             heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
             settings=settings,
             control=control,
@@ -130,9 +129,7 @@ def write_report(
             answers=answers_table(rows),
             rows=rows,
             chosen=chosen,
-            facts=_facts(
-                identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)
-            ),
+            facts=_facts(identity, command, str(out)),
             notes=[*notes, *_general_notes(settings, control, units)],
             units=units,
         )
@@ -175,14 +172,13 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
     if block.reasons[0]:
         raise ReportError(f"design {number} cannot be computed: {block.reasons[0]}")
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
-    settings, control = sweep.resolved(), control_of(sweep, accuracy_of(sweep))
+    settings, control, readings = sweep.resolved(), control_of(sweep, accuracy_of(sweep)), readings_of(sweep)
     text = assembled(
-        title=sweep.name,
         settings=settings,
         control=control,
-        readings=readings_of(sweep),
+        readings=readings,
         start=inputs,
-        facts=_facts(versions(), settings_sha256(settings), kernels_sha256(), command, None),
+        facts=_facts(identity_of(settings, readings._asdict(), control._asdict()), command),
         notes=_general_notes(settings, control, units),
         units=units,
     )
@@ -227,8 +223,7 @@ def _page_maker() -> Callable[..., str]:
 
 def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
-    inputs = {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
-    return {"title": one.title, "number": one.number, "inputs": inputs}
+    return {"title": one.title, "number": one.number, "inputs": inputs_of(row)}
 
 
 def _notes_on_rules(judged_by: str) -> list[str]:
@@ -271,15 +266,12 @@ def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
     return f"{value_text(name, value, units) if isinstance(value, float) else name_of(name)} ({how})"
 
 
-def _facts(
-    versions_: Mapping[str, str], settings_sha256_: str, kernels_sha256_: str, command: str, out: str | None
-) -> list[tuple[str, str]]:
+def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tuple[str, str]]:
     """Return the origin of the results, and how to reproduce them."""
-    found = [(f"version of {name}", versions_[name]) for name in PACKAGES if name in versions_]
-    found += [("hash of the settings", settings_sha256_), ("hash of the kernels", kernels_sha256_)]
-    if out is not None:
-        found.append(("table", printable(out)))
-    return [*found, ("command", printable(command))] if command else found
+    used = identity["versions"]
+    found = [(f"version of {name}", used[name]) for name in PACKAGES if name in used]
+    found += [(f"hash of the {what}", identity[f"{what}_sha256"]) for what in ("settings", "kernels")]
+    return [*found, *((name, printable(text)) for name, text in (("table", out), ("command", command)) if text)]
 
 
 def _written(page: Path, text: str) -> Path:
@@ -288,13 +280,11 @@ def _written(page: Path, text: str) -> Path:
     Raises
     ------
     ReportError
-        The system refuses it, or as of `print_page`.
+        The system refuses it, or as of `printed`.
     """
-    if page.suffix.lower() == ".pdf":
-        print_page(text, page)
-        return page
+    content = printed(text) if page.suffix.lower() == ".pdf" else text.encode()
     try:
-        put_file(page.parent, page.name, text.encode())
+        put_file(page.parent, page.name, content)
     except OSError as problem:
         raise ReportError(f"{page} cannot be written: {why(problem)}") from problem
     return page
@@ -318,24 +308,17 @@ def browser() -> str:
     return str(found[-1])
 
 
-def print_page(html: str, target: Path) -> None:
-    """Print a page.
-
-    Parameters
-    ----------
-    html
-        The page.
-    target
-        The PDF; written as a whole or not at all.
+def printed(html: str) -> bytes:
+    """Return a page as PDF.
 
     Raises
     ------
     ReportError
-        There is no Chromium, it does not print the page, or the file cannot be written.
+        There is no Chromium, or it does not print the page.
     """
     program = browser()
     with tempfile.TemporaryDirectory(prefix="boulder-sweep-", ignore_cleanup_errors=True) as folder:
-        page, printed = Path(folder, "page.html"), Path(folder, "page.pdf")
+        page, target = Path(folder, "page.html"), Path(folder, "page.pdf")
         page.write_text(html, encoding="utf-8")
         # As root, as in a container, Chromium does not start with its sandbox.
         as_root = hasattr(os, "geteuid") and os.geteuid() == 0
@@ -353,7 +336,7 @@ def print_page(html: str, target: Path) -> None:
             "--no-pdf-header-footer",
             f"--virtual-time-budget={SETTLED_MS}",
             "--window-size=1200,900",
-            f"--print-to-pdf={printed}",
+            f"--print-to-pdf={target}",
             page.as_uri(),
         ]
         try:
@@ -362,9 +345,6 @@ def print_page(html: str, target: Path) -> None:
             raise ReportError(f"{program} did not print the page within {MOST_SECONDS} s: {HELP}") from None
         except OSError as problem:
             raise ReportError(f"{program} does not start ({why(problem)}): {HELP}") from problem
-        if not printed.exists() or not printed.stat().st_size:
+        if not target.exists() or not target.stat().st_size:
             raise ReportError(f"{program} did not print the page (it ended with code {ended.returncode}): {HELP}")
-        try:
-            put_file(target.parent, target.name, printed.read_bytes())
-        except OSError as problem:
-            raise ReportError(f"{target} cannot be written: {why(problem)}") from problem
+        return target.read_bytes()
