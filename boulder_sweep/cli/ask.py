@@ -26,8 +26,7 @@ from boulder_sweep.cli.options import (
     take_values,
     units_option,
 )
-from boulder_sweep.cli.output import say, show
-from boulder_sweep.cli.progress import working
+from boulder_sweep.cli.output import say, show, working
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 from boulder_sweep.text import counted
 
@@ -184,9 +183,7 @@ def uncertainty(
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
     refuse_units_of_json(units, as_json)
-    from boulder_sweep.settings.overrides import ALL_OPINIONS
-
-    sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet, units)
+    sweep = load_sweep(grid, overrides, quiet, units, second_opinion=second_opinion)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     with working(quiet) as progress:

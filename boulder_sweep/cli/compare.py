@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from boulder_sweep.cli.options import json_option, refuse_units_of_json, units_option
-from boulder_sweep.cli.output import show
+from boulder_sweep.cli.output import show, wrap
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from boulder_sweep.report.comparison import Comparison
 
 EXAMPLES = """\b
@@ -65,13 +68,13 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
     for name in comparison.answers:
         show(*_answer_lines(name, comparison, listed, units))
     for row in comparison.flipped.head(listed).to_dict("records"):
-        show(*_design_lines(row, comparison, units))
+        rotation = _change(row, "max_rotation_deg", lambda value: f"{value:.4g}")
+        show(*_design_lines(row, f"{_change(row, 'verdict', str)}, {rotation} deg", comparison, units))
     return 0
 
 
 def _count_lines(before: str, after: str, comparison: Comparison, units: str) -> list[str]:
     """Return how many designs both have, what tells them apart, and how many verdicts changed."""
-    from boulder_sweep.cli.console import wrap
     from boulder_sweep.views.wording import name_of, size_of, unit_of
 
     turned, matched = comparison.turned(), len(comparison.matched)
@@ -90,9 +93,7 @@ def _count_lines(before: str, after: str, comparison: Comparison, units: str) ->
 
 def _answer_lines(name: str, comparison: Comparison, listed: int, units: str) -> list[str]:
     """Return how an answer changed in all, and the designs in which it changed most."""
-    from boulder_sweep.cli.console import wrap
     from boulder_sweep.settings.shown_units import shown_as
-    from boulder_sweep.views.wording import value_text
 
     shown = shown_as(name, comparison.answers[name], "", units)
     counts = comparison.to_dict()["answers"][name]
@@ -101,29 +102,25 @@ def _answer_lines(name: str, comparison: Comparison, listed: int, units: str) ->
     change = f" (by {ends[0]} to {ends[1]})" if ends[0] != "+0" or ends[1] != "+0" else ""
     lines = wrap(f"{shown.name}: {', '.join(words)} after{change}")
     for row in comparison.matched.loc[comparison.moved(name).index[:listed]].to_dict("records"):
-        values = " -> ".join(f"{row[f'{name}_{when}'] / shown.size:.5g}" for when in WHEN)
-        ids = " -> ".join(str(row[f"design_id_{when}"]) for when in WHEN)
-        inputs = [
-            value_text(own, row[own], units)
-            if own in row
-            else " -> ".join(value_text(own, row[f"{own}_{when}"], units) for when in WHEN)
-            for own in comparison.varying
-        ]
-        lines += [f"  design {ids}: {values}", *(f"    {line}" for line in wrap(", ".join(inputs), 76))]
+        values = _change(row, name, lambda value: f"{value / shown.size:.5g}")
+        lines += _design_lines(row, values, comparison, units)
     return lines
 
 
-def _design_lines(row: dict[str, Any], comparison: Comparison, units: str) -> list[str]:
-    """Return one design whose verdict changed: how, and the inputs that tell it apart."""
-    from boulder_sweep.cli.console import wrap
+def _design_lines(row: dict[str, Any], words: str, comparison: Comparison, units: str) -> list[str]:
+    """Return one design: how it changed, and the inputs that tell it apart."""
     from boulder_sweep.views.wording import value_text
 
-    verdicts, ids = (" -> ".join(str(row[f"{name}_{when}"]) for when in WHEN) for name in ("verdict", "design_id"))
-    rotation = " -> ".join(f"{row[f'max_rotation_deg_{when}']:.4g}" for when in WHEN)
     inputs = [
         value_text(name, row[name], units)
         if name in row
-        else " -> ".join(value_text(name, row[f"{name}_{when}"], units) for when in WHEN)
+        else _change(row, name, partial(value_text, name, units=units))
         for name in comparison.varying
     ]
-    return [f"  design {ids}: {verdicts}, {rotation} deg", *(f"    {line}" for line in wrap(", ".join(inputs), 76))]
+    ids = _change(row, "design_id", str)
+    return [f"  design {ids}: {words}", *(f"    {line}" for line in wrap(", ".join(inputs), 76))]
+
+
+def _change(row: dict[str, Any], name: str, text: Callable[[Any], str]) -> str:
+    """Return a column of a design before and after."""
+    return " -> ".join(text(row[f"{name}_{when}"]) for when in WHEN)

@@ -191,11 +191,6 @@ def status_lines(status: RunStatus) -> list[str]:
     return lines
 
 
-def wrap(text: str, width: int = 80) -> list[str]:
-    """Return a sentence as lines for a terminal of 80 columns."""
-    return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-
-
 def value_lines(values: Mapping[str, Any], indent: str = "") -> list[str]:
     """Return one line per name and value; the names include the units."""
     lines = []

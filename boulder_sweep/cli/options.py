@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.output import say
+from boulder_sweep.cli.output import say, wrap
 from boulder_sweep.runner.pool import BACKENDS, MOST_JOBS
 from boulder_sweep.text import counted
 
@@ -95,12 +95,15 @@ def cluster_options(function: Command) -> Command:
     return command
 
 
-def load_sweep(path: str, overrides: Sequence[str], quiet: bool, units: str = "si") -> Sweep:
+def load_sweep(
+    path: str, overrides: Sequence[str], quiet: bool, units: str = "si", *, second_opinion: bool = False
+) -> Sweep:
     """Load settings and print the notes on them, and how inputs follow from the data of a site, in these units."""
     from boulder_sweep.settings import load
+    from boulder_sweep.settings.overrides import ALL_OPINIONS
     from boulder_sweep.settings.site_data import derived_words
 
-    sweep = load(path, overrides)
+    sweep = load(path, (*overrides, ALL_OPINIONS) if second_opinion else overrides)
     if not quiet:
         for words in derived_words(sweep.derived, units):
             say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
@@ -115,8 +118,6 @@ def take_values(sweep: Sweep, at: str | None, quiet: bool, units: str = "si") ->
 
     sweep = at_values(sweep, at)
     if sweep.taken_at and not quiet:
-        from boulder_sweep.cli.console import wrap
-
         say("\n".join(wrap(f"note: {words_of(sweep, units)}")))
     return sweep
 

@@ -1,4 +1,8 @@
-"""Everything that commands write to a terminal goes through here, so that text from users' files stays text."""
+"""What commands write to a terminal goes through here, so that text from users' files stays text.
+
+Lines of results go to stdout, notes to stderr; so does, while a command works, a bar or, elsewhere than on a terminal,
+an occasional line.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,23 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
-from boulder_sweep.text import printable
+from boulder_sweep.text import duration_text, printable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from boulder_sweep.runner.summary import Progress
+
+PLAIN_EVERY_S = 10.0
+"""Time between two lines of progress where there is no terminal."""
+USUALLY_S = 20.0
+"""How long compiling takes, where that is not known of this machine."""
 
 
 def ready_streams() -> None:
@@ -55,3 +71,186 @@ def say(text: str) -> None:
 def _columns() -> int | None:
     """Return the width of the terminal that stderr is; None for a file or a pipe, where lines stay whole."""
     return shutil.get_terminal_size().columns if sys.stderr.isatty() else None
+
+
+def wrap(text: str, width: int = 80) -> list[str]:
+    """Return a sentence as lines for a terminal of 80 columns."""
+    return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+
+
+@contextmanager
+def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iterator[None]:
+    """Say, once, that kernels are compiled, if any are; and keep how long it took for the next version of the kernels.
+
+    Parameters
+    ----------
+    say_so
+        Shows a line; called before the first kernel is compiled.
+    resume
+        Called whenever one has been compiled.
+    """
+    from boulder_kernels import _ahead
+
+    kernels: dict[str, float] = {}
+
+    @contextmanager
+    def compiling(kernel: str) -> Iterator[None]:
+        """Take the time."""
+        if not kernels:
+            say_so(f"compiling kernels, once on this machine, about {max(_took_s(kernel), 1.0):.0f} s")
+        begun = time.monotonic()
+        try:
+            yield
+        finally:
+            kernels[kernel] = time.monotonic() - begun
+            resume()
+
+    before, _ahead.announce = _ahead.announce, compiling
+    try:
+        yield
+    finally:
+        _ahead.announce = before
+        for first in list(kernels)[:1]:
+            _remember(first, sum(kernels.values()))
+
+
+def _took_s(kernel: str) -> float:
+    """Seconds that a compilation took the last time that it began with this kernel, of whatever version."""
+    with suppress(OSError, ValueError):  # no earlier compilation on this machine
+        return float(_seconds_file(kernel).read_text())
+    return USUALLY_S
+
+
+def _remember(kernel: str, seconds: float) -> None:
+    """Keep how long a compilation took."""
+    with suppress(OSError):
+        _seconds_file(kernel).write_text(f"{seconds:.1f}")
+
+
+def _seconds_file(kernel: str) -> Path:
+    """Return the file with the seconds that a compilation took which began with this kernel."""
+    from boulder_kernels._cache import CACHE_FOLDER
+
+    return Path(CACHE_FOLDER or "").parent / f"{kernel}-and-more-in-seconds"
+
+
+@contextmanager
+def working(quiet: bool, doing: str = "simulating", of: str = "designs") -> Iterator[Callable[[int, int], None] | None]:
+    """Give a function that shows how many of how many are done, called with 0 once the kernels are compiled.
+
+    It is None where nothing is to be shown.
+
+    Parameters
+    ----------
+    quiet
+        Show nothing.
+    doing, of
+        Word beside the bar, and what is counted.
+    """
+    with progress(quiet, Notes(), doing, of) as shown:
+        if shown is None:
+            yield None
+            return
+        from boulder_sweep.runner.summary import Progress
+
+        begun = time.monotonic()
+
+        def update(done: int, total: int) -> None:
+            nonlocal begun
+            now = time.monotonic()
+            if done == 0:  # what went before was compiling, and does not count as simulation
+                begun = now
+                if not sys.stderr.isatty():
+                    return
+            seconds = max(now - begun, 1e-9)
+            left = seconds / done * (total - done) if done else None
+            shown(Progress(done, total, seconds, done / seconds, left))
+
+        yield update
+
+
+@contextmanager
+def progress(
+    quiet: bool, notes: Notes, doing: str = "simulating", of: str = "designs"
+) -> Iterator[Callable[[Progress], None] | None]:
+    """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere.
+
+    Nothing is compiled here: commands refuse what they must before they compile, and act on signals while they do.
+
+    Parameters
+    ----------
+    quiet
+        Show nothing.
+    notes
+        What was shown already.
+    doing, of
+        See `working`.
+    """
+    if quiet:
+        yield None
+        return
+    if sys.stderr.isatty():
+        with _bar(notes, doing) as show:
+            yield show
+    else:
+        with announced(say, lambda: None):
+            yield _PlainLines(notes, of)
+
+
+class Notes:
+    """The notes of a run that were shown already."""
+
+    def __init__(self) -> None:
+        self._shown = 0
+
+    def new(self, notes: Sequence[str]) -> Sequence[str]:
+        """Return the notes that were not shown yet; they count as shown now."""
+        fresh, self._shown = notes[self._shown :], len(notes)
+        return fresh
+
+
+class _PlainLines:
+    """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
+
+    def __init__(self, notes: Notes, of: str) -> None:
+        self.last = time.monotonic()
+        self._notes, self._of = notes, of
+
+    def __call__(self, now: Progress) -> None:
+        for note in self._notes.new(now.notes):
+            say(f"note: {note}")
+        if time.monotonic() - self.last < PLAIN_EVERY_S:
+            return
+        self.last = time.monotonic()
+        left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
+        say(
+            f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} {self._of}, "
+            f"{now.rows_per_second:,.0f} per second{left}"
+        )
+
+
+@contextmanager
+def _bar(notes: Notes, doing: str) -> Iterator[Callable[[Progress], None]]:
+    """Show a bar; give the function that shows progress."""
+    # rich is for terminals only. It honours NO_COLOR by itself.
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[numbers]}"))
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        # Before the first block is done there is no progress to show; the bar pulses.
+        task = bars.add_task(printable(doing), total=None, numbers="")
+
+        def show(now: Progress) -> None:
+            for note in notes.new(now.notes):
+                bars.console.print(f"note: {printable(note)}", markup=False, highlight=False)
+            left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
+            numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
+            bars.update(task, total=now.rows, completed=now.rows_done, numbers=numbers)
+
+        def describe(words: str = doing) -> None:
+            bars.update(task, description=printable(words))
+
+        with announced(describe, describe):
+            yield show

@@ -24,7 +24,7 @@ from boulder_sweep.cli.options import (
     take_values,
     talk_options,
 )
-from boulder_sweep.cli.output import say, show
+from boulder_sweep.cli.output import Notes, progress, say, show
 from boulder_sweep.errors import EXIT_INTERNAL, Interrupted
 from boulder_sweep.locations import Location, location_of
 from boulder_sweep.text import counted
@@ -73,17 +73,13 @@ def run(
 ) -> int:
     """Simulate every design of GRID and write the table of verdicts."""
     from boulder_sweep.cli import console
-    from boulder_sweep.cli.progress import Notes, progress
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite cannot be used together")
     if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
         raise click.UsageError("--dashboard needs --backend dask, without --scheduler, which has its own dashboard")
-    from boulder_sweep.settings.overrides import ALL_OPINIONS
-
-    chosen = [] if accuracy is None else [f"--accuracy={accuracy}"]
-    chosen += [ALL_OPINIONS] if second_opinion else []
-    sweep = take_values(load_sweep(grid, (*overrides, *chosen), quiet), at, quiet)
+    chosen = overrides if accuracy is None else (*overrides, f"--accuracy={accuracy}")
+    sweep = take_values(load_sweep(grid, chosen, quiet, second_opinion=second_opinion), at, quiet)
     target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
         return _dry_run(sweep, target, options, as_json)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,8 +23,7 @@ from boulder_sweep.cli.options import (
     talk_options,
     units_option,
 )
-from boulder_sweep.cli.output import say, show
-from boulder_sweep.cli.progress import working
+from boulder_sweep.cli.output import say, show, working, wrap
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def simulate(
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         columns = ["", *console.value_lines(whole)] if every else []
-        show(*console.wrap(verdict_line(result)), *lines, *_cautions(row | result.inputs, sweep.model), *columns)
+        show(*wrap(verdict_line(result)), *lines, *_cautions(row | result.inputs, sweep.model), *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:
@@ -225,9 +225,9 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
         ``si`` or ``us``.
     """
     from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-    from boulder_sweep.settings.shown_units import shown_unit
+    from boulder_sweep.settings.shown_units import quantity_text
 
-    (length, metre), (force, kilonewton) = shown_unit("m", units), shown_unit("kN", units)
+    metres = partial(quantity_text, "m", units)
     limit = math.degrees(history.motion.control.theta_limit)
     if row["time_to_limit_s"] is not None:
         reached_ms = 1e3 * row["time_to_limit_s"]
@@ -238,11 +238,11 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
             f"  rotation: {row['max_rotation_deg']:.4g} deg of {limit:g} deg allowed, "
             f"{1 - row['max_rotation_deg'] / limit:.1%} below, "
             f"{1e3 * history.motion.outcome.maxima.t_theta:.0f} ms after contact",
-            f"  penetration: {row['penetration_m'] / metre:.4g} {length}, {rating} allows "
-            f"{PENETRATION_LIMITS_M[rating] / metre:.3g} {length} beyond the far face",
-            f"  displacement: boulder {row['max_displacement_m'] / metre:.3g} {length}, "
-            f"truck {row['max_vehicle_displacement_m'] / metre:.3g} {length}; "
-            f"peak force {row['peak_force_kN'] / kilonewton:,.0f} {force}",
+            f"  penetration: {metres(row['penetration_m'])}, {rating} allows "
+            f"{metres(PENETRATION_LIMITS_M[rating], digits='.3g')} beyond the far face",
+            f"  displacement: boulder {metres(row['max_displacement_m'], digits='.3g')}, "
+            f"truck {metres(row['max_vehicle_displacement_m'], digits='.3g')}; "
+            f"peak force {quantity_text('kN', units, row['peak_force_kN'], digits=',.0f')}",
         ]
     if row.get("permanent_tilt_deg") is not None:
         lines.append(
@@ -252,8 +252,7 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
     if (second := history.motion.second) is not None:
         reached = history.time_s[history.motion.record.offset > 0.0]
         when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
-        crush = f"{second.s_2 / metre:.4g} {length}"
-        lines.append(f"  front: its second spring acts from a crush of {crush} on, {when}")
+        lines.append(f"  front: its second spring acts from a crush of {metres(second.s_2)} on, {when}")
     lines.append(build_line(history, units))
     if row["rotation_error_deg"] is not None:
         lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
@@ -269,12 +268,10 @@ def _to_build(history: Trajectory) -> dict[str, float]:
 
 def build_line(history: Trajectory, units: str = "si") -> str:
     """Return in words what a design takes to build."""
-    from boulder_sweep.settings.shown_units import shown_unit
+    from boulder_sweep.settings.shown_units import quantity_text
 
-    mass, above, dig, fill = _to_build(history).values()
-    (length, metre), (volume, cubic) = shown_unit("m", units), shown_unit("m^3", units)
-    tonnes = f"{mass / 1e3:.1f} t" if units == "si" else f"{mass / shown_unit('kg', units).size:,.0f} lb"
-    return (
-        f"  to build: {tonnes}, {above / metre:.3g} {length} above ground; "
-        f"dig {dig / cubic:.1f} {volume}, fill {fill / cubic:.1f} {volume}"
-    )
+    mass, above, *volumes = _to_build(history).values()
+    weight = f"{mass / 1e3:.1f} t" if units == "si" else quantity_text("kg", units, mass, digits=",.0f")
+    dig, fill = (quantity_text("m^3", units, volume, digits=".1f") for volume in volumes)
+    height = quantity_text("m", units, above, digits=".3g")
+    return f"  to build: {weight}, {height} above ground; dig {dig}, fill {fill}"

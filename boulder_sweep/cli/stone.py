@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -23,18 +23,18 @@ from boulder_sweep.cli.options import (
     set_option,
     take_values,
 )
-from boulder_sweep.cli.output import say, show
-from boulder_sweep.cli.progress import working
+from boulder_sweep.cli.output import say, show, working
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.placing import Placing, Way
-    from boulder_sweep.answers.printing import Column
+    from boulder_sweep.answers.printing import Cell
     from boulder_sweep.settings import Sweep
     from boulder_sweep.stones.standing import Standing
     from boulder_sweep.stones.weighing import ScannedStone
 
+T = TypeVar("T")
 EXAMPLES = """\b
 Examples:
   sweep stone rock.ply --mass '18.2 t'
@@ -96,33 +96,31 @@ def stone(
     found = scanned(rock, metres=metres, mass_kg=mass_kg)
     for caution in found.cautions:
         say(f"caution: {caution}")
-    chosen = None if up is None or facing is None else found.stone.standing(up, facing)
+    chosen = None if up is None or facing is None else (found.stone.standing(up, facing),)
     if site is not None:
-        return _place(found, rock, unit, site, chosen, plot, margin, at, overrides, quiet, as_json)
-    if as_json:
-        show(json.dumps(found.to_dict() if chosen is None else found.to_dict((chosen,))))
+        result = _place(found, site, chosen, margin, at, overrides, quiet)
+        text = [*stone_lines(found), "", *placing_lines(result, rock, unit, site)]
+        show(*([json.dumps(result.to_dict())] if as_json else text))
+    elif as_json:
+        show(json.dumps(found.to_dict(chosen)))
     else:
-        ways = standing_lines(found) if chosen is None else settings_lines(found, chosen)
+        ways = standing_lines(found) if chosen is None else settings_lines(found, *chosen)
         show(*stone_lines(found), "", *ways)
     if plot is not None:
-        found.plot(plot)
+        (found if site is None else result).plot(plot)
     return 0
 
 
 def _place(
     found: ScannedStone,
-    rock: str,
-    unit: str,
     site: str,
-    chosen: Standing | None,
-    plot: str | None,
+    standings: tuple[Standing, ...] | None,
     margin: str,
     at: str | None,
     overrides: tuple[str, ...],
     quiet: bool,
-    as_json: bool,
-) -> int:
-    """Find and print the best ways to stand at a site; return the exit code."""
+) -> Placing:
+    """Find the best ways to stand at a site, among all or among some."""
     from boulder_sweep.answers.placing import placed
 
     said = False
@@ -133,23 +131,15 @@ def _place(
         said, silent = True, quiet or said
         return take_values(load_sweep(site, (*overrides, block), silent), at, silent)
 
-    standings = None if chosen is None else (chosen,)
     if not any(own.has_foot for own in standings or found.standings):
         raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")
     with working(quiet, "placing", "ways") as progress:
-        result = placed(found, with_boulder, standings, margin=margin, progress=progress)
-    if as_json:
-        show(json.dumps(result.to_dict()))
-    else:
-        show(*stone_lines(found), "", *placing_lines(result, rock, unit, site))
-    if plot is not None:
-        result.plot(plot)
-    return 0
+        return placed(found, with_boulder, standings, margin=margin, progress=progress)
 
 
 def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]:
     """Return the ways to stand at a site, the one of least depth first, and a block of settings for that one."""
-    from boulder_sweep.answers.printing import grade_lines, table_lines
+    from boulder_sweep.answers.printing import grade_lines
     from boulder_sweep.judge.validity import NOT_A_RATING
 
     passing = result.passing
@@ -161,31 +151,27 @@ def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]
     ]
     if not passing:
         return [f"at {site} it passes at no depth{cases}", *rest]
-    rows = [{"way": way} for way in passing]
-
-    def column(head: tuple[str, str], text: Callable[[Way], str]) -> Column:
-        return head, lambda row: text(row["way"])
 
     def depth(way: Way) -> float:
         return way.depth_m or 0.0
 
-    columns = [
-        column(("up", ""), lambda way: way.standing.up),
-        column(("facing", ""), lambda way: way.standing.facing),
-        column(("depth", "m"), lambda way: f"{depth(way):.3f}"),
-        column(("above", "m"), lambda way: f"{way.standing.profile.height[-1] - depth(way):.2f}"),
-        column(("length", "m"), lambda way: f"{way.standing.profile.length.max():.2f}"),
-        column(("width", "m"), lambda way: f"{way.standing.profile.width.max():.2f}"),
-        column(("foot", "m"), lambda way: foot_text(way.standing)),
-        column(("cut", "m"), lambda way: f"{way.standing.cut_m:.2f}"),
-        column(("mass", "t"), lambda way: f"{result.found.density_kg_m3 * way.standing.volume / 1e3:.1f}"),
-        column(("turns", "deg"), lambda way: f"{way.row['max_rotation_deg']:.1f}"),
+    columns: list[tuple[tuple[str, str], Callable[[Way], str]]] = [
+        (("up", ""), lambda way: way.standing.up),
+        (("facing", ""), lambda way: way.standing.facing),
+        (("depth", "m"), lambda way: f"{depth(way):.3f}"),
+        (("above", "m"), lambda way: f"{way.standing.profile.height[-1] - depth(way):.2f}"),
+        (("length", "m"), lambda way: f"{way.standing.profile.length.max():.2f}"),
+        (("width", "m"), lambda way: f"{way.standing.profile.width.max():.2f}"),
+        (("foot", "m"), lambda way: foot_text(way.standing)),
+        (("cut", "m"), lambda way: f"{way.standing.cut_m:.2f}"),
+        (("mass", "t"), lambda way: f"{result.found.density_kg_m3 * way.standing.volume / 1e3:.1f}"),
+        (("turns", "deg"), lambda way: f"{way.row['max_rotation_deg']:.1f}"),
     ]
     best = passing[0]
     words = "" if unit == "m" else f", unit: {unit}"
     return [
         f"at {site}, least depth{cases}:",
-        *table_lines(columns, rows),
+        *_table(columns, passing),
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
         "above: height over the ground; mass: of what is left after the cut",
         *rest,
@@ -232,26 +218,29 @@ def stone_lines(found: ScannedStone) -> list[str]:
 
 def standing_lines(found: ScannedStone) -> list[str]:
     """Return how it can stand: a line for each end up and each pair of opposite faces to the road."""
+    columns: list[tuple[tuple[str, str], Callable[[Standing], str]]] = [
+        (("up", ""), lambda own: own.up),
+        (("facing", ""), lambda own: f"±{own.facing}"),
+        (("height", "m"), lambda own: f"{own.profile.height[-1]:.2f}"),
+        (("length", "m"), lambda own: f"{own.profile.length.max():.2f}"),
+        (("width", "m"), lambda own: f"{own.profile.width.max():.2f}"),
+        (("foot", "m"), foot_text),
+        (("cut", "m"), lambda own: f"{own.cut_m:.2f}"),
+        (("cut", "of mass"), lambda own: f"{own.cut_share:.1%}"),
+        (("rests", "uncut"), lambda own: f"{own.rests:.0%}"),
+        (("fit", "m"), lambda own: f"{own.profile.error:.3f}"),
+    ]
+    return [*_table(columns, [own for own in found.standings if not own.facing.startswith("-")]), *_legend(found)]
+
+
+def _table(columns: Iterable[tuple[tuple[str, str], Callable[[T], str]]], ways: Iterable[T]) -> list[str]:
+    """Return ways to stand as a table; of each column its name and unit, and what it says of one of them."""
     from boulder_sweep.answers.printing import table_lines
 
-    rows = [{"standing": own} for own in found.standings if not own.facing.startswith("-")]
+    def cell(text: Callable[[T], str]) -> Cell:
+        return lambda row: text(row["way"])
 
-    def column(head: tuple[str, str], text: Callable[[Standing], str]) -> Column:
-        return head, lambda row: text(row["standing"])
-
-    columns = [
-        column(("up", ""), lambda own: own.up),
-        column(("facing", ""), lambda own: f"±{own.facing}"),
-        column(("height", "m"), lambda own: f"{own.profile.height[-1]:.2f}"),
-        column(("length", "m"), lambda own: f"{own.profile.length.max():.2f}"),
-        column(("width", "m"), lambda own: f"{own.profile.width.max():.2f}"),
-        column(("foot", "m"), foot_text),
-        column(("cut", "m"), lambda own: f"{own.cut_m:.2f}"),
-        column(("cut", "of mass"), lambda own: f"{own.cut_share:.1%}"),
-        column(("rests", "uncut"), lambda own: f"{own.rests:.0%}"),
-        column(("fit", "m"), lambda own: f"{own.profile.error:.3f}"),
-    ]
-    return [*table_lines(columns, rows), *_legend(found.standings)]
+    return table_lines([(head, cell(text)) for head, text in columns], [{"way": way} for way in ways])
 
 
 def settings_lines(found: ScannedStone, own: Standing) -> list[str]:
@@ -275,7 +264,7 @@ def foot_text(own: Standing) -> str:
     return f"{own.profile.length[0]:.2f} × {own.profile.width[0]:.2f}" if own.has_foot else "rounded"
 
 
-def _legend(standings: Iterable[Standing]) -> list[str]:
+def _legend(found: ScannedStone) -> list[str]:
     """Return what the columns mean, as far as they say something."""
     lines = [
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
@@ -283,6 +272,6 @@ def _legend(standings: Iterable[Standing]) -> list[str]:
         "rests: section of the uncut stone just above the ground over its largest one",
         "fit: error of the profile, root mean square over the volume",
     ]
-    if any(not own.has_foot for own in standings):
+    if any(not own.has_foot for own in found.standings):
         lines.append("rounded: no cut of a quarter of the height makes a foot; bed it in concrete")
     return lines

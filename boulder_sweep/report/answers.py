@@ -4,21 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.files import CAPACITY, NEED, AnswerFile
-from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.files import CAPACITY, NEED
 from boulder_sweep.columns import GRADES, TO_BUILD
 from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS, meaning_of
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
-from boulder_sweep.report.asked import capacity_sentences, need_sentences
+from boulder_sweep.report.asked import (
+    Named,
+    Quantity,
+    Sentence,
+    capacity_sentences,
+    listed,
+    need_sentences,
+    share,
+    verb,
+)
 from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
-from boulder_sweep.report.sentences import Named, Quantity, Sentence, listed, share, verb
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import REASON_WORDS
+
+if TYPE_CHECKING:
+    from boulder_sweep.answers.need import Need
 
 SAFE = 0.95
 """Probability of passing from which on a design is called safe here."""
@@ -45,8 +55,8 @@ def answer_of(rows: Rows) -> Answer:
     counts, total = rows.counts(), len(rows.codes)
     passing = rows.having("pass")
     n = int(passing.sum())
-    if rows.kind == NEED:
-        return _of_answers(rows, n)
+    if rows.need is not None:
+        return _of_answers(rows, rows.need, n)
     uncertain = _uncertain(rows)
     if total == 1:
         return _of_one(rows, uncertain)
@@ -89,11 +99,8 @@ def answer_of(rows: Rows) -> Answer:
     return Answer(tuple(sentences), tuple(named.values()))
 
 
-def _of_answers(rows: Rows, n: int) -> Answer:
+def _of_answers(rows: Rows, need: Need, n: int) -> Answer:
     """Describe the answers of `sweep need`."""
-    assert isinstance(rows.finished, AnswerFile)
-    need = rows.finished.answers()
-    assert isinstance(need, Need)
     sentences, named = need_sentences(rows, need)
     if n == 1:
         sentences += _of_row(rows, rows.row(named[0].number))
@@ -148,17 +155,10 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
         return [((largest,), Named("Design with the largest probability of passing", best))]
     withstood = _withstood(rows, safe.reshape(rows.shape))
     mass = np.where(withstood.designs, rows.mass(), np.inf)
-    siblings = rows.siblings(int(mass.argmin()), withstood.kinds)
-    kinds = withstood.kinds if len(siblings) > 1 else ()
+    siblings, kinds = withstood.siblings(rows, int(mass.argmin()))
     number = int(siblings[chances[siblings].argmin()])
-    depth = float(np.broadcast_to(rows.depth(), rows.shape).flat[number])
-    sentence: Sentence = (
-        f"{first}. The lightest {f'boulder that does so {_where(rows, kinds)}' if kinds else 'of them'}",
-        *_beyond(rows, siblings, kinds),
-        *(": ", Quantity(float(mass.flat[number]), "kg"), " of rock, "),
-        *(Quantity(depth, "m"), f" deep (design {number:,}, P(pass) = {chances[number]:.1%}{_worst(rows, kinds)})."),
-        *_to_build(rows, number),
-    )
+    lead = f"{first}. The lightest {f'boulder that does so {_where(rows, kinds)}' if kinds else 'of them'}"
+    sentence = _describe(rows, number, siblings, kinds, lead, f", P(pass) = {chances[number]:.1%}")
     title = f"Lightest boulder that passes with a probability of {SAFE:.0%}"
     return [(sentence, Named(f"{title} {_where(rows, kinds)}".rstrip(), number))]
 
@@ -166,12 +166,10 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
 def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answer:
     """Describe the result of a single design."""
     row, name = rows.row(0), rows.names[rows.codes[0]]
-    mass, depth = (float(value.flat[0]) for value in (rows.mass(), rows.depth()))
     margin = "" if row["margin"] is None else f", with a margin of {row['margin']:.1%}"
     verdict = f"{_in_words(name, 1)}{margin}{', at the means of its uncertain inputs' if uncertain else ''}"
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
-    what = (Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m"), " deep.", *_to_build(rows, 0))
-    sentences.append((f"The design {verdict}: ", *what))
+    sentences.append((f"The design {verdict}: ", *_sizes(rows, 0), " deep.", *_to_build(rows, 0)))
     if rows.kind == CAPACITY:
         sentences += capacity_sentences(row)
     sentences += _of_row(rows, row)
@@ -189,6 +187,12 @@ def _of_row(rows: Rows, row: dict[str, Any]) -> list[Sentence]:
     if flags:
         sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))
     return sentences
+
+
+def _sizes(rows: Rows, number: int) -> Sentence:
+    """Say how heavy a boulder is and how deep it stands."""
+    mass, depth = (float(values.flat[number]) for values in (rows.mass(), rows.depth()))
+    return Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m")
 
 
 def _to_build(rows: Rows, number: int) -> Sentence:
@@ -234,6 +238,11 @@ class Withstood(NamedTuple):
     """Whether a row is one of them, in the shape of the grid."""
     kinds: tuple[str, ...]
     """The conditions under all of which they hold."""
+
+    def siblings(self, rows: Rows, number: int) -> tuple[np.ndarray, tuple[str, ...]]:
+        """Return the rows of a boulder under these conditions, and the conditions; none where it has a single row."""
+        siblings = rows.siblings(number, self.kinds)
+        return siblings, self.kinds if len(siblings) > 1 else ()
 
 
 def _varied(rows: Rows) -> tuple[str, ...]:
@@ -292,28 +301,32 @@ def _beyond(rows: Rows, siblings: np.ndarray, kinds: tuple[str, ...]) -> Sentenc
     return tuple(said)
 
 
+def _describe(rows: Rows, number: int, siblings: np.ndarray, kinds: tuple[str, ...], lead: str, held: str) -> Sentence:
+    """Describe a boulder behind the words that lead to it: conditions, sizes, worst row, what it takes to build."""
+    return (
+        lead,
+        *_beyond(rows, siblings, kinds),
+        ": ",
+        *_sizes(rows, number),
+        f" deep (design {number:,}{held}{_worst(rows, kinds)}).",
+        *_to_build(rows, number),
+    )
+
+
 def _least(rows: Rows, withstood: Withstood, what: str) -> tuple[Sentence, Named]:
     """Find the design of least mass or depth among boulders that pass, in the row that is worst for it."""
     values, other = (rows.mass(), rows.depth()) if what == "mass" else (rows.depth(), rows.mass())
     least = np.where(withstood.designs, values, np.inf)
     # Ties are broken by the other quantity.
     ties = least <= least.min() * (1.0 + 1e-9)
-    siblings = rows.siblings(int(np.argmin(np.where(ties, other, np.inf))), withstood.kinds)
-    kinds = withstood.kinds if len(siblings) > 1 else ()
+    siblings, kinds = withstood.siblings(rows, int(np.argmin(np.where(ties, other, np.inf))))
     margins = rows.margins(siblings)
     number = int(siblings[np.argmin(np.where(np.isnan(margins), np.inf, margins))])
-    mass, depth = (float(np.broadcast_to(value, rows.shape).flat[number]) for value in (rows.mass(), rows.depth()))
     title = "Lightest boulder that passes" if what == "mass" else "Shallowest embedment that passes"
     row = rows.row(number)
     grade = rows.grade(row)
     held = f", margin {row['margin']:.1%}" if row["margin"] is not None else ""
     held += f", {grade}" if grade in ("robust", "sensitive") else ""
     where = _where(rows, kinds)
-    sentence: Sentence = (
-        f"The {title[0].lower()}{title[1:]} {where or 'among them'}",
-        *_beyond(rows, siblings, kinds),
-        *(": ", Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m")),
-        f" deep (design {number:,}{held}{_worst(rows, kinds)}).",
-        *_to_build(rows, number),
-    )
-    return sentence, Named(f"{title} {where}".rstrip(), number)
+    lead = f"The {title[0].lower()}{title[1:]} {where or 'among them'}"
+    return _describe(rows, number, siblings, kinds, lead, held), Named(f"{title} {where}".rstrip(), number)

@@ -1,8 +1,11 @@
-"""What a file of answers says: the question and its governing answer in sentences, and the answers as a table."""
+"""What a file of answers says: the question and its governing answer in sentences, and the answers as a table.
+
+The parts of sentences, here and in `boulder_sweep.report.answers`, are words and numbers with units.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +16,6 @@ from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.search import BLOCKED, NEVER, WORDS
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS
 from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, Rows, condition_of, label_of
-from boulder_sweep.report.sentences import Named, Quantity, Sentence, listed, share, verb
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import counted
 
@@ -24,6 +26,40 @@ NOTHING = {
     WORDS[BLOCKED]: "not pass up to where the truck would pass or ride over the boulder; another boulder is needed",
 }
 """What is said where there is no answer."""
+
+
+class Quantity(NamedTuple):
+    """A number in a sentence, in a unit of the table; the page shows it in the reader's."""
+
+    value: float
+    unit: str
+
+
+Sentence = tuple[str | Quantity, ...]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A design worth naming."""
+
+    title: str
+    number: int
+    """Its row."""
+
+
+def verb(count: int, many: str, one: str) -> str:
+    """The form of a verb that goes with a number."""
+    return one if count == 1 else many
+
+
+def share(n: int, total: int) -> str:
+    """Share of a total in per cent; never rounded to 0 % or 100 % unless exact."""
+    return f"{n / total if n in (0, total) else min(max(n / total, 0.001), 0.999):.1%}"
+
+
+def listed(words: tuple[str, ...] | list[str]) -> str:
+    """Words as a list in a sentence."""
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
 class Table(NamedTuple):
@@ -62,10 +98,10 @@ def need_sentences(rows: Rows, need: Need) -> tuple[list[Sentence], list[Named]]
 
 def _terms(need: Need, rows: Rows) -> str:
     """Say what an answer must have besides passing."""
-    asked = rows.finished.question if isinstance(rows.finished, AnswerFile) else {}
+    assert isinstance(rows.finished, AnswerFile)
     words = [f"a margin of {need.least_margin:.0%} or more"] if need.least_margin else []
     words += [f"a probability of {100 * need.probability:.10g} % or more"] if need.probability is not None else []
-    robust = " and is robust" if asked.get("robust") else ""
+    robust = " and is robust" if rows.finished.question.get("robust") else ""
     return f"{robust}{' with ' if words else ''}{listed(words) if words else ''}"
 
 
@@ -95,30 +131,21 @@ def _governing(rows: Rows, need: Need, answers: np.ndarray) -> tuple[Sentence, N
     row = rows.row(number)
     sizes: list[str | Quantity] = []
     if need.key.name != BOULDER_MASS:
-        sizes += [Quantity(float(mass[number]), "kg"), " of rock, "]
+        sizes += [", ", Quantity(float(mass[number]), "kg"), " of rock"]
     if need.key.name != DEPTH:
-        sizes += [Quantity(row[DEPTH], "m"), " deep, "]
+        sizes += [", ", Quantity(row[DEPTH], "m"), " deep"]
     more = [f"margin {row['margin']:.1%}"] if row["margin"] is not None and need.probability is None else []
     more += [f"P(pass) = {row['p_pass']:.1%}"] if "p_pass" in row else []
     more += [row["robustness"]] if row["robustness"] in ("robust", "sensitive") else []
-    what = f"{key_words(need)} "
-    unit = need.key.field.unit
-    asked = Quantity(float(answers[number]), unit)
+    asked = Quantity(float(answers[number]), need.key.field.unit)
     where = " where that is worst for it" if several else ""
     if len(answers) == 1:
         lead = f"The {key_words(need)} that passes{_terms(need, rows)}: "
-        sentence: Sentence = (lead, asked, ", ", *sizes[:-1], f"{_ended(sizes)} ({', '.join(more)}).")
-        return sentence, Named("The answer", number)
+        return (lead, asked, *sizes, f" ({', '.join(more)})."), Named("The answer", number)
     who = "Lightest boulder with an answer" if need.key.name != BOULDER_MASS else "Governing answer"
     title = f"{who} {under}".rstrip()
-    sentence = (f"{title}: ", *sizes, what, asked, f"{where} (design {number:,}{''.join(f', {one}' for one in more)}).")
-    return sentence, Named(title, number)
-
-
-def _ended(sizes: Sequence[str | Quantity]) -> str:
-    """Return the last words of a list of sizes without the comma behind them."""
-    last = sizes[-1] if sizes else ""
-    return str(last).rstrip(", ") if isinstance(last, str) else ""
+    end = f"{where} ({', '.join([f'design {number:,}', *more])})."
+    return (f"{title}: ", *sizes[1:], f", {key_words(need)} ", asked, end), Named(title, number)
 
 
 def capacity_sentences(row: dict[str, Any]) -> list[Sentence]:
@@ -158,18 +185,6 @@ def answers_table(rows: Rows) -> Table | None:
     left = f"the first {MOST_LINES:,} of {len(table):,} answers; `sweep export` writes them all" if more else ""
     lines = tuple(tuple(_cell(row, name, unit, open_) for _, name, unit in columns) for row in kept)
     return Table(tuple(head for head, _, _ in columns), lines, left)
-
-
-def map_of(rows: Rows) -> dict[str, Any]:
-    """Return what the map of answers adds to that of a list: the axes it starts with, and the input asked for."""
-    if rows.kind != NEED:
-        return {"first": [], "asked": ""}
-    assert isinstance(rows.finished, AnswerFile)
-    need = rows.finished.answers()
-    assert isinstance(need, Need)
-    others = [name for name in rows.varying() if name not in (need.key.name, *need.derived)]
-    asked = need.key.name if need.key.name in rows.varying() else ""
-    return {"first": [*others, *([asked] if asked else [])][:2], "asked": asked}
 
 
 def _own_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:

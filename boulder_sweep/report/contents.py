@@ -6,7 +6,7 @@ import base64
 import gzip
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -21,18 +21,12 @@ from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRI
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
-from boulder_sweep.judge.validity import (
-    FLAGS,
-    TESTED_OVERLAP_M,
-    TESTED_ROTATION_DEG,
-    usual_range,
-)
+from boulder_sweep.judge.validity import FLAGS, TESTED_OVERLAP_M, TESTED_ROTATION_DEG, usual_range
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, STEP_REASONS
 from boulder_sweep.report import entry_points
-from boulder_sweep.report.asked import map_of
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, parts_of
-from boulder_sweep.report.rows import MOST_ELEMENTS, SIZES, Rows, Thinned, label_of
+from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, SIZES, Rows, label_of
 from boulder_sweep.settings.choices import LAYER_FIELDS
 from boulder_sweep.settings.consistency import FLOATS, SLIDES, uppermost_is_wet
 from boulder_sweep.settings.fields import BY_NAME, fields_of
@@ -47,9 +41,9 @@ from boulder_sweep.settings.notes import (
     api_curve,
     terzaghi_curve,
 )
-from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, describe, needed
+from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, needed
 from boulder_sweep.settings.shape import Shape
-from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
+from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text, shown_unit
 from boulder_sweep.soils import SLICES, is_layered
 from boulder_sweep.views.wording import REASON_WORDS
 
@@ -77,13 +71,17 @@ FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
 """Sides that the reader cannot change where the boulder is a stone with a profile of its own."""
 OF_THE_PAGE = {"L": "reach_m", "bed_offset": "bed_offset_m"}
 """Where the page has its own names for what the verdict takes: a boulder reaches from where it is struck."""
+MOST_CELLS = 1_500_000
+"""Most designs of a grid whose verdicts go into the page; of larger grids, some values of the longest axes are left
+out."""
+MOST_POINTS = 20_000
+"""The same for a list of designs, each of which carries its inputs."""
 ANGLES = np.arange(20.0, 61.0)
 """Friction angles [deg] at which the page knows which soil constants belong together."""
 
 
 def page_data(
     *,
-    title: str,
     settings: Mapping[str, Any],
     control: Control,
     readings: Readings,
@@ -97,7 +95,7 @@ def page_data(
     simulated = control._replace(elements=min(control.elements, MOST_ELEMENTS))
     simulated = simulated._replace(paired=is_paired(readings, simulated, layered=is_layered(law, ground, shape)))
     return {
-        "title": title,
+        "title": str(settings["name"]),
         "units": units,
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
@@ -155,6 +153,45 @@ def page_data(
     }
 
 
+@dataclass(frozen=True, eq=False)
+class Thinned:
+    """The part of a grid or list that goes into the page.
+
+    Attributes
+    ----------
+    places : tuple of ndarray
+        Indices kept along each axis; for a list, the rows.
+    words : str
+        What is left out; empty if nothing is.
+    """
+
+    places: tuple[np.ndarray, ...]
+    words: str
+
+
+def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
+    """Choose the rows that go into the page: all, or values spread evenly along the longest axes."""
+    if not rows.axes:
+        computed = np.flatnonzero(~rows.having(NOT_YET))  # the inputs of the others are in no file yet
+        n, kept = len(computed), min(len(computed), most_points)
+        words = f"{kept:,} of the {n:,} designs of the list, spread evenly" if kept < n else ""
+        return Thinned((computed[np.round(np.linspace(0, n - 1, kept)).astype(np.int64)],), words)
+    lengths = list(rows.shape)
+    while np.prod(lengths, dtype=float) > most_cells:
+        longest = int(np.argmax(lengths))
+        lengths[longest] = -(-lengths[longest] // 2)
+    places = tuple(
+        np.round(np.linspace(0, whole - 1, kept)).astype(np.int64)
+        for whole, kept in zip(rows.shape, lengths, strict=True)
+    )
+    left = [
+        f"{kept:,} of {whole:,} values of {name}"
+        for name, whole, kept in zip(rows.axes, rows.shape, lengths, strict=True)
+        if kept < whole
+    ]
+    return Thinned(places, f"{', '.join(left)}, spread evenly" if left else "")
+
+
 def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
     """Return the data of the map: codes of the designs kept, values along the axes or of the list."""
     codes = rows.codes.reshape(rows.shape)[np.ix_(*kept.places)].ravel()
@@ -182,6 +219,16 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
     }
 
 
+def map_of(rows: Rows) -> dict[str, Any]:
+    """Return what the map of answers adds to that of a list: the axes it starts with, and the input asked for."""
+    if rows.need is None:
+        return {"first": [], "asked": ""}
+    key, varying = rows.need.key, rows.varying()
+    others = [name for name in varying if name not in (key.name, *rows.need.derived)]
+    asked = [key.name] if key.name in varying else []
+    return {"first": [*others, *asked][:2], "asked": "".join(asked)}
+
+
 def held_at(rows: Rows, kept: Thinned, number: int) -> dict[str, int]:
     """Return the place of a design along each axis of the map; the nearest one kept where its own is left out."""
     if not rows.axes:
@@ -197,25 +244,6 @@ def reading_words(settings: Mapping[str, Any]) -> str:
     if model["preset"] != "mixed":
         return str(model["preset"]).replace("_", " ")
     return ", ".join(f"{name}: {value}" for name, value in model["readings"].items())
-
-
-def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
-    """Return the settings as lines of text, one line for each list."""
-    lines = []
-    for name, value in settings.items():
-        if isinstance(value, Mapping):
-            lines += [f"{indent}{name}:", *setting_lines(value, f"{indent}  ")]
-        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-            for place, one in enumerate(value, 1):
-                lines += [f"{indent}{name} {place}:", *setting_lines(one, f"{indent}  ")]
-        else:
-            shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in _as_list(value))
-            lines.append(f"{indent}{name}: {shown}")
-    return lines
-
-
-def _as_list(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else [value]
 
 
 def _packed(content: bytes) -> str:
@@ -338,8 +366,7 @@ def _ground_entries(ground: Ground, system: str) -> list[str]:
 
 def _quantity(value: float, unit: str, system: str) -> str:
     """A value in a unit of the table with the unit that it is shown in, to six digits."""
-    shown = shown_unit(unit, system)
-    return describe(value / shown.size, shown.unit)
+    return quantity_text(unit, system, value, digits=".6g")
 
 
 def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str, list[str]]:
@@ -347,9 +374,7 @@ def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str,
     criterion, model, solver = (settings[name] for name in ("criterion", "model", "solver"))
     taper = Shape.of_model(settings["model"]).taper
     soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
-    readings = model["preset"]
-    if readings == "mixed":
-        readings = "{" + ", ".join(f"{name}: {value}" for name, value in model["readings"].items()) + "}"
+    readings = f"{{{reading_words(settings)}}}" if model["preset"] == "mixed" else model["preset"]
     asked = solver["accuracy"] or (f"{solver['accuracy_deg']} deg" if solver["accuracy_deg"] is not None else None)
     accuracy = f"step: {solver['step_s']} s" if asked is None else f"accuracy: {asked}"
     limits = [

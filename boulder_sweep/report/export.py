@@ -15,7 +15,6 @@ from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import RemotePath, location_of
-from boulder_sweep.report.contents import setting_lines
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
 from boulder_sweep.store.files import check_target, replacing
 from boulder_sweep.store.reader import FinishedRows
@@ -130,6 +129,22 @@ def about(finished: Result, columns: Iterable[Shown], units: str = "si") -> Iter
     yield "settings", "", ""
     for line in setting_lines(shown_settings(identity["settings"], units)):
         yield line, "", ""
+
+
+def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
+    """Return the settings as lines of text, one line for each list."""
+    lines = []
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            lines += [f"{indent}{name}:", *setting_lines(value, f"{indent}  ")]
+        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+            for place, one in enumerate(value, 1):
+                lines += [f"{indent}{name} {place}:", *setting_lines(one, f"{indent}  ")]
+        else:
+            values = value if isinstance(value, list) else [value]
+            shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in values)
+            lines.append(f"{indent}{name}: {shown}")
+    return lines
 
 
 def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:

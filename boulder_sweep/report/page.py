@@ -14,30 +14,20 @@ from bokeh.embed.util import standalone_docs_json_and_render_items
 from bokeh.resources import INLINE
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.report.contents import (
-    held_at,
-    page_data,
-    reading_words,
-    setting_lines,
-    table_data,
-)
-from boulder_sweep.report.figures import curves, parts_of, verdict_map
-from boulder_sweep.report.sketch import sketch_of
+from boulder_sweep.report.contents import held_at, page_data, reading_words, table_data, thinned
+from boulder_sweep.report.export import setting_lines
+from boulder_sweep.report.figures import curves, parts_of, sketch_of, verdict_map
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_settings
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
 if TYPE_CHECKING:
-    from boulder_sweep.report.asked import Table
-    from boulder_sweep.report.rows import Rows, Thinned
-    from boulder_sweep.report.sentences import Sentence
+    from boulder_sweep.report.asked import Sentence, Table
+    from boulder_sweep.report.rows import Rows
 
 ASSETS = Path(__file__).with_name("assets")
-SCRIPTS = (
-    *("kernel", "verdict", "outline", "simulator", "units", "plots", "scene", "maps"),
-    *("walker", "controls", "choices", "player", "texts", "page"),
-)
+SCRIPTS = ("kernel", "verdict", "simulator", "texts", "plots", "scene", "maps", "controls", "page")
 """Our own script, in this order."""
 NOTHING: Mapping[str, str] = {}
 MAIN = (
@@ -55,7 +45,6 @@ MAIN = (
 
 def assembled(
     *,
-    title: str,
     settings: Mapping[str, Any],
     control: Control,
     readings: Readings,
@@ -63,7 +52,6 @@ def assembled(
     sentences: Sequence[Sentence] = (),
     answers: Table | None = None,
     rows: Rows | None = None,
-    kept: Thinned | None = None,
     chosen: Sequence[Mapping[str, Any]] = (),
     facts: Sequence[tuple[str, str]] = (),
     notes: Sequence[str] = (),
@@ -74,10 +62,8 @@ def assembled(
 
     Parameters
     ----------
-    title
-        Title of the page.
     settings
-        Resolved settings of the sweep.
+        Resolved settings of the sweep, whose name is the title of the page.
     control, readings
         How its designs are simulated.
     start
@@ -86,8 +72,8 @@ def assembled(
         The answer in words.
     answers
         The answers one by one, of a file of them.
-    rows, kept
-        Rows of a result, and those kept in the page; None for a single design.
+    rows
+        Rows of a result; None for a single design.
     chosen
         Designs that are shown in full: ``title``, ``number`` and ``inputs`` of each.
     facts
@@ -104,26 +90,19 @@ def assembled(
     str
         HTML.
     """
+    kept, table = None, None
+    if rows is not None:
+        kept = thinned(rows)
+        table = {**table_data(rows, kept), "held": held_at(rows, kept, chosen[0]["number"])}
+    mapped = table is not None and table["mapped"]
     panels = ["live", *(f"chosen{place}" for place in range(len(chosen)))]
     document = Document()
-    for plot in [*(plot for panel in panels for plot in curves(panel, parts_of(control))), verdict_map("live")]:
+    curved = [plot for panel in panels for plot in curves(panel, parts_of(control))]
+    for plot in [*curved, *map(verdict_map, ["live", "sweep"] if mapped else ["live"])]:
         document.add_root(plot)
-    table = None if rows is None or kept is None else table_data(rows, kept)
-    if table is not None and rows is not None and kept is not None and chosen:
-        table["held"] = held_at(rows, kept, chosen[0]["number"])
-    if table is not None and table["mapped"]:
-        document.add_root(verdict_map("sweep"))
     docs, items = standalone_docs_json_and_render_items(list(document.roots))
     places = {plot.id: f"figure-{plot.name}" for plot in document.roots}
-    data = page_data(
-        title=title,
-        settings=settings,
-        control=control,
-        readings=readings,
-        start=start,
-        chosen=chosen,
-        units=units,
-    )
+    data = page_data(settings=settings, control=control, readings=readings, start=start, chosen=chosen, units=units)
     data["rows"] = table
     data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": places} for item in items]}
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
@@ -136,7 +115,7 @@ def assembled(
         undefined=jinja2.StrictUndefined,
     )
     return environment.get_template("page.html").render(
-        title=title,
+        title=data["title"],
         sentences=sentences,
         answers=answers,
         panels=panels,
@@ -144,7 +123,7 @@ def assembled(
         main=MAIN,
         chosen=data["chosen"],
         thinned=kept.words if kept is not None else None,
-        mapped=table is not None and table["mapped"],
+        mapped=mapped,
         facts=facts,
         notes=notes,
         heading=heading,
@@ -167,12 +146,9 @@ def assembled(
 
 def _policy(*scripts: str) -> str:
     """Content-Security-Policy of the page: its own scripts, no connections."""
-    hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
+    digests = [hashlib.sha256(script.encode()).digest() for script in scripts]
+    hashes = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
     return (
         f"default-src 'none'; script-src {hashes} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; "
         "img-src data: blob:; font-src data:; connect-src 'none'; form-action 'none'; base-uri 'none'"
     )
-
-
-def _sha256(text: str) -> str:
-    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

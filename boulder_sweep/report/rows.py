@@ -1,40 +1,42 @@
-"""Contents of the page for a table of any size: one small number for each design, and the designs worth naming.
+"""The rows of a result for its page: one small number for each design, and the designs worth naming.
 
-`boulder_sweep.report.reading` reads them. If the designs come from axes, their inputs follow from the settings.
+If the designs come from axes, their inputs follow from the settings; a table is read part by part.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.files import UNCERTAINTY, AnswerFile, kind_of
+from boulder_sweep.answers.files import CAPACITY, NEED, UNCERTAINTY, AnswerFile, answered, kind_of, result_of
+from boulder_sweep.answers.need import Need
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.errors import ReportError
 from boulder_sweep.impact.explanation import one_design
 from boulder_sweep.judge.accuracy import accuracy_of, known_control
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.quantities import NEEDED, quantities_by
+from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import completed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.store.reader import FinishedRows, read_row
+from boulder_sweep.text import counted
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
 CONDITIONS = {"soil": "in every soil", "vehicle": "against every vehicle", "speed": "at every speed"}
 """What a boulder must withstand as it is, in the words of a sentence; not the designer's choice."""
 NOT_YET = "not computed yet"
-MOST_CELLS = 1_500_000
-"""Most designs of a grid whose verdicts go into the page; of larger grids, some values of the longest axes are left
-out."""
-MOST_POINTS = 20_000
-"""The same for a list of designs, each of which carries its inputs."""
-
 MOST_ELEMENTS = 5000
 """Most soil elements that the page simulates with; the paper has as many."""
 
@@ -54,6 +56,11 @@ def label_of(name: str) -> str:
     if name not in BY_NAME:
         return name
     return BY_NAME[name].path.replace(".", " ").replace("_", " ").removeprefix("site ")
+
+
+def inputs_of(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the inputs among the columns of a row."""
+    return {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
 
 
 class NamedSets(NamedTuple):
@@ -133,18 +140,25 @@ class Rows:
             found[name] += n
         return dict(+found)
 
+    @cached_property
+    def need(self) -> Need | None:
+        """The answers of `sweep need`; None of any other result."""
+        answers = self.finished.answers() if isinstance(self.finished, AnswerFile) and self.kind == NEED else None
+        return answers if isinstance(answers, Need) else None
+
     def depth(self) -> np.ndarray:
-        """Embedment depth [m] of every design, in a shape that broadcasts against that of the grid."""
-        if DEPTH in self.inputs:
-            return self.inputs[DEPTH]
-        return self.inputs[RATIO] * self.inputs["boulder_height_m"]
+        """Embedment depth [m] of every design, in the shape of the grid."""
+        given = DEPTH in self.inputs
+        depth = self.inputs[DEPTH] if given else self.inputs[RATIO] * self.inputs["boulder_height_m"]
+        return np.broadcast_to(depth, self.shape)
 
     def mass(self) -> np.ndarray:
-        """Mass of the boulder [kg] of every design, in the same shape."""
+        """Mass of the boulder [kg] of every design, in the shape of the grid."""
         if BOULDER_MASS in self.inputs:
-            return self.inputs[BOULDER_MASS]
+            return np.broadcast_to(self.inputs[BOULDER_MASS], self.shape)
         length, width, height, density = (self.inputs[name] for name in SIZES)
-        return length * width * height * density * Shape.of_model(self.settings["model"]).filled
+        mass = length * width * height * density * Shape.of_model(self.settings["model"]).filled
+        return np.broadcast_to(mass, self.shape)
 
     def to_build(self, number: int) -> dict[str, float]:
         """Return what one design takes to build, by the names of `boulder_sweep.judge.quantities.QUANTITIES`."""
@@ -254,10 +268,9 @@ class Rows:
         if row["verdict"] != "pass" or row.get("robustness") not in ("open", None):
             return row.get("robustness")
         identity = self.finished.identity
-        inputs = {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
         try:
             control = known_control(identity["control"])
-            sweep = one_design(completed(identity["settings"]), inputs, control, row["step_s"] or control.h)
+            sweep = one_design(completed(identity["settings"]), inputs_of(row), control, row["step_s"] or control.h)
         except (LookupError, TypeError, ValueError):
             return row.get("robustness")
         evaluation, block = evaluation_of(sweep, accuracy_of(sweep)), sweep.block(0, 1)
@@ -271,40 +284,140 @@ class Rows:
         return next(self.finished.tables(["p_pass"])).column("p_pass").to_numpy()
 
 
-@dataclass(frozen=True, eq=False)
-class Thinned:
-    """The part of a grid or list that goes into the page.
+def read_rows(folder: Location) -> Rows:
+    """Read what the page needs of a result.
 
-    Attributes
-    ----------
-    places : tuple of ndarray
-        Indices kept along each axis; for a list, the rows.
-    words : str
-        What is left out; empty if nothing is.
+    Raises
+    ------
+    StoreError
+        There is no result in the folder, or it is damaged.
+    ReportError
+        The file is not one of answers, or rows of it are missing or in another order.
     """
+    finished = result_of(folder, ReportError)
+    settings = finished.identity["settings"]
+    order, given = settings["order"], settings["inputs"]
+    if isinstance(finished, AnswerFile):
+        _check_whole(finished, folder)
+        if finished.kind == NEED:  # a list of the designs at the answers
+            order, given = "table", _inputs_of(finished.table, given)
+            finished.table = answered(finished.table)
+    sets = {} if order == "table" else dict(_sets(settings))
+    # Very long axes and the columns of a list are only in the table.
+    names_of, long = (given, list | dict) if order == "table" else (order, dict)
+    wanted = [name for name in names_of if isinstance(given.get(name), long)]
+    stored = list(dict.fromkeys(own for name in wanted for own in _stored(name)))
+    codes = np.full(finished.rows, 255, np.uint8)
+    columns = {name: np.full(finished.rows, np.nan) for name in stored}
+    names: list[tuple[str, str]] = []
+    flags: Counter[str] = Counter()
+    grades: Counter[str] = Counter()
+    asked = bool(settings["model"].get("second_opinion")) or kind_of(finished) in (NEED, CAPACITY)
+    for table in finished.tables(["design_id", "verdict", "reason", "validity", "robustness", *stored]):
+        if "validity" not in finished.lacking:
+            flags.update(_of_passes(table, "validity"))
+        if "robustness" not in finished.lacking:
+            grades.update(_of_passes(table, "robustness"))
+        rows = table.column("design_id").to_numpy()
+        codes[rows] = _codes(table, names, asked=asked)
+        for name in stored:
+            columns[name][rows] = table.column(name).to_numpy()
+    codes[codes == 255] = len(names)
+    inputs = {name: np.array(float(value)) for name, value in given.items() if isinstance(value, float | int)}
+    axes: dict[str, np.ndarray] = {}
+    if order == "table":
+        inputs |= {name: _column(columns, name) for name in wanted}
+    else:
+        axes = dict(_axes(settings, sets, columns))
+    for place, (axis, values) in enumerate(axes.items()):
+        for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
+            inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
+    told = flag_counts(flags.items()) if flags else {}
+    words, robustness = zip(*names, (NOT_YET, ""), strict=True)
+    return Rows(folder, finished, words, codes, told, dict(grades), axes, sets, inputs, robustness)
 
-    places: tuple[np.ndarray, ...]
-    words: str
+
+def _check_whole(file: AnswerFile, path: Location) -> None:
+    """Refuse a file from which rows were taken, or whose rows were put in another order."""
+    asked, ids = file.asked, next(file.tables(["design_id"])).column("design_id").to_numpy()
+    if len(ids) != asked or not np.array_equal(ids, np.arange(asked)):
+        raise ReportError(
+            f"{path} does not hold the rows of its {counted(asked, 'design')} in their order; "
+            f"write it again with `sweep {file.kind}`"
+        )
 
 
-def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
-    """Choose the rows that go into the page: all, or values spread evenly along the longest axes."""
-    if not rows.axes:
-        computed = np.flatnonzero(~rows.having(NOT_YET))  # the inputs of the others are in no file yet
-        n, kept = len(computed), min(len(computed), most_points)
-        words = f"{kept:,} of the {n:,} designs of the list, spread evenly" if kept < n else ""
-        return Thinned((computed[np.round(np.linspace(0, n - 1, kept)).astype(np.int64)],), words)
-    lengths = list(rows.shape)
-    while np.prod(lengths, dtype=float) > most_cells:
-        longest = int(np.argmax(lengths))
-        lengths[longest] = -(-lengths[longest] // 2)
-    places = tuple(
-        np.round(np.linspace(0, whole - 1, kept)).astype(np.int64)
-        for whole, kept in zip(rows.shape, lengths, strict=True)
-    )
-    left = [
-        f"{kept:,} of {whole:,} values of {name}"
-        for name, whole, kept in zip(rows.axes, rows.shape, lengths, strict=True)
-        if kept < whole
-    ]
-    return Thinned(places, f"{', '.join(left)}, spread evenly" if left else "")
+def _inputs_of(table: pa.Table, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the inputs of answers as those of a list of designs; what follows from others is left out."""
+    found: dict[str, Any] = {}
+    for name in (name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in table.column_names):
+        optional = name in OPTIONAL_COLUMNS and name not in given
+        if not (optional or isinstance(given.get(name), str)):
+            values = table[name].unique().to_pylist()
+            found[name] = values if len(values) > 1 else values[0]
+    return found
+
+
+def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:
+    """Yield the axes that are named sets, each with the inputs that it gives."""
+    given, order = settings["inputs"], settings["order"]
+    for axis, names in settings.get("labels", {}).items():
+        own = {name: value for name, value in given.items() if isinstance(value, list) and name not in order}
+        inputs = {name: np.array(value) for name, value in own.items() if BY_NAME[name].section == axis}
+        yield axis, NamedSets(tuple(names), inputs)
+
+
+def _stored(name: str) -> tuple[str, ...]:
+    """Columns that a quantity follows from."""
+    return (DEPTH, "boulder_height_m") if name == RATIO else (name,)
+
+
+def _column(columns: dict[str, np.ndarray], name: str) -> np.ndarray:
+    return columns[DEPTH] / columns["boulder_height_m"] if name == RATIO else columns[name]
+
+
+def _axes(
+    settings: dict[str, Any], sets: dict[str, NamedSets], columns: dict[str, np.ndarray]
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the axes with their values; those of named sets are counted by their names."""
+    given = settings["inputs"]
+    counted_by = [(given | settings.get("labels", {}))[name] for name in settings["order"]]
+    lengths = [int(axis["count"]) if isinstance(axis, dict) else len(axis) for axis in counted_by]
+    for place, (name, length) in enumerate(zip(settings["order"], lengths, strict=True)):
+        if name in sets:
+            yield name, np.arange(length)
+        elif isinstance(given[name], list):
+            yield name, np.array(given[name])
+        else:
+            step = int(np.prod(lengths[place + 1 :], dtype=np.int64))
+            yield name, _column(columns, name)[: step * length : step]
+
+
+def _of_passes(table: Any, name: str) -> dict[str, int]:
+    """Return the number of passing designs of a part for each word of a column."""
+    import pyarrow.compute as pc
+
+    words = table.column(name).filter(pc.equal(table.column("verdict").cast("string"), "pass"))
+    return {one["values"] or "": one["counts"] for one in pc.value_counts(words.cast("string")).to_pylist()}
+
+
+def _codes(table: Any, names: list[tuple[str, str]], *, asked: bool) -> np.ndarray:
+    """Code of every row of a part; new names, each with the grade of its designs, are added.
+
+    A pass has no reason; where second opinions were asked, its grade stands in for it.
+    """
+    import pyarrow.compute as pc
+
+    verdicts, reasons, grades = (table.column(name).combine_chunks() for name in ("verdict", "reason", "robustness"))
+    reasons = pc.coalesce(grades.cast("string"), reasons.cast("string")).dictionary_encode()
+    whys = reasons.dictionary.to_pylist()
+    pairs = verdicts.indices.to_numpy().astype(np.int64) * max(len(whys), 1) + reasons.indices.to_numpy()
+    place = np.zeros(int(pairs.max(initial=0)) + 1, np.uint8)
+    for pair in np.unique(pairs):
+        verdict, why = verdicts.dictionary[int(pair) // len(whys)].as_py(), whys[int(pair) % len(whys)]
+        grade = why if verdict == "pass" else ""
+        name = f"{verdict}: {why}" if why and (asked or not grade) else verdict
+        if (name, grade) not in names:
+            names.append((name, grade))
+        place[pair] = names.index((name, grade))
+    return place[pairs]

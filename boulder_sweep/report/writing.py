@@ -1,25 +1,25 @@
-"""From a result, or a settings file, to the page on disk."""
+"""From a result, or a settings file, to the page on disk, as HTML or printed to PDF by a Chromium on the machine."""
 
 from __future__ import annotations
 
 import dataclasses
+import os
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, known_control, readings_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import answers_table
-from boulder_sweep.report.printing import print_page
-from boulder_sweep.report.reading import read_rows
-from boulder_sweep.report.rows import MOST_ELEMENTS, thinned
-from boulder_sweep.report.sentences import Named
+from boulder_sweep.report.asked import Named, answers_table
+from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
@@ -27,12 +27,34 @@ from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.site_data import derived_words
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.files import check_target, put_file
-from boulder_sweep.store.provenance import kernels_sha256, settings_sha256, versions
+from boulder_sweep.store.provenance import identity as identity_of
+from boulder_sweep.store.provenance import versions
 from boulder_sweep.text import counted, printable, why
 from boulder_sweep.views.wording import UNLOADING_WORDS, name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
+BROWSERS = (
+    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge", "microsoft-edge"),
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+    "/Applications/Chromium.app/Contents/MacOS/Chromium",
+    r"C:\Program Files\Google\Chrome\Application\chrome.exe",
+    r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
+)
+"""Executables that print, the first found is taken."""
+PLAYWRIGHT = (
+    "chromium-*/chrome-linux*/chrome",
+    "chromium-*/chrome-mac*/*.app/Contents/MacOS/*",
+    "chromium-*/*/chrome.exe",
+)
+"""Where Playwright keeps its browser, within its folder."""
+PLAYWRIGHT_FOLDERS = (".cache/ms-playwright", "Library/Caches/ms-playwright", "AppData/Local/ms-playwright")
+HELP = "install Chromium or Chrome, or write the page as .html and print it from a browser"
+MOST_SECONDS = 600
+"""After so long a browser that has not printed the page hangs and is ended; it works for five seconds, of which a busy
+machine makes minutes."""
+SETTLED_MS = 30_000
+"""Time of the page that passes before it is printed; the browser skips it while nothing happens."""
 
 
 def write_report(
@@ -91,13 +113,12 @@ def write_report(
         chosen = [_shown(one, rows.row(one.number)) for one in named]
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
-    identity, kept = rows.finished.identity, thinned(rows)
+    identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
     try:
         settings, control = completed(identity["settings"]), known_control(identity["control"])
         readings = Readings(**identity["readings"])
         text = assembled(
-            title=str(settings["name"]),
             heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
             settings=settings,
             control=control,
@@ -106,11 +127,8 @@ def write_report(
             sentences=answer.sentences,
             answers=answers_table(rows),
             rows=rows,
-            kept=kept,
             chosen=chosen,
-            facts=_facts(
-                identity["versions"], identity["settings_sha256"], identity["kernels_sha256"], command, str(out)
-            ),
+            facts=_facts(identity, command, str(out)),
             notes=[*notes, *_general_notes(settings, control, units)],
             units=units,
         )
@@ -153,14 +171,13 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
     if block.reasons[0]:
         raise ReportError(f"design {number} cannot be computed: {block.reasons[0]}")
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
-    settings, control = sweep.resolved(), control_of(sweep, accuracy_of(sweep))
+    settings, control, readings = sweep.resolved(), control_of(sweep, accuracy_of(sweep)), readings_of(sweep)
     text = assembled(
-        title=sweep.name,
         settings=settings,
         control=control,
-        readings=readings_of(sweep),
+        readings=readings,
         start=inputs,
-        facts=_facts(versions(), settings_sha256(settings), kernels_sha256(), command, None),
+        facts=_facts(identity_of(settings, readings._asdict(), control._asdict()), command),
         notes=_general_notes(settings, control, units),
         units=units,
     )
@@ -205,8 +222,7 @@ def _page_maker() -> Callable[..., str]:
 
 def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
-    inputs = {name: row[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in row}
-    return {"title": one.title, "number": one.number, "inputs": inputs}
+    return {"title": one.title, "number": one.number, "inputs": inputs_of(row)}
 
 
 def _notes_on_rules(judged_by: str) -> list[str]:
@@ -249,15 +265,12 @@ def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
     return f"{value_text(name, value, units) if isinstance(value, float) else name_of(name)} ({how})"
 
 
-def _facts(
-    versions_: Mapping[str, str], settings_sha256_: str, kernels_sha256_: str, command: str, out: str | None
-) -> list[tuple[str, str]]:
+def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tuple[str, str]]:
     """Return the origin of the results, and how to reproduce them."""
-    found = [(f"version of {name}", versions_[name]) for name in PACKAGES if name in versions_]
-    found += [("hash of the settings", settings_sha256_), ("hash of the kernels", kernels_sha256_)]
-    if out is not None:
-        found.append(("table", printable(out)))
-    return [*found, ("command", printable(command))] if command else found
+    used = identity["versions"]
+    found = [(f"version of {name}", used[name]) for name in PACKAGES if name in used]
+    found += [(f"hash of the {what}", identity[f"{what}_sha256"]) for what in ("settings", "kernels")]
+    return [*found, *((name, printable(text)) for name, text in (("table", out), ("command", command)) if text)]
 
 
 def _written(page: Path, text: str) -> Path:
@@ -266,13 +279,71 @@ def _written(page: Path, text: str) -> Path:
     Raises
     ------
     ReportError
-        The system refuses it, or as of `print_page`.
+        The system refuses it, or as of `printed`.
     """
-    if page.suffix.lower() == ".pdf":
-        print_page(text, page)
-        return page
+    content = printed(text) if page.suffix.lower() == ".pdf" else text.encode()
     try:
-        put_file(page.parent, page.name, text.encode())
+        put_file(page.parent, page.name, content)
     except OSError as problem:
         raise ReportError(f"{page} cannot be written: {why(problem)}") from problem
     return page
+
+
+def browser() -> str:
+    """Return the executable of a Chromium.
+
+    Raises
+    ------
+    ReportError
+        There is none.
+    """
+    named = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if named:
+        return named
+    folders = [Path.home() / folder for folder in PLAYWRIGHT_FOLDERS]
+    found = [path for folder in folders for pattern in PLAYWRIGHT for path in sorted(folder.glob(pattern))]
+    if not found:
+        raise ReportError(f"a PDF is printed by Chromium, which was not found: {HELP}")
+    return str(found[-1])
+
+
+def printed(html: str) -> bytes:
+    """Return a page as PDF.
+
+    Raises
+    ------
+    ReportError
+        There is no Chromium, or it does not print the page.
+    """
+    program = browser()
+    with tempfile.TemporaryDirectory(prefix="boulder-sweep-", ignore_cleanup_errors=True) as folder:
+        page, target = Path(folder, "page.html"), Path(folder, "page.pdf")
+        page.write_text(html, encoding="utf-8")
+        # As root, as in a container, Chromium does not start with its sandbox.
+        as_root = hasattr(os, "geteuid") and os.geteuid() == 0
+        words = [
+            program,
+            "--headless",
+            "--disable-gpu",
+            "--disable-dev-shm-usage",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            *(["--no-sandbox"] if as_root else []),
+            f"--user-data-dir={Path(folder, 'profile')}",
+            "--no-pdf-header-footer",
+            f"--virtual-time-budget={SETTLED_MS}",
+            "--window-size=1200,900",
+            f"--print-to-pdf={target}",
+            page.as_uri(),
+        ]
+        try:
+            ended = subprocess.run(words, capture_output=True, timeout=MOST_SECONDS, check=False)
+        except subprocess.TimeoutExpired:
+            raise ReportError(f"{program} did not print the page within {MOST_SECONDS} s: {HELP}") from None
+        except OSError as problem:
+            raise ReportError(f"{program} does not start ({why(problem)}): {HELP}") from problem
+        if not target.exists() or not target.stat().st_size:
+            raise ReportError(f"{program} did not print the page (it ended with code {ended.returncode}): {HELP}")
+        return target.read_bytes()

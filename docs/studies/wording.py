@@ -124,7 +124,7 @@ def caution_text(root: Path) -> str:
 
 def fit_text() -> str:
     """What ``sweep fit-vehicle`` prints for the example."""
-    from boulder_sweep.cli.fit_vehicle import lines
+    from boulder_sweep.cli.vehicle import fit_lines
     from boulder_sweep.crash_tests.fitting import fit_pulse
     from boulder_sweep.crash_tests.measured import read_pulse
 
@@ -132,4 +132,4 @@ def fit_text() -> str:
         file = Path(folder) / "pulse.csv"
         file.write_text(example_pulse(), encoding="utf-8")
         fit = fit_pulse(read_pulse(file), 6800.0)
-    return "```text\n" + "\n".join(lines(fit)) + "\n```"
+    return "```text\n" + "\n".join(fit_lines(fit)) + "\n```"

@@ -222,7 +222,7 @@ def test_without_a_browser_a_pdf_is_refused_with_what_to_do(sweep, possible_grid
 
 def test_a_browser_that_prints_nothing_is_an_error(sweep, possible_grid, monkeypatch, tmp_path):
     assert sweep("run", possible_grid, "-q")[0] == 0
-    monkeypatch.setattr("boulder_sweep.report.printing.browser", lambda: shutil.which("true"))
+    monkeypatch.setattr("boulder_sweep.report.writing.browser", lambda: shutil.which("true"))
     code, _, err = sweep("report", "small-grid.sweep", "-o", "page.pdf")
     assert code == 2
     assert "did not print the page (it ended with code 0)" in err

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from boulder_sweep.cli import progress
+from boulder_sweep.cli import output
 from boulder_sweep.runner.summary import progress_of
 from boulder_sweep.text import duration_text
 
@@ -248,8 +248,8 @@ def test_one_design_is_not_called_designs(sweep, possible_grid):
 
 def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkeypatch):
     clock = {"now": 0.0}
-    monkeypatch.setattr(progress.time, "monotonic", lambda: clock["now"])
-    with progress.progress(quiet=False, notes=progress.Notes()) as show:
+    monkeypatch.setattr(output.time, "monotonic", lambda: clock["now"])
+    with output.progress(quiet=False, notes=output.Notes()) as show:
         for clock["now"], done in ((1.0, 100), (11.0, 200), (12.0, 300), (30.0, 400)):
             show(progress_of(0, done, 1000, done / 50))
     lines = capsys.readouterr().err.splitlines()

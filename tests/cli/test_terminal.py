@@ -56,12 +56,12 @@ COLD_START = """
 import sys
 from pathlib import Path
 from boulder_kernels import _ahead
-from boulder_sweep.cli import main, progress
+from boulder_sweep.cli import main, output
 from boulder_sweep.judge.evaluation import Evaluation
 from tests.waiting import wait_until
 enough = Path(sys.argv[1])
-progress._took_s = lambda kernel: 2.0
-progress._remember = lambda *_: None
+output._took_s = lambda kernel: 2.0
+output._remember = lambda *_: None
 def warm_up(evaluation):
     with _ahead.announce("lanes-run_lanes-0"):
         wait_until(enough.exists, "the bar has moved")
@@ -114,8 +114,8 @@ def test_a_reader_that_goes_away_is_no_error(grid, words):
 
 TALKATIVE = """
 import sys
-from boulder_sweep.cli import main, progress
-progress.PLAIN_EVERY_S = -1.0
+from boulder_sweep.cli import main, output
+output.PLAIN_EVERY_S = -1.0
 main.main(sys.argv[1:])
 """
 

@@ -8,7 +8,7 @@ import pytest
 import boulder_sweep
 from boulder_kernels import _ahead
 from boulder_sweep import simulate
-from boulder_sweep.cli import progress
+from boulder_sweep.cli import output
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.judge.accuracy import Accuracy, Steps
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
@@ -74,7 +74,7 @@ def test_every_command_that_compiles_says_so_first(compiled, sweep, words, monke
     assert COMPILING not in sweep(*words)[2]
     monkeypatch.setattr(_ahead, "call", after_compiling(KERNEL))
     remembered = {}
-    monkeypatch.setattr(progress, "_remember", remembered.__setitem__)
+    monkeypatch.setattr(output, "_remember", remembered.__setitem__)
     code, _, err = sweep(*words, *(["--overwrite"] if words[0] == "run" else []))
     assert code == 0
     assert err.count(f"{COMPILING}20 s") == 1

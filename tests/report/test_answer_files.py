@@ -19,10 +19,9 @@ from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import answers_table
+from boulder_sweep.report.asked import Quantity, answers_table
 from boulder_sweep.report.comparison import compare
-from boulder_sweep.report.reading import read_rows
-from boulder_sweep.report.sentences import Quantity
+from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from tests.answers.designs import site
 from tests.conftest import Command
@@ -175,7 +174,7 @@ def test_the_map_of_a_need_says_the_answers(files: dict[str, Path], tmp_path: Pa
     page = opened(write_report(files["depth"], tmp_path / "page.html"))
     table = pq.read_table(files["depth"]).to_pylist()
     assert [page.input_value(f"#{one}") for one in ("across", "up")] == ["boulder_height_m", "friction_angle_deg"]
-    cells = page.evaluate("page.cells.sweep.map((cell) => ({ x: cell.x, y: cell.y, words: wordsOf(cell) }))")
+    cells = page.evaluate("page.maps.sweep.cells.map((cell) => ({ x: cell.x, y: cell.y, words: wordsOf(cell) }))")
     for row in table:
         (cell,) = [one for one in cells if (one["x"], one["y"]) == (row["boulder_height_m"], row["friction_angle_deg"])]
         if row["passes_at"] is None:

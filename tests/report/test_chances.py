@@ -15,7 +15,7 @@ from boulder_sweep.answers.files import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import Quantity, answer_of
-from boulder_sweep.report.reading import read_rows
+from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import sha256_of
 from tests.answers.designs import DEFAULTS, SITE, site

@@ -84,7 +84,7 @@ def test_the_map_around_a_slow_design_comes_in_pieces_and_gives_way_to_another(t
     )
     page.fill("#in-embedment_depth_m", "2.1")
     page.wait_until_it_is_true("/^Of 12 × 12 designs/.test(document.getElementById('live-words').textContent)")
-    cells = page.evaluate("page.cells.live.map((cell) => ({ ...cell.pick(), verdict: cell.name.split(':')[0] }))")
+    cells = page.evaluate("page.maps.live.cells.map((cell) => ({ ...cell.pick(), verdict: cell.name.split(':')[0] }))")
     depths = sorted({cell["embedment_depth_m"] for cell in cells})
     assert (depths[0], depths[-1]) == pytest.approx((0.75 * 2.1, 1.25 * 2.1))
     one = cells[70]

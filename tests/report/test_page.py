@@ -199,7 +199,7 @@ def test_the_map_shows_the_rows_and_a_rectangle_can_be_picked(report, result, op
     table = boulder_sweep.read(result)
     page.select_option("#across", "boulder_height_m")
     page.select_option("#up", "friction_angle_deg")
-    shown = page.evaluate("page.cells.sweep.map((cell) => ({ ...cell.pick(), name: cell.name }))")
+    shown = page.evaluate("page.maps.sweep.cells.map((cell) => ({ ...cell.pick(), name: cell.name }))")
     assert len(shown) == 18
     for cell in shown:
         row = table[
@@ -221,7 +221,7 @@ def test_named_soils_have_their_names_on_the_slider(tmp_path, opened):
     boulder_sweep.run(boulder_sweep.load(tmp_path / "sites.yaml"), tmp_path / "out")
     page = opened(write_report(tmp_path / "out", tmp_path / "out.html"))
     assert page.inner_text("#held") == "soil: dense sand"
-    page.evaluate("page.take(page.cells.sweep[0].pick())")
+    page.evaluate("page.take(page.maps.sweep.cells[0].pick())")
     assert page.evaluate("page.design.friction_angle_deg") == 42.0
     assert page.evaluate("page.design.soil_density_kg_m3") == 1900.0
 

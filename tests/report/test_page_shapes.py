@@ -114,10 +114,10 @@ def check_map(page, table):
         verdicts = verdicts.reshape([len(values) for values in rows["values"].values()])[held].ravel()
     passing, total = (verdicts == "pass").sum(), len(verdicts)
     assert page.inner_text("#sweep-words").startswith(f"{passing} of the {total} designs shown pass")
-    cells = page.evaluate("page.cells.sweep.flatMap((cell) => cell.names ?? [cell.name])")
+    cells = page.evaluate("page.maps.sweep.cells.flatMap((cell) => cell.names ?? [cell.name])")
     assert sorted(cells) == sorted(verdicts)
     legend = re.findall(r"\((\d+)\)", page.inner_text("#sweep-legend"))
-    assert sum(map(int, legend)) == page.evaluate("page.cells.sweep.length")
+    assert sum(map(int, legend)) == page.evaluate("page.maps.sweep.cells.length")
 
 
 def check_designs(page, table):

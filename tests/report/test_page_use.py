@@ -18,7 +18,7 @@ def test_one_axis_is_a_strip(tmp_path, opened):
     page = opened(reported(STRIP, tmp_path))
     verdicts = boulder_sweep.read(tmp_path / "site.sweep").verdict
     assert page.inner_text("#sweep-words") == f"{(verdicts == 'pass').sum()} of the 19 designs shown pass."
-    assert page.evaluate("page.cells.sweep.map((cell) => cell.name.split(':')[0])") == verdicts.tolist()
+    assert page.evaluate("page.maps.sweep.cells.map((cell) => cell.name.split(':')[0])") == verdicts.tolist()
     assert page.is_visible("#across")
     assert not page.is_visible("#up")
     assert not page.evaluate("page.plots.find('sweep-map-y').visible")
@@ -36,12 +36,12 @@ def test_no_input_is_both_across_and_up(report, opened):
     page = opened(report)
     for across, up, changed in (("#across", "#up", "sweep"), ("#live-across", "#live-up", "live")):
         before = (page.input_value(across), page.input_value(up))
-        shown = page.evaluate(f"page.cells.{changed}.length")
+        shown = page.evaluate(f"page.maps.{changed}.cells.length")
         page.select_option(up, before[0])
         assert (page.input_value(across), page.input_value(up)) == before[::-1]
         page.select_option(across, before[0])
         assert (page.input_value(across), page.input_value(up)) == before
-        assert page.evaluate(f"page.cells.{changed}.length") == shown
+        assert page.evaluate(f"page.maps.{changed}.cells.length") == shown
 
 
 @pytest.mark.nightly
@@ -56,7 +56,7 @@ def test_designs_of_a_list_at_one_place_show_the_worst_of_them(tmp_path, opened)
     assert page.inner_text("#sweep-words").startswith(
         f"{passing.sum()} of the 12 designs shown pass. Designs lie on each other: the map has 4 places"
     )
-    for cell in page.evaluate("page.cells.sweep.map((cell) => ({ ...cell.pick(), name: cell.name }))"):
+    for cell in page.evaluate("page.maps.sweep.cells.map((cell) => ({ ...cell.pick(), name: cell.name }))"):
         here = table[
             (table.boulder_height_m == cell["boulder_height_m"])
             & (table.embedment_depth_m == cell["embedment_depth_m"])
@@ -165,7 +165,8 @@ def test_what_the_command_refuses_the_page_refuses_in_the_same_words(explorer, o
     page = opened(explorer)
     page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
     before, found = page.input_value("#yaml"), page.inner_text("#verdict")
-    assert page.evaluate("page.cells.live.length") > 0 or page.wait_until_it_is_true("page.cells.live?.length > 0")
+    cells = "page.maps.live.cells.length"
+    assert page.evaluate(cells) > 0 or page.wait_until_it_is_true(f"{cells} > 0")
     for name, typed, key, value in REFUSED:
         page.fill(f"#in-{name}", typed)
         page.press(f"#in-{name}", "Tab")
@@ -176,7 +177,7 @@ def test_what_the_command_refuses_the_page_refuses_in_the_same_words(explorer, o
         assert page.inner_text("#verdict").startswith("! error: ")
         assert page.inner_text("#verdict").endswith(words)
         assert page.input_value("#yaml") == ""
-        assert page.evaluate("page.cells.live.length") == 0
+        assert page.evaluate(cells) == 0
         assert page.is_disabled("#copy")
         page.click("#reset")
         assert page.inner_text(f"#refused-{name}") == ""

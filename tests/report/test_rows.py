@@ -10,9 +10,8 @@ import pytest
 import boulder_sweep
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import Quantity, answer_of
-from boulder_sweep.report.contents import table_data
-from boulder_sweep.report.reading import read_rows
-from boulder_sweep.report.rows import NOT_YET, thinned
+from boulder_sweep.report.contents import table_data, thinned
+from boulder_sweep.report.rows import NOT_YET, read_rows
 from tests.report.conftest import GRID, LIST, SETS
 from tests.store.folders import rewrite_records
 

@@ -7,8 +7,8 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.report import write_explorer, write_report
-from boulder_sweep.report.reading import read_rows
-from boulder_sweep.report.sketch import sketch_of
+from boulder_sweep.report.figures import sketch_of
+from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.shape import tapered
 from tests.report.test_ground import SOILS

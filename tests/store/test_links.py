@@ -178,10 +178,9 @@ BY_ITSELF = {
     "store/files.py": "creates files",
     "store/lock.py": "opens a file that is there",
     "cli/settings_files.py": "only a new file",
-    "cli/output.py": "nowhere",
-    "cli/progress.py": "its own cache",
+    "cli/output.py": "nowhere, and its own cache",
     "report/build.py": "for developers",
-    "report/printing.py": "a folder of its own for the browser",
+    "report/writing.py": "a folder of its own for the browser",
 }
 
 

@@ -172,3 +172,113 @@ function wallCrush({ vehicle_mass_kg: m, impact_speed_m_s: v, vehicle_spring_N_m
   const stops = Math.atan2(b, decay);
   return (m * v) / c + (b > 0 ? ((v * Math.exp((decay * stops) / b)) / b) * Math.sin(stops) : 0);
 }
+
+/** The two lists that the axes of a map are chosen from. Choosing what the other holds exchanges them. */
+class Axes {
+  /** @param {string} across @param {string} up ids of the lists */
+  constructor(across, up) {
+    this.lists = [byId(across), byId(up)];
+    this.chosen = ["", ""];
+  }
+
+  get across() {
+    return this.chosen[0];
+  }
+
+  /** Empty where only one input varies. */
+  get up() {
+    return this.chosen[1];
+  }
+
+  /**
+   * @param {[string, string][]} options names and words
+   * @param {string} first
+   * @param {string} second empty if there is none
+   */
+  offer(options, first, second) {
+    this.chosen = [first, second];
+    this.lists.forEach((list, k) => {
+      list.replaceChildren(...options.map(([value, words]) => Object.assign(element("option", words), { value })));
+      list.value = this.chosen[k];
+    });
+    this.lists[1].parentElement.hidden = second === "";
+  }
+
+  /** @param {() => void} changed */
+  listen(changed) {
+    this.lists.forEach((list, k) =>
+      list.addEventListener("change", () => {
+        const other = this.lists[1 - k];
+        if (other.value === list.value) other.value = this.chosen[k];
+        this.chosen = this.lists.map((one) => one.value);
+        changed();
+      }),
+    );
+  }
+}
+
+/** Plays the motion of one design in its side view: one animation at a time, from where the reader left it. */
+class Player {
+  /**
+   * @param {string} panel
+   * @param {Float64Array} times of the samples [s]
+   * @param {() => void} moved what to do when the slider has moved
+   */
+  constructor(panel, times, moved) {
+    this.slider = byId(`${panel}-time`);
+    this.button = byId(`${panel}-play`);
+    this.times = times;
+    this.moved = moved;
+    /** The frame that the browser was asked for; 0 at rest. */
+    this.frame = 0;
+    /** Whether the reader has put the slider where it is. */
+    this.left = false;
+  }
+
+  listen() {
+    this.slider.addEventListener("input", () => {
+      this.pause();
+      this.moved();
+    });
+    this.button.addEventListener("click", () => (this.frame === 0 ? this.play() : this.pause()));
+  }
+
+  /**
+   * Take another motion.
+   * @param {number} last its last sample
+   * @param {number} sample shown first
+   */
+  load(last, sample) {
+    this.pause();
+    this.left = false;
+    this.slider.max = last;
+    this.slider.value = sample;
+  }
+
+  pause() {
+    cancelAnimationFrame(this.frame);
+    this.frame = 0;
+    this.left = true;
+    this.button.textContent = "Play";
+  }
+
+  /** Go on from where the reader left the slider, or begin. */
+  play() {
+    const last = Number(this.slider.max);
+    if (last === 0) return;
+    const from = this.left ? Number(this.slider.value) % last : 0;
+    // Five times as slow as it is.
+    const rate = last / this.times[last] / 5000;
+    const begun = performance.now() - from / rate;
+    /** @param {number} now */
+    const tick = (now) => {
+      const sample = Math.min(Math.max(Math.floor((now - begun) * rate), from), last);
+      this.slider.value = String(sample);
+      this.moved();
+      if (sample < last) this.frame = requestAnimationFrame(tick);
+      else this.pause();
+    };
+    this.button.textContent = "Pause";
+    this.frame = requestAnimationFrame(tick);
+  }
+}

@@ -84,54 +84,97 @@ function ends(values) {
   return [2 * first - inner[0], ...inner, 2 * last - inner[inner.length - 1]];
 }
 
-/**
- * Draw cells.
- * @param {Plots} plots
- * @param {string} panel
- * @param {Cell[]} cells
- * @param {{x: string, y: string}} labels
- * @param {{x: string, y: string}} shownUnits units of the table
- * @param {Units} units
- * @param {Record<string, string>} colours by verdict
- * @param {{x: number, y: number} | null} here the design shown elsewhere
- */
-function drawCells(plots, panel, cells, labels, shownUnits, units, colours, here) {
-  const [sx, sy] = [units.size(shownUnits.x), units.size(shownUnits.y)];
-  /** @param {number[]} values */
-  const steps = (values) => {
-    const levels = [...new Set(values)].sort((a, b) => a - b);
-    const limits = ends(levels);
-    return new Map(levels.map((level, k) => [level, [limits[k], limits[k + 1]]]));
-  };
-  const [xs, ys] = [steps(cells.map((cell) => cell.x)), steps(cells.map((cell) => cell.y))];
-  /** @param {Map<number, number[]>} map @param {number} value @param {number} end */
-  const limit = (map, value, end) => /** @type {number[]} */ (map.get(value))[end];
-  /** @param {Cell[]} some */
-  const places = (some) => ({
-    left: some.map((cell) => limit(xs, cell.x, 0) / sx),
-    right: some.map((cell) => limit(xs, cell.x, 1) / sx),
-    bottom: some.map((cell) => limit(ys, cell.y, 0) / sy),
-    top: some.map((cell) => limit(ys, cell.y, 1) / sy),
-  });
-  for (const [name, hatched] of Object.entries(HATCHES)) {
-    plots.fill(`${panel}-${hatched}`, places(cells.filter((cell) => cell.name === name)));
+/** A map of verdicts over two inputs: its rectangles, its legend, and how the reader chooses a rectangle. */
+class VerdictMap {
+  /** @param {string} panel @param {Plots} plots @param {Units} units @param {Record<string, string>} colours by verdict */
+  constructor(panel, plots, units, colours) {
+    this.panel = panel;
+    this.plots = plots;
+    this.units = units;
+    this.colours = colours;
+    this.walker = new Walker(panel, plots, units);
+    /** @type {Cell[]} */
+    this.cells = [];
   }
-  plots.fill(`${panel}-cells`, {
-    ...places(cells),
-    colour: cells.map((cell) => colourOf(cell.name, colours)),
-    verdict: cells.map(wordsOf),
-    across: cells.map((cell) => cell.x / sx),
-    up: cells.map((cell) => cell.y / sy),
-    margin: cells.map((cell) => cell.margin ?? NaN),
-  });
-  plots.fill(`${panel}-here`, here === null ? { x: [], y: [] } : { x: [here.x / sx], y: [here.y / sy] });
-  plots.flatten(panel, labels.y === "");
-  plots.title(`${panel}-map`, units.title(labels.x, shownUnits.x), units.title(labels.y, shownUnits.y));
-}
 
-/** @param {string} name verdict and reason @param {Record<string, string>} colours @returns {string} */
-function colourOf(name, colours) {
-  return colours[name] ?? colours[name.split(":")[0]] ?? colours.none;
+  /**
+   * Draw other rectangles.
+   * @param {Cell[]} cells
+   * @param {{x: string, y: string}} labels
+   * @param {{x: string, y: string}} shown units of the table
+   * @param {{x: number, y: number} | null} here the design shown elsewhere
+   */
+  draw(cells, labels, shown, here) {
+    const { plots, panel, units } = this;
+    this.cells = cells;
+    const [sx, sy] = [units.size(shown.x), units.size(shown.y)];
+    /** @param {number[]} values */
+    const steps = (values) => {
+      const levels = [...new Set(values)].sort((a, b) => a - b);
+      const limits = ends(levels);
+      return new Map(levels.map((level, k) => [level, [limits[k], limits[k + 1]]]));
+    };
+    const [xs, ys] = [steps(cells.map((cell) => cell.x)), steps(cells.map((cell) => cell.y))];
+    /** @param {Map<number, number[]>} map @param {number} value @param {number} end */
+    const limit = (map, value, end) => /** @type {number[]} */ (map.get(value))[end];
+    /** @param {Cell[]} some */
+    const places = (some) => ({
+      left: some.map((cell) => limit(xs, cell.x, 0) / sx),
+      right: some.map((cell) => limit(xs, cell.x, 1) / sx),
+      bottom: some.map((cell) => limit(ys, cell.y, 0) / sy),
+      top: some.map((cell) => limit(ys, cell.y, 1) / sy),
+    });
+    for (const [name, hatched] of Object.entries(HATCHES)) {
+      plots.fill(`${panel}-${hatched}`, places(cells.filter((cell) => cell.name === name)));
+    }
+    plots.fill(`${panel}-cells`, {
+      ...places(cells),
+      colour: cells.map((cell) => this.colourOf(cell.name)),
+      verdict: cells.map(wordsOf),
+      across: cells.map((cell) => cell.x / sx),
+      up: cells.map((cell) => cell.y / sy),
+      margin: cells.map((cell) => cell.margin ?? NaN),
+    });
+    plots.fill(`${panel}-here`, here === null ? { x: [], y: [] } : { x: [here.x / sx], y: [here.y / sy] });
+    plots.flatten(panel, labels.y === "");
+    plots.title(`${panel}-map`, units.title(labels.x, shown.x), units.title(labels.y, shown.y));
+    this.walker.over(cells, labels, shown, here);
+    this.drawLegend();
+  }
+
+  /** Count the rectangles of each colour beside it. */
+  drawLegend() {
+    /** @type {Map<string, number>} */
+    const counts = new Map();
+    for (const { name } of this.cells) counts.set(name, (counts.get(name) ?? 0) + 1);
+    byId(`${this.panel}-legend`).replaceChildren(
+      ...[...counts].sort().map(([name, count]) => {
+        const item = element("li", "");
+        const box = document.createElement("i");
+        box.style.backgroundColor = this.colourOf(name);
+        if (name in HATCHES) box.classList.add(HATCHES[name]);
+        item.append(box, `${name.replaceAll("_", " ")} (${count.toLocaleString("en-US")})`);
+        return item;
+      }),
+    );
+  }
+
+  /** @param {string} name verdict and reason @returns {string} */
+  colourOf(name) {
+    return this.colours[name] ?? this.colours[name.split(":")[0]] ?? this.colours.none;
+  }
+
+  /** Let the reader choose a rectangle, by a click or by keys. @param {(cell: Cell) => void} pick */
+  listen(pick) {
+    const source = this.plots.find(`${this.panel}-cells`);
+    source.selected.properties.indices.change.connect(() => {
+      const [picked] = source.selected.indices;
+      if (picked === undefined) return;
+      source.selected.indices = [];
+      pick(this.cells[picked]);
+    });
+    this.walker.listen(pick);
+  }
 }
 
 /** @param {Cell} cell @returns {string} its verdict, and whether other designs lie there */
@@ -212,4 +255,79 @@ function tableCells(rows, codes, across, up, held) {
       })),
     ),
   );
+}
+
+/** @type {Record<string, [number, number]>} to the right and up */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
+
+/** Moves over a map by keys: an arrow goes to the next rectangle, Enter picks it. */
+class Walker {
+  /** @param {string} panel @param {Plots} plots @param {Units} units */
+  constructor(panel, plots, units) {
+    this.panel = panel;
+    this.plots = plots;
+    this.units = units;
+    /** @type {Cell[]} */
+    this.cells = [];
+    this.at = { x: 0, y: 0 };
+    this.labels = { x: "", y: "" };
+    this.shown = { x: "", y: "" };
+  }
+
+  /**
+   * Move over other rectangles from now on.
+   * @param {Cell[]} cells
+   * @param {{x: string, y: string}} labels
+   * @param {{x: string, y: string}} shown units of the table
+   * @param {{x: number, y: number} | null} here where to begin; in the middle without it
+   */
+  over(cells, labels, shown, here) {
+    [this.cells, this.labels, this.shown] = [cells, labels, shown];
+    const middle = (/** @type {number[]} */ values) => values.sort((a, b) => a - b)[values.length >> 1] ?? 0;
+    this.at = here ?? { x: middle(cells.map((cell) => cell.x)), y: middle(cells.map((cell) => cell.y)) };
+    byId(`${this.panel}-at`).textContent = "";
+  }
+
+  /** @param {(cell: Cell) => void} pick */
+  listen(pick) {
+    byId(`figure-${this.panel}-map`).addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+      const arrow = ARROWS[event.key];
+      if (arrow === undefined && event.key !== "Enter") return;
+      event.preventDefault();
+      if (this.cells.length === 0) return;
+      if (arrow === undefined) pick(this.nearest());
+      else this.move(arrow);
+    });
+  }
+
+  /** @returns {Cell} the rectangle nearest to where the reader is */
+  nearest() {
+    const [wide, high] = [extent(this.cells.map((cell) => cell.x)), extent(this.cells.map((cell) => cell.y))];
+    const far = (/** @type {Cell} */ cell) => Math.hypot((cell.x - this.at.x) / wide, (cell.y - this.at.y) / high);
+    return this.cells.reduce((best, cell) => (far(cell) < far(best) ? cell : best));
+  }
+
+  /** @param {[number, number]} arrow */
+  move([right, up]) {
+    const from = this.nearest();
+    const levels = (/** @type {"x" | "y"} */ axis) => [...new Set(this.cells.map((cell) => cell[axis]))].sort((a, b) => a - b);
+    const next = (/** @type {"x" | "y"} */ axis, /** @type {number} */ step) => {
+      const along = levels(axis);
+      return along[Math.min(Math.max(along.indexOf(from[axis]) + step, 0), along.length - 1)];
+    };
+    this.at = { x: next("x", right), y: next("y", up) };
+    const found = this.nearest();
+    this.at = { x: found.x, y: found.y };
+    const [sx, sy] = [this.units.size(this.shown.x), this.units.size(this.shown.y)];
+    this.plots.fill(`${this.panel}-here`, { x: [found.x / sx], y: [found.y / sy] });
+    const words = (/** @type {"x" | "y"} */ axis) => `${this.labels[axis]} ${this.units.text(found[axis], this.shown[axis])}`;
+    const place = this.labels.y === "" ? words("x") : `${words("x")}, ${words("y")}`;
+    byId(`${this.panel}-at`).textContent = `${place}: ${wordsOf(found)}`;
+  }
+}
+
+/** @param {number[]} values @returns {number} how far they reach, never 0 */
+function extent(values) {
+  const [least, most] = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+  return most > least ? most - least : 1;
 }

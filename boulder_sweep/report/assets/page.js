@@ -36,16 +36,15 @@ class Page {
     /** Of maps around a design; another change makes the one that is being computed the last but one. */
     this.rounds = 0;
     this.printing = false;
-    /** @type {Record<string, Cell[]>} */
-    this.cells = {};
     this.axes = { live: new Axes("live-across", "live-up"), sweep: data.rows?.mapped ? new Axes("across", "up") : null };
     const panels = ["live", ...data.chosen.map((/** @type {any} */ _, /** @type {number} */ k) => `chosen${k}`)];
     /** @type {Record<string, Player>} */
     this.players = Object.fromEntries(
       panels.map((panel) => [panel, new Player(panel, this.simulator.times, () => this.showScene(panel))]),
     );
-    /** @type {Record<string, Walker>} */
-    this.walkers = { live: new Walker("live", plots, this.units), sweep: new Walker("sweep", plots, this.units) };
+    /** @param {string} panel */
+    const map = (panel) => new VerdictMap(panel, plots, this.units, data.colours);
+    this.maps = { live: map("live"), sweep: map("sweep") };
   }
 
   /**
@@ -218,13 +217,9 @@ class Page {
   /** Draw the map of designs around the one of the controls. @param {Cell[]} cells */
   showCells(cells) {
     const { across, up } = this.axes.live;
-    this.cells = { ...this.cells, live: cells };
     const of = (/** @type {string} */ name) => /** @type {Input} */ (this.inputs.find((one) => one.name === name));
     const [labels, units] = [{ x: of(across).label, y: of(up).label }, { x: of(across).unit, y: of(up).unit }];
-    const here = { x: this.design[across], y: this.design[up] };
-    drawCells(this.plots, "live", cells, labels, units, this.units, this.data.colours, here);
-    this.walkers.live.over(cells, labels, units, here);
-    this.legend("live", cells);
+    this.maps.live.draw(cells, labels, units, { x: this.design[across], y: this.design[up] });
   }
 
   /** Draw the map of the table. */
@@ -238,30 +233,10 @@ class Page {
         cell.answer = `, ${rows.labels[rows.asked]} ${this.units.text(cell.pick()[rows.asked], rows.units[rows.asked])}`;
       }
     }
-    this.cells = { ...this.cells, sweep: cells };
     const labels = { x: rows.labels[across], y: up === "" ? "" : rows.labels[up] };
     const units = { x: rows.units[across], y: up === "" ? "" : rows.units[up] };
-    drawCells(this.plots, "sweep", cells, labels, units, this.units, this.data.colours, null);
-    this.walkers.sweep.over(cells, labels, units, null);
-    this.legend("sweep", cells);
+    this.maps.sweep.draw(cells, labels, units, null);
     byId("sweep-words").textContent = summed(cells);
-  }
-
-  /** @param {string} panel @param {Cell[]} cells */
-  legend(panel, cells) {
-    /** @type {Map<string, number>} */
-    const counts = new Map();
-    for (const cell of cells) counts.set(cell.name, (counts.get(cell.name) ?? 0) + 1);
-    byId(`${panel}-legend`).replaceChildren(
-      ...[...counts].sort().map(([name, count]) => {
-        const item = element("li", "");
-        const box = document.createElement("i");
-        box.style.backgroundColor = colourOf(name, this.data.colours);
-        if (name in HATCHES) box.classList.add(HATCHES[name]);
-        item.append(box, `${name.replaceAll("_", " ")} (${count.toLocaleString("en-US")})`);
-        return item;
-      }),
-    );
   }
 
   showList() {
@@ -353,11 +328,6 @@ class Page {
     this.update();
   }
 
-  /** @param {string} panel @param {Cell} cell whose design is to be simulated */
-  pick(panel, cell) {
-    this.take({ ...(panel === "sweep" ? this.data.rows.given : {}), ...cell.pick() });
-  }
-
   /** Let the reader do what there is to do. */
   listen() {
     const { data } = this;
@@ -368,16 +338,8 @@ class Page {
     for (const player of Object.values(this.players)) player.listen();
     this.axes.live.listen(() => this.showAround());
     this.axes.sweep?.listen(() => this.showTable());
-    for (const panel of ["live", ...(this.axes.sweep === null ? [] : ["sweep"])]) {
-      const source = this.plots.find(`${panel}-cells`);
-      source.selected.properties.indices.change.connect(() => {
-        const [picked] = source.selected.indices;
-        if (picked === undefined) return;
-        source.selected.indices = [];
-        this.pick(panel, this.cells[panel][picked]);
-      });
-      this.walkers[panel].listen((cell) => this.pick(panel, cell));
-    }
+    this.maps.live.listen((cell) => this.take(cell.pick()));
+    if (this.axes.sweep !== null) this.maps.sweep.listen((cell) => this.take({ ...data.rows.given, ...cell.pick() }));
     byId("reset").addEventListener("click", () => this.take(data.start));
     byId("add").addEventListener("click", () => {
       this.list.push({ ...this.design });

@@ -1,0 +1,185 @@
+"""The vehicle of a settings file: ``sweep speed`` for its speed, ``sweep fit-vehicle`` for its spring and damper."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from typing import TYPE_CHECKING
+
+import click
+
+from boulder_sweep.cli.options import OUTPUT, json_option, quantity_of, refuse_unwritable
+from boulder_sweep.cli.output import say, show
+
+if TYPE_CHECKING:
+    from boulder_sweep.crash_tests.fitting import StagedFit, VehicleFit
+    from boulder_sweep.settings.tree import Mapping
+
+MPH = 0.44704
+SPEED_EXAMPLES = """\b
+Examples:
+  sweep speed --length '80 m' --from '0 mph' --acceleration '1.2 m/s^2'
+  sweep speed --length 260ft --curve-radius 60ft --acceleration '4 ft/s^2'
+  sweep speed --length 80m --from 20mph --acceleration 1m/s^2 --grade=-4%
+
+\b
+In a settings file, in place of vehicle.speed:
+  approach: {length: 80 m, from: 0 mph, acceleration: 1.2 m/s^2}
+"""
+
+
+@click.command("speed", short_help="Speed with which a vehicle reaches the boulder.", epilog=SPEED_EXAMPLES)
+@click.option("--length", metavar="'80 m'", help="Run-up: from its beginning or last curve to the boulder.")
+@click.option("--from", "start", metavar="'0 mph'", help="Speed at the beginning of the run-up.")
+@click.option("--acceleration", metavar="'1.2 m/s^2'", help="Of the vehicle, at full throttle on level ground.")
+@click.option("--curve-radius", metavar="'25 m'", help="Of the curve that ends where the run-up begins.")
+@click.option("--friction", metavar="MU", help="Coefficient of friction of the tyres in that curve [1].")
+@click.option("--grade", metavar="'-4 %'", help="Rise over run towards the boulder, negative downhill [0].")
+@json_option
+def speed(as_json: bool, **given: str | None) -> int:
+    """Work out the largest speed with which a vehicle reaches the boulder: v² = v₀² + 2 a s, √(μ g r) out of a curve.
+
+    Every choice is on the safe side: the acceleration lasts up to the boulder, a curve is left at the speed at which
+    the vehicle skids, and no largest speed of the vehicle is known. Where there are several ways to the boulder, the
+    fastest counts.
+    """
+    from boulder_sweep.settings.leaf import LeafError
+    from boulder_sweep.settings.site_data import APPROACH, approach_data, approach_words, read_approach
+    from boulder_sweep.settings.tree import Scalar
+
+    block = _as_block({"from" if key == "start" else key: text for key, text in given.items() if text is not None})
+    try:
+        data = approach_data(read_approach(block))
+    except LeafError as error:
+        raise click.UsageError("; ".join(mistake.message for mistake in error.mistakes)) from None
+    if as_json:
+        show(json.dumps(data))
+        return 0
+    entry = ", ".join(f"{entry.key}: {entry.value.text.strip()}" for entry in block if isinstance(entry.value, Scalar))
+    yaml = textwrap.wrap(f"vehicle: {{{APPROACH}: {{{entry}}},", 80, subsequent_indent=" " * 21)
+    show(*speed_lines(data["impact_speed_m_s"]), "", *textwrap.wrap(approach_words(data), 80), "", *yaml)
+    show("          ...}")
+    return 0
+
+
+def _as_block(given: dict[str, str]) -> Mapping:
+    """Return the options as the block of a settings file; each needs its unit here, zero too."""
+    from boulder_sweep.settings.numbers import NumberError, split_number
+    from boulder_sweep.settings.problems import Position
+    from boulder_sweep.settings.site_data import APPROACH_FIELDS
+    from boulder_sweep.settings.tree import Entry, Mapping, Scalar
+    from boulder_sweep.settings.units import EXPECTED
+
+    here = Position("sweep speed")
+    for key, text in given.items():
+        unit = APPROACH_FIELDS[key.replace("-", "_")].unit
+        try:
+            bare = unit != "1" and not split_number(text, unit)[1]
+        except NumberError:
+            continue  # the reader says what is wrong
+        if bare:
+            examples = EXPECTED[unit].examples
+            raise click.UsageError(f"--{key.replace('_', '-')} '{text}': write the unit too ({examples})")
+    return Mapping(here, {key: Entry(key, here, Scalar(here, text)) for key, text in given.items()})
+
+
+def speed_lines(speed_m_s: float) -> list[str]:
+    """Return a speed in the units in use, and the nominal speed of a test that covers it."""
+    from boulder_sweep.settings.starter import CLASSES
+
+    nominal = {name: mph for name, (code, mph) in CLASSES.items() if code == "M"}
+    covered = next((name for name, mph in nominal.items() if mph * MPH >= speed_m_s - 0.005), None)
+    what = f"{covered} ({nominal[covered]} mph)" if covered else f"none (M goes up to {max(nominal.values())} mph)"
+    return [
+        f"speed at the boulder       {speed_m_s:.2f} m/s = {3.6 * speed_m_s:.1f} km/h = {speed_m_s / MPH:.1f} mph",
+        f"class of ASTM F2656 for it {what}, by its nominal speed",
+    ]
+
+
+FIT_EXAMPLES = """\b
+Examples:
+  sweep fit-vehicle docs/examples/rigid_wall_pulse.csv --mass "6800 kg"
+  sweep fit-vehicle pulse.csv --mass "15000 lb" --plot fit.png
+  sweep fit-vehicle pulse.csv --mass "6800 kg" --stages 2
+
+\b
+The first line of PULSE names what its columns hold, with units:
+  time [ms], displacement [mm], velocity [m/s], acceleration [g]
+One of the three beside time is enough. Time counts from first touch; earlier
+rows are left out. An acceleration is negative while the vehicle slows down;
+where it is not, name the column deceleration. Empty cells are gaps.
+"""
+
+
+@click.command("fit-vehicle", short_help="Fit spring and damper of a vehicle to a crash pulse.", epilog=FIT_EXAMPLES)
+@click.argument("pulse", type=click.Path())
+@click.option("--mass", required=True, metavar="'6800 kg'", help="Mass of the vehicle, with its unit.")
+@click.option("--speed", metavar="'30 mph'", help="Speed of impact, with its unit [default: fitted too].")
+@click.option("--stages", type=click.IntRange(1, 2), default=1, help="Springs of the front [default: 1].")
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw pulse, fit and residuals.")
+@json_option
+def fit_vehicle(pulse: str, mass: str, speed: str | None, stages: int, plot: str | None, as_json: bool) -> int:
+    """Fit spring and damper of a Maxwell element to PULSE, a vehicle's crash against a rigid wall.
+
+    With `--stages 2` also a second, stiffer spring from a crush on; refused where it fits no better than one spring.
+    """
+    mass_kg = quantity_of("--mass", mass, "kg")
+    speed_m_s = None if speed is None else quantity_of("--speed", speed, "m/s")
+    from boulder_sweep.crash_tests.fitting import fit_pulse, fit_stages
+    from boulder_sweep.crash_tests.measured import read_pulse
+
+    refuse_unwritable(None, plot)
+    fit = (fit_pulse if stages == 1 else fit_stages)(read_pulse(pulse), mass_kg, speed_m_s=speed_m_s)
+    if plot is not None:
+        fit.plot(plot)
+    for warning in fit.warnings:
+        say(f"caution: {warning}")
+    show(*([json.dumps(fit.to_dict())] if as_json else fit_lines(fit)))
+    return 0
+
+
+def fit_lines(fit: VehicleFit) -> list[str]:
+    """Return the result for people, and the line for a settings file."""
+    from boulder_sweep.crash_tests.fitting import StagedFit
+
+    wall = fit.wall
+    staged = fit if isinstance(fit, StagedFit) else None
+    speed = f"{wall.speed_m_s:.3f} m/s"
+    speed += " (given)" if fit.speed_error_m_s is None else f" ± {fit.speed_error_m_s:.3f}"
+    damping = (
+        "over-damped: creeps to a stop" if wall.over_damped else f"under-damped: a = {wall.a:.3f}, b = {wall.b:.3f} 1/s"
+    )
+    rows = [
+        ("spring", f"{wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"),
+        *(() if staged is None else _second_rows(staged)),
+        ("damper", f"{wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN*s/m"),
+        ("impact speed", speed),
+        ("damping", damping),
+        ("largest crush", f"{wall.max_displacement_m:.3f} m"),
+        ("peak force", f"{wall.peak_force / 1e3:.0f} kN at {wall.peak_force_time_s:.4f} s"),
+        ("rebound", f"{abs(wall.rebound_speed_m_s):.2f} m/s"),
+    ]
+    for name, misfit in fit.misfits.items():
+        alone = "" if staged is None else f", {staged.one.misfits[name].share:.1%} with one spring"
+        rows.append((f"misfit of {name}", f"{misfit.share:.1%} of its range (root mean square){alone}"))
+    spring, damper = f"{wall.spring_N_m / 1e3:.6g} kN/m", f"damper: {wall.damper_N_s_m / 1e3:.6g} kN*s/m}}"
+    settings = [f"vehicle: {{mass: {wall.mass_kg:.6g} kg, speed: ...,"]
+    if staged is None:
+        settings.append(f"          spring: {spring}, {damper}")
+    else:
+        second = f"{{beyond: {staged.wall.second_spring_from_m:.4g} m, "
+        second += f"stiffness: {staged.wall.second_spring_N_m / 1e3:.6g} kN/m}}"
+        settings += [
+            f"          spring: [{{stiffness: {spring}}}, {second}],",
+            f"          calibrated_crush: {wall.max_displacement_m:.3g} m, {damper}",
+        ]
+    return [*(f"{name:<24}{text}" for name, text in rows), "", *settings]
+
+
+def _second_rows(fit: StagedFit) -> list[tuple[str, str]]:
+    """Return the rows of a second spring."""
+    wall = fit.wall
+    return [
+        ("second spring", f"{wall.second_spring_N_m / 1e3:.1f} ± {fit.second_error_N_m / 1e3:.1f} kN/m"),
+        ("acts from a crush of", f"{wall.second_spring_from_m:.3f} ± {fit.from_error_m:.3f} m"),
+    ]
