@@ -184,7 +184,7 @@ def uncertainty(
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
     refuse_units_of_json(units, as_json)
-    from boulder_sweep.settings.overrides import ALL_OPINIONS
+    from boulder_sweep.settings.loader import ALL_OPINIONS
 
     sweep = load_sweep(grid, (*overrides, *([ALL_OPINIONS] if second_opinion else [])), quiet, units)
     refuse_missing(sweep, grid, design)

@@ -98,7 +98,7 @@ def cluster_options(function: Command) -> Command:
 def load_sweep(path: str, overrides: Sequence[str], quiet: bool, units: str = "si") -> Sweep:
     """Load settings and print the notes on them, and how inputs follow from the data of a site, in these units."""
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.site_data import derived_words
+    from boulder_sweep.settings.sweep import derived_words
 
     sweep = load(path, overrides)
     if not quiet:

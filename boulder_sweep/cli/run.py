@@ -79,7 +79,7 @@ def run(
         raise click.UsageError("--resume and --overwrite cannot be used together")
     if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
         raise click.UsageError("--dashboard needs --backend dask, without --scheduler, which has its own dashboard")
-    from boulder_sweep.settings.overrides import ALL_OPINIONS
+    from boulder_sweep.settings.loader import ALL_OPINIONS
 
     chosen = [] if accuracy is None else [f"--accuracy={accuracy}"]
     chosen += [ALL_OPINIONS] if second_opinion else []

@@ -9,10 +9,18 @@ from fractions import Fraction
 
 import numpy as np
 
-from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import Field
-from boulder_sweep.settings.numbers import NumberError, Quantity, describe, read_count, read_quantity
-from boulder_sweep.settings.problems import Position, did_you_mean, shorten
+from boulder_sweep.settings.numbers import Quantity, describe, quoted, read_count, read_quantity
+from boulder_sweep.settings.problems import (
+    LeafError,
+    Mistake,
+    Mistakes,
+    Position,
+    did_you_mean,
+    shorten,
+    unknown_word,
+    wrong,
+)
 from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 
 MAX_AXIS = 1_000_000
@@ -21,7 +29,7 @@ MAX_AXIS = 1_000_000
 OUTSIDE = "{value} is outside the admitted range of {low} to {high} ({reason})"
 """Why a value is not admitted; the page of a report says the same."""
 
-_RANGE_KEYS = ("from", "to", "count", "step")
+RANGE_KEYS = ("from", "to", "count", "step")
 _TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
 
 
@@ -37,30 +45,11 @@ class Leaf:
         Whether it was written as a list or range (an axis of the grid) or as one value.
     position : Position
         Where it stands.
-    distribution : Distribution, SetDistributions or None
-        Spread about the values, which are its means; None where the values are certain.
     """
 
     values: np.ndarray
     is_axis: bool
     position: Position
-    distribution: Distribution | SetDistributions | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """One mistake within an entry."""
-
-    position: Position
-    message: str
-
-
-class LeafError(Exception):
-    """An entry that cannot be used, with every mistake in it."""
-
-    def __init__(self, mistakes: list[Mistake]) -> None:
-        super().__init__("; ".join(mistake.message for mistake in mistakes))
-        self.mistakes = mistakes
 
 
 def read_leaf(node: Node, field: Field) -> Leaf:
@@ -81,17 +70,16 @@ def read_leaf(node: Node, field: Field) -> Leaf:
     """
     node = _unfold_text_list(node)
     if isinstance(node, Mapping):
-        values = _read_range(node, field)
-        return Leaf(np.array(values), True, node.position)
+        return Leaf(np.array(_read_range(node, field)), True, node.position)
     items: list[Node] = [node]
+    unit = None
     if isinstance(node, Sequence):
-        items = node.items
+        items, unit = node.items, node.unit
     if not items:
-        raise LeafError([Mistake(node.position, "the list is empty; give at least one value")])
+        raise wrong(node.position, "the list is empty; give at least one value")
     if len(items) > MAX_AXIS:
-        raise LeafError([Mistake(node.position, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")])
-    quantities = _read_all(items, field, node.unit if isinstance(node, Sequence) else None)
-    values = _check_values(quantities, items, field)
+        raise wrong(node.position, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")
+    values = _check_values(_read_all(items, field, unit), items, field)
     return Leaf(np.array(values), isinstance(node, Sequence), node.position)
 
 
@@ -104,41 +92,33 @@ def read_single(node: Node, field: Field) -> float:
         Not one number, wrong unit, or outside the admitted range.
     """
     if not isinstance(node, Scalar):
-        raise LeafError([Mistake(node.position, "takes one value here, not a list or a range")])
-    try:
-        value = _to_float(read_quantity(node, field.unit, sample=sample_of(field)).value)
-    except NumberError as error:
-        raise LeafError([Mistake(node.position, str(error))]) from None
-    problem = outside(value, field)
-    if problem:
-        raise LeafError([Mistake(node.position, problem)])
+        raise wrong(node.position, "takes one value here, not a list or a range")
+    (value,) = _check_values([read_quantity(node, field.unit, sample=sample_of(field))], [node], field)
     return value
 
 
-def read_entries(node: Node, known: dict[str, Field], what: str) -> tuple[dict[str, float], list[Mistake]]:
-    """Return the single values of a block by their keys, and every mistake in it: an unknown key, a wrong value.
+def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mistakes) -> dict[str, float]:
+    """Return the single values of a block by their keys; unknown keys and wrong values go to `mistakes`.
 
     Raises
     ------
     LeafError
         It is no block.
     """
-    keys = ", ".join(known)
     if not isinstance(node, Mapping) or node.unit is not None:
-        raise LeafError([Mistake(node.position, f"{what} must be a block of keys: {keys}")])
+        raise wrong(node.position, f"{what} must be a block of keys: {', '.join(known)}")
     values: dict[str, float] = {}
-    mistakes: list[Mistake] = []
     for entry in node:
         field = known.get(entry.key)
         if field is None:
-            hint = did_you_mean(entry.key, tuple(known))
-            mistakes.append(Mistake(entry.position, f"'{shorten(entry.key)}' is not a key of {what} ({keys}){hint}"))
+            mistakes.add(entry.position, unknown_word(entry.key, f"a key of {what}", known))
             continue
         try:
             values[entry.key] = read_single(entry.value, field)
         except LeafError as error:
-            mistakes.extend(Mistake(found.position, f"{entry.key}: {found.message}") for found in error.mistakes)
-    return values, mistakes
+            for found in error.mistakes:
+                mistakes.add(found.position, f"{entry.key}: {found.message}")
+    return values
 
 
 def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
@@ -149,9 +129,9 @@ def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, floa
     LeafError
         With every mistake in it, see `read_entries`.
     """
-    values, mistakes = read_entries(node, known, what)
-    if mistakes:
-        raise LeafError(mistakes)
+    mistakes = Mistakes()
+    values = read_entries(node, known, what, mistakes)
+    mistakes.raise_if_any()
     return {known[key].name: value for key, value in values.items()}
 
 
@@ -184,98 +164,88 @@ def _unfold_text_list(node: Node) -> Node:
 def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quantity]:
     """Read every number of an entry; all of them with a unit or none."""
     quantities: list[Quantity] = []
-    mistakes: dict[str, Mistake] = {}
+    mistakes = Mistakes()
     for item in items:
-        try:
+        with mistakes:
             quantities.append(read_quantity(item, field.unit, unit, sample_of(field)))
-        except NumberError as error:
-            mistakes.setdefault(str(error), Mistake(item.position, str(error)))
     if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:
         bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.has_unit)
-        text = shorten(bare.text) if isinstance(bare, Scalar) else ""
-        message = f"'{text}' has no unit while the others have one; give all of them a unit, or none"
-        mistakes[message] = Mistake(bare.position, message)
-    if mistakes:
-        raise LeafError(list(mistakes.values()))
+        message = f"{quoted(bare)} has no unit while the others have one; give all of them a unit, or none"
+        mistakes.add(bare.position, message)
+    unlike: dict[str, Mistake] = {}  # the same mistake in many values is reported once
+    for mistake in mistakes:
+        unlike.setdefault(mistake.message, mistake)
+    Mistakes(unlike.values()).raise_if_any()
     return quantities
 
 
 def _check_values(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
     """Return the values; every one of them must be admitted."""
     values = [_to_float(quantity.value) for quantity in quantities]
-    problems = ((node, outside(value, field)) for node, value in zip(nodes, values, strict=True))
-    mistakes = [Mistake(node.position, problem) for node, problem in problems if problem]
-    if mistakes:
-        raise LeafError(mistakes)
+    mistakes = Mistakes()
+    for node, value in zip(nodes, values, strict=True):
+        problem = outside(value, field)
+        if problem:
+            mistakes.add(node.position, problem)
+    mistakes.raise_if_any()
     return values
 
 
 def _read_range(node: Mapping, field: Field) -> list[float]:
     """Return the values of ``{from, to, count}`` or ``{from, to, step}``."""
     _check_range_keys(node)
-    ends = [entry for entry in node if entry.key in ("from", "to", "step")]
-    quantities = _read_all([entry.value for entry in ends], field, node.unit)
-    exact = {entry.key: quantity.value for entry, quantity in zip(ends, quantities, strict=True)}
-    bounding = [
-        (quantity, entry.value) for entry, quantity in zip(ends, quantities, strict=True) if entry.key != "step"
-    ]
-    _check_values([quantity for quantity, _ in bounding], [value for _, value in bounding], field)
-    try:
-        if "step" in exact:
-            count = _count_of_step(exact["from"], exact["to"], exact["step"], field.unit)
-        else:
-            count = _count_of_count(exact["from"], exact["to"], node.entries["count"].value)
-    except NumberError as error:
-        key = "step" if "step" in exact else "count"
-        raise LeafError([Mistake(node.entries[key].value.position, str(error))]) from None
-    return spread(exact["from"], exact["to"], count)
+    given = [entry for entry in node if entry.key != "count"]
+    quantities = _read_all([entry.value for entry in given], field, node.unit)
+    exact = {entry.key: quantity for entry, quantity in zip(given, quantities, strict=True)}
+    ends = [key for key in exact if key != "step"]
+    _check_values([exact[key] for key in ends], [node.entries[key].value for key in ends], field)
+    first, last = exact["from"].value, exact["to"].value
+    if "step" in exact:
+        position = node.entries["step"].value.position
+        return spread(first, last, _count_of_step(first, last, exact["step"].value, field.unit, position))
+    of_count = node.entries["count"].value
+    count = read_count(of_count, "count", MAX_AXIS)
+    if count == 1 and first != last:
+        message = "a count of 1 cannot hold both ends of the range; give a count of 2 or more, or one value"
+        raise wrong(of_count.position, message)
+    return spread(first, last, count)
 
 
 def _check_range_keys(node: Mapping) -> None:
-    mistakes = []
+    mistakes = Mistakes()
     for entry in node:
-        if entry.key not in _RANGE_KEYS:
-            hint = did_you_mean(entry.key, _RANGE_KEYS)
+        if entry.key not in RANGE_KEYS:
+            hint = did_you_mean(entry.key, RANGE_KEYS)
             message = f"'{shorten(entry.key)}' is not a key of a range (from, to, count or step){hint}"
-            mistakes.append(Mistake(entry.position, message))
-    if not mistakes:
-        missing = [key for key in ("from", "to") if key not in node.entries]
-        if missing:
-            mistakes.append(Mistake(node.position, f"the range lacks {' and '.join(missing)}"))
-        elif "count" in node.entries and "step" in node.entries:
-            mistakes.append(Mistake(node.entries["step"].position, "give count or step, not both"))
-        elif "count" not in node.entries and "step" not in node.entries:
-            mistakes.append(Mistake(node.position, "the range lacks count or step"))
-    if mistakes:
-        raise LeafError(mistakes)
+            mistakes.add(entry.position, message)
+    mistakes.raise_if_any()
+    missing = [key for key in ("from", "to") if key not in node.entries]
+    if missing:
+        raise wrong(node.position, f"the range lacks {' and '.join(missing)}")
+    if "count" in node.entries and "step" in node.entries:
+        raise wrong(node.entries["step"].position, "give count or step, not both")
+    if "count" not in node.entries and "step" not in node.entries:
+        raise wrong(node.position, "the range lacks count or step")
 
 
-def _count_of_count(first: Fraction, last: Fraction, node: Node) -> int:
-    count = read_count(node, "count", MAX_AXIS)
-    if count == 1 and first != last:
-        raise NumberError("a count of 1 cannot hold both ends of the range; give a count of 2 or more, or one value")
-    return count
-
-
-def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str) -> int:
+def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str, position: Position) -> int:
     """Return how many values the steps make; the last one must be the end of the range, exactly."""
     if step == 0:
-        raise NumberError("step must not be 0")
+        raise wrong(position, "step must not be 0")
     steps = (last - first) / step
     if steps < 0:
         way = "downwards" if last < first else "upwards"
-        raise NumberError(
-            f"the range goes {way} and the step does not; swap from and to, or change the sign of the step"
-        )
+        message = f"the range goes {way} and the step does not; swap from and to, or change the sign of the step"
+        raise wrong(position, message)
     if steps >= MAX_AXIS:
-        raise NumberError(f"this gives more than {MAX_AXIS} values, the limit for one axis; use a larger step")
+        raise wrong(position, f"this gives more than {MAX_AXIS} values, the limit for one axis; use a larger step")
     if steps.denominator != 1:
         below = first + math.floor(steps) * step
-        above = below + step
-        raise NumberError(
-            f"steps of {describe(float(step), unit)} from {describe(float(first), unit)} do not end at "
-            f"{describe(float(last), unit)} but at {describe(float(below), unit)} or "
-            f"{describe(float(above), unit)}; use one of these for 'to', or give count"
+        start, end, low, high = (describe(float(value), unit) for value in (first, last, below, below + step))
+        raise wrong(
+            position,
+            f"steps of {describe(float(step), unit)} from {start} do not end at {end} but at {low} or {high}; "
+            "use one of these for 'to', or give count",
         )
     return int(steps) + 1
 

@@ -9,7 +9,7 @@ import re
 from fractions import Fraction
 from typing import NamedTuple
 
-from boulder_sweep.settings.problems import shorten
+from boulder_sweep.settings.problems import shorten, wrong
 from boulder_sweep.settings.tree import Node, Scalar, Sequence
 from boulder_sweep.settings.units import EXPECTED, UnitError, factor
 
@@ -50,26 +50,24 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
 
     Raises
     ------
-    NumberError
+    LeafError
         Not a finite decimal number, or an unknown or unfit unit.
     """
     if not isinstance(node, Scalar):
         kind = "a list" if isinstance(node, Sequence) else "a block"
-        raise NumberError(f"one number is needed here, not {kind}")
-    number, unit_text = split_number(node.text, unit, sample)
-    if outer_unit is not None:
-        if unit_text:
-            raise NumberError(
-                f"'{shorten(node.text)}' has a unit and so has the list ('{shorten(outer_unit.text)}'); "
-                "give one of them"
-            )
-        unit_text = outer_unit.text
-    if not unit_text:
-        return Quantity(number, has_unit=False)
+        raise wrong(node.position, f"one number is needed here, not {kind}")
     try:
-        return Quantity(number * factor(unit_text, unit), has_unit=True)
-    except UnitError as error:
-        raise NumberError(str(error)) from None
+        number, unit_text = split_number(node.text, unit, sample)
+        if outer_unit is not None:
+            if unit_text:
+                raise NumberError(
+                    f"'{shorten(node.text)}' has a unit and so has the list ('{shorten(outer_unit.text)}'); "
+                    "give one of them"
+                )
+            unit_text = outer_unit.text
+        return Quantity(number * factor(unit_text, unit) if unit_text else number, has_unit=bool(unit_text))
+    except (NumberError, UnitError) as error:
+        raise wrong(node.position, str(error)) from None
 
 
 def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]:
@@ -81,37 +79,37 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
         The text does not begin with a plain, finite decimal number.
     """
     stripped = text.strip().replace("−", "-")
-    quoted = f"'{shorten(text)}'"
+    given = f"'{shorten(text)}'"
     words = needed(unit, sample)
     if not stripped or stripped in ("~", "null", "Null", "NULL"):
         raise NumberError(f"{EMPTY}; {words}")
     if stripped.lower() in _YES_NO:
-        raise NumberError(f"{quoted} is a yes/no value; {words}")
+        raise NumberError(f"{given} is a yes/no value; {words}")
     if _NOT_FINITE.fullmatch(stripped):
-        raise NumberError(f"{quoted} is not a finite number; {words}")
+        raise NumberError(f"{given} is not a finite number; {words}")
     match = _NUMBER.match(stripped)
     sign, whole, decimals, exponent = match.groups() if match else ("", "", None, None)
     rest = stripped[match.end() :] if match else stripped
     if not (whole or decimals):
-        raise NumberError(f"{quoted} {NOT_A_NUMBER}; {words}")
+        raise NumberError(f"{given} {NOT_A_NUMBER}; {words}")
     if whole == "0" and rest[:1].lower() in ("x", "o", "b"):
-        raise NumberError(f"{quoted} is not a decimal number; {words}")
+        raise NumberError(f"{given} is not a decimal number; {words}")
     if len(whole) > 1 and whole.startswith("0"):
-        raise NumberError(f"{quoted} begins with a zero, which some programs read as octal; remove the zero")
+        raise NumberError(f"{given} begins with a zero, which some programs read as octal; remove the zero")
     if _FEET_AND_INCHES.fullmatch(stripped):
-        raise NumberError(f"{quoted} is in feet and inches; write one number, such as 5.5 ft or 66 in")
+        raise NumberError(f"{given} is in feet and inches; write one number, such as 5.5 ft or 66 in")
     if re.match(r"\s*[,;]\s+\d", rest) or rest[:1] == ";":
-        raise NumberError(f"{quoted} is not one number; write a list in brackets, such as [34, 38] deg")
+        raise NumberError(f"{given} is not one number; write a list in brackets, such as [34, 38] deg")
     if rest[:1] in (",", "_", "'", ".") or re.match(r"\s+\d", rest):
         raise NumberError(
-            f"{quoted} is not a plain number; use a decimal point and no thousands separators, as in 6800.5"
+            f"{given} is not a plain number; use a decimal point and no thousands separators, as in 6800.5"
         )
     if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
-        raise NumberError(f"{quoted} is not one number; {words}, or a range {{from: ..., to: ..., count: ...}}")
+        raise NumberError(f"{given} is not one number; {words}, or a range {{from: ..., to: ..., count: ...}}")
     digits = whole + (decimals or "")
     power = _MAX_EXPONENT + 1 if len(exponent or "") > 9 else int(exponent or 0)
     if len(digits) > _MAX_DIGITS or abs(power) > _MAX_EXPONENT:
-        raise NumberError(f"{quoted} has too many digits or too large an exponent")
+        raise NumberError(f"{given} has too many digits or too large an exponent")
     value = Fraction(int(digits)) * Fraction(10) ** (power - len(decimals or ""))
     return (-value if sign == "-" else value), rest.strip()
 
@@ -121,15 +119,20 @@ def read_count(node: Node, what: str, largest: int) -> int:
 
     Raises
     ------
-    NumberError
+    LeafError
         Not a whole number, or outside that range.
     """
     if isinstance(node, Scalar) and re.fullmatch(r"[1-9]\d{0,17}", node.text.strip(), re.ASCII):
         value = int(node.text)
         if value <= largest:
             return value
-    shown = f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
-    raise NumberError(f"{shown} is not valid; {what} must be a whole number from 1 to {largest}")
+    message = f"{quoted(node)} is not valid; {what} must be a whole number from 1 to {largest}"
+    raise wrong(node.position, message)
+
+
+def quoted(node: Node) -> str:
+    """Return the text of a node, to be quoted in a message; of a list or a block "this"."""
+    return f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
 
 
 def describe(value: float, unit: str) -> str:
@@ -140,22 +143,4 @@ def describe(value: float, unit: str) -> str:
 def needed(unit: str, sample: str = "") -> str:
     """Return what an entry takes whose bare numbers are in a unit of the table, with an example."""
     expected = EXPECTED[unit]
-    if unit == "1":
-        return "a number is needed"
-    return f"{expected.words} is needed, such as {sample or _SAMPLES[unit]}"
-
-
-_SAMPLES = {
-    "m": "1.65 m",
-    "kg": "6800 kg or 15000 lb",
-    "s": "1 s",
-    "m/s": "13.4 m/s or 30 mph",
-    "m/s^2": "1.5 m/s^2",
-    "deg": "36 deg",
-    "kg/m^3": "2650 kg/m^3 or 116 pcf",
-    "MN/m^3": "95 MN/m^3 or 350 pci",
-    "kPa": "5 kPa",
-    "MPa": "14 MPa",
-    "N/m": "3103.3 kN/m",
-    "N*s/m": "138.91 kN*s/m",
-}
+    return "a number is needed" if unit == "1" else f"{expected.words} is needed, such as {sample or expected.sample}"

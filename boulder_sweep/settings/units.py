@@ -71,23 +71,25 @@ class Expected(NamedTuple):
 
     words: str
     examples: str
+    sample: str
+    """A value that a message suggests."""
 
 
 # By the unit of the table (the unit of a bare number).
 EXPECTED: dict[str, Expected] = {
-    "m": Expected("a length", "m, cm, ft or in"),
-    "kg": Expected("a mass", "kg, t, lb or short_ton"),
-    "s": Expected("a time", "s or ms"),
-    "m/s": Expected("a speed", "m/s, km/h, mph or ft/s"),
-    "m/s^2": Expected("an acceleration", "m/s^2 or ft/s^2"),
-    "deg": Expected("an angle", "deg or rad"),
-    "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3"),
-    "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci"),
-    "kPa": Expected("a pressure", "kPa, Pa or MPa"),
-    "MPa": Expected("a pressure", "MPa, kPa or tsf"),
-    "N/m": Expected("a stiffness", "kN/m, N/m or lb/in"),
-    "N*s/m": Expected("a damping constant", "kN*s/m, N*s/m or lb*s/in"),
-    "1": Expected("a plain number", "no unit, or %"),
+    "m": Expected("a length", "m, cm, ft or in", "1.65 m"),
+    "kg": Expected("a mass", "kg, t, lb or short_ton", "6800 kg or 15000 lb"),
+    "s": Expected("a time", "s or ms", "1 s"),
+    "m/s": Expected("a speed", "m/s, km/h, mph or ft/s", "13.4 m/s or 30 mph"),
+    "m/s^2": Expected("an acceleration", "m/s^2 or ft/s^2", "1.5 m/s^2"),
+    "deg": Expected("an angle", "deg or rad", "36 deg"),
+    "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3", "2650 kg/m^3 or 116 pcf"),
+    "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci", "95 MN/m^3 or 350 pci"),
+    "kPa": Expected("a pressure", "kPa, Pa or MPa", "5 kPa"),
+    "MPa": Expected("a pressure", "MPa, kPa or tsf", "14 MPa"),
+    "N/m": Expected("a stiffness", "kN/m, N/m or lb/in", "3103.3 kN/m"),
+    "N*s/m": Expected("a damping constant", "kN*s/m, N*s/m or lb*s/in", "138.91 kN*s/m"),
+    "1": Expected("a plain number", "no unit, or %", ""),
 }
 
 _KINDS = (
@@ -158,6 +160,11 @@ def factor(text: str, target: str) -> Fraction:
         return ratio * STANDARD_GRAVITY
     expected = EXPECTED[target]
     raise UnitError(f"'{shorten(text)}' is {_kind(unit.dimension)}; {expected.words} is needed ({expected.examples})")
+
+
+def name_suffix(unit: str) -> str:
+    """Return the end of the name of a column in a unit: ``_kg_m3`` for kg/m^3, nothing for a plain number."""
+    return "" if unit == "1" else "_" + unit.replace("^", "").replace("*", "_").replace("/", "_")
 
 
 Dimension = tuple[int, ...]

@@ -1,132 +1,24 @@
-"""Entries that hold what a site gives: the street in place of a speed, readings in place of soil constants.
+"""Readings of an investigation in place of soil constants: ``spt: {n: 28, energy_ratio: 60 %, depth: 1.5 m}``.
 
-Each is worked out while the file is read and stands for entries of the table from then on; what was used is kept, so
+They are worked out while the file is read and stand for entries of the table from then on; what was used is kept, so
 that it can be printed, stored and reported.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import asdict
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
 
 from boulder_sweep import investigation as sand
-from boulder_sweep.approach import Approach, NoApproachError
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.leaf import LeafError, Mistake, read_block, read_single
+from boulder_sweep.settings.leaf import read_block, read_single
 from boulder_sweep.settings.model import Bound, Field
+from boulder_sweep.settings.problems import LeafError, Mistakes, wrong
 from boulder_sweep.settings.shown_units import quantity_text
-from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
-
-APPROACH = "approach"
-SPEED = "speed"
-APPROACH_FIELDS = {
-    key: Field("vehicle.approach", key, name, unit, meaning, bound)
-    for key, name, unit, meaning, bound in (
-        (
-            "length",
-            "length_m",
-            "m",
-            "length of the run-up: from its beginning, or the end of its last curve, to the boulder",
-            Bound(0.0, 1e5, "a length"),
-        ),
-        ("from", "from_m_s", "m/s", "speed at the beginning of the run-up", Bound(0.0, 100.0, "up to 360 km/h")),
-        (
-            "acceleration",
-            "acceleration_m_s2",
-            "m/s^2",
-            "acceleration of the vehicle at full throttle on level ground",
-            Bound(0.0, 20.0, "tyres transmit about 1 g at most"),
-        ),
-        (
-            "curve_radius",
-            "curve_radius_m",
-            "m",
-            "radius of the curve that ends where the run-up begins",
-            Bound(1.0, 1e5, "no truck turns tighter"),
-        ),
-        (
-            "friction",
-            "friction",
-            "1",
-            "coefficient of friction of the tyres in that curve; 1 if not given, the conservative value",
-            Bound(0.05, 2.0, "0.6 is usual on a road, 1 is conservative"),
-        ),
-        (
-            "grade",
-            "grade",
-            "1",
-            "rise over run of the street in the direction of travel, negative downhill",
-            Bound(-0.5, 0.5, "no street is steeper"),
-        ),
-    )
-}
-"""Entries of a run-up by key."""
-NEEDS_ACCELERATION = (
-    "lacks acceleration: that of the vehicle at full throttle on level ground, averaged over the run-up, by its maker "
-    "or a timed run from rest (2 s / t^2); no values for classes of vehicles are built in"
-)
-
-
-def read_approach(node: Node) -> Approach:
-    """Read ``{length: 80 m, from: 0 mph, acceleration: 1.5 m/s^2, curve_radius: 25 m, friction: 0.8, grade: -4 %}``.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in it.
-    """
-    values = read_block(node, APPROACH_FIELDS, "an approach")
-    given = node.entries if isinstance(node, Mapping) else {}
-    mistakes = []
-    if "length" not in given:
-        mistakes.append(Mistake(node.position, "lacks length, that of the run-up to the boulder"))
-    if "acceleration" not in given:
-        mistakes.append(Mistake(node.position, NEEDS_ACCELERATION))
-    if not {"from", "curve_radius"} & set(given):
-        mistakes.append(Mistake(node.position, "lacks from (0 mph for a start from rest) or curve_radius"))
-    if "friction" in given and "curve_radius" not in given:
-        mistakes.append(Mistake(given["friction"].position, "friction limits the speed in a curve: give curve_radius"))
-    if mistakes:
-        raise LeafError(mistakes)
-    approach = Approach(**values)
-    try:
-        speed = approach.impact_speed_m_s
-    except NoApproachError as error:
-        raise LeafError([Mistake(node.position, str(error))]) from None
-    if speed > 100.0:
-        message = f"reaches {speed:.4g} m/s; more than 100 m/s (360 km/h) is not admitted"
-        raise LeafError([Mistake(node.position, message)])
-    return approach
-
-
-def approach_data(approach: Approach) -> dict[str, Any]:
-    """Return what is kept of a run-up as plain data: what was given, and the speeds that follow."""
-    given = {name: value for name, value in asdict(approach).items() if value is not None}
-    if approach.curve_radius_m is None:
-        del given["friction"]
-    else:
-        given["curve_speed_m_s"] = approach.curve_speed_m_s
-    return {**given, "impact_speed_m_s": approach.impact_speed_m_s}
-
-
-def approach_words(data: dict[str, Any], units: str = "si") -> str:
-    """Return in one line how a speed follows from a run-up, by what `approach_data` returned."""
-    start, curve = data.get("from_m_s", math.inf), data.get("curve_speed_m_s", math.inf)
-
-    def shown(name: str, unit: str) -> str:
-        return quantity_text(unit, units, data[name])
-
-    first = "from rest" if start == 0.0 else f"from {_speed(min(start, curve), units)}"
-    if curve < start:
-        first += f", the most in a curve of {shown('curve_radius_m', 'm')} (sqrt({data['friction']:g} g r))"
-    street = "" if data["grade"] == 0.0 else f", grade {100.0 * data['grade']:+g} %"
-    run = f"over {shown('length_m', 'm')} with {shown('acceleration_m_s2', 'm/s^2')}{street}"
-    return f"{_speed(data['impact_speed_m_s'], units)} is the most that reaches the boulder: {first}, {run}"
-
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
 
 SOIL_KEYS = ("friction_angle", "density", "subgrade_reaction")
 """What readings stand for, as far as a file does not give it."""
@@ -194,15 +86,12 @@ def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[di
         return [{method: ratio, "friction_angle_deg": _inside(node, lambda: sand.angle_by_relative_density(ratio))}]
     items = node.items if isinstance(node, Sequence) and node.unit is None else [node]
     if not items:
-        raise LeafError([Mistake(node.position, "the list is empty; give at least one reading")])
-    found, mistakes = [], []
+        raise wrong(node.position, "the list is empty; give at least one reading")
+    found, mistakes = [], Mistakes()
     for item in items:
-        try:
+        with mistakes:
             found.append(_reading(item, method, density_kg_m3))
-        except LeafError as error:
-            mistakes += error.mistakes
-    if mistakes:
-        raise LeafError(mistakes)
+    mistakes.raise_if_any()
     return found
 
 
@@ -212,12 +101,12 @@ def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, 
     position, raw = node.position, {"n", "energy_ratio", "depth_m"}
     if method == "spt":
         if "n1_60" in values and raw & set(values):
-            raise LeafError([Mistake(position, "give n, energy_ratio and depth, or n1_60, not both")])
+            raise wrong(position, "give n, energy_ratio and depth, or n1_60, not both")
         if "n1_60" not in values and not raw <= set(values):
             message = "a reading is n, the blows as logged, with energy_ratio and depth, or n1_60, which is corrected"
-            raise LeafError([Mistake(position, message)])
+            raise wrong(position, message)
     elif len(values) < 2:
-        raise LeafError([Mistake(position, "a reading of a cone has q_c and depth")])
+        raise wrong(position, "a reading of a cone has q_c and depth")
     if "depth_m" in values:
         stress = sand.vertical_stress(values["depth_m"], density_kg_m3)
         values |= {"stress_kPa": stress, "stress_factor": sand.stress_factor(stress)}
@@ -236,7 +125,7 @@ def _inside(node: Node, of_correlation: Callable[[], float]) -> float:
     try:
         return of_correlation()
     except sand.OutsideError as error:
-        raise LeafError([Mistake(node.position, f"{error}; give soil.friction_angle as measured")]) from None
+        raise wrong(node.position, f"{error}; give soil.friction_angle as measured") from None
 
 
 def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: float | None) -> dict[str, Any]:
@@ -249,8 +138,6 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
     LeafError
         With every mistake.
     """
-    from boulder_sweep.settings.notes import API_ANGLES, api_curve
-
     readings = readings_of(node, method, density_kg_m3)
     angle, sd = min(own["friction_angle_deg"] for own in readings), _SD_DEG[method]
     data: dict[str, Any] = {"method": method, "source": SOURCES[method], "readings": readings}
@@ -259,12 +146,12 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
     if "density" in lacking:
         data["density_low_kg_m3"], data["density_high_kg_m3"] = sand.densities(angle)
     if "subgrade_reaction" in lacking:
-        if angle < API_ANGLES[0]:
-            message = f"the API curve begins at {API_ANGLES[0]:g} deg, and these readings give {angle:.4g} deg"
-            raise LeafError([Mistake(node.position, f"{message}; give soil.subgrade_reaction as measured")])
+        if angle < sand.API_ANGLES[0]:
+            message = f"the API curve begins at {sand.API_ANGLES[0]:g} deg, and these readings give {angle:.4g} deg"
+            raise wrong(node.position, f"{message}; give soil.subgrade_reaction as measured")
         # The curve as it is; what the angle may be off by is carried along it, at the slope of its logarithm.
-        curve = api_curve(np.array([angle, *API_ANGLES]))
-        spread = sd * math.log(curve[2] / curve[1]) / float(API_ANGLES[1] - API_ANGLES[0])
+        curve = sand.api_curve(np.array([angle, *sand.API_ANGLES]))
+        spread = sd * math.log(curve[2] / curve[1]) / float(sand.API_ANGLES[1] - sand.API_ANGLES[0])
         data |= {"subgrade_reaction_MN_m3": float(curve[0]), "subgrade_reaction_cov": math.sqrt(math.expm1(spread**2))}
     return data
 
@@ -305,7 +192,7 @@ def _reading_words(reading: dict[str, float], units: str) -> str:
     return f"N {reading['n']:g} ({energy}) at {depth}, {corrected} with {factors}"
 
 
-def unfold_soils(root: Mapping, listed: Collection[str]) -> tuple[list[Mistake], list[dict[str, Any]]]:
+def unfold_soils(root: Mapping, listed: Collection[str], mistakes: Mistakes) -> list[dict[str, Any]]:
     """Replace the readings of every soil by distributions of the constants that it does not give.
 
     Parameters
@@ -314,39 +201,34 @@ def unfold_soils(root: Mapping, listed: Collection[str]) -> tuple[list[Mistake],
         The tree of the file, changed in place.
     listed : collection of str
         Keys of the soil that a table of designs gives.
+    mistakes : Mistakes
+        Receives what is wrong with them.
 
     Returns
     -------
-    mistakes : list of Mistake
-        What is wrong with them.
-    data : list of dict
+    list of dict
         What `soil_of` keeps of each, under the name of its soil where it is a named one.
     """
-    mistakes: list[Mistake] = []
     data: list[dict[str, Any]] = []
-    for soil in blocks_of(root, "soil"):
+    for soil in root.blocks("soil"):
         given = [key for key in METHODS if key in soil.entries]
         if not given:
             continue
         entry = soil.entries[given[0]]
         lacking = [key for key in SOIL_KEYS if key not in soil.entries and key not in listed]
         found: dict[str, Any] = {}
-        try:
+        with mistakes:
             if len(given) > 1:
-                raise LeafError([Mistake(soil.entries[given[1]].position, f"give one of {', '.join(given)}")])
+                raise wrong(soil.entries[given[1]].position, f"give one of {', '.join(given)}")
             if "water_table" in soil.entries and "subgrade_reaction" in lacking:
                 message = "the API curve is that of dry sand; with a water table give soil.subgrade_reaction"
-                raise LeafError([Mistake(entry.position, message)])
+                raise wrong(entry.position, message)
             found = soil_of(entry.value, given[0], lacking, _plain_density(soil))
-        except LeafError as error:
-            mistakes += error.mistakes
-        name = soil.get("name")
-        if found:
-            data.append(({"name": name.text.strip()} if isinstance(name, Scalar) else {}) | found)
+            data.append(soil.label | found)
         for key in given[1:]:
             del soil.entries[key]
         soil.replace(given[0], _soil_entries(entry, found))
-    return mistakes, data
+    return data
 
 
 def _plain_density(soil: Mapping) -> float | None:
@@ -370,69 +252,4 @@ def _soil_entries(entry: Entry, data: dict[str, Any]) -> list[Entry]:
     if "subgrade_reaction_MN_m3" in data:
         mean, cov = data["subgrade_reaction_MN_m3"], data["subgrade_reaction_cov"]
         forms["subgrade_reaction"] = {"distribution": "lognormal", "mean": f"{mean!r} MN/m^3", "cov": f"{cov!r}"}
-    at = entry.value.position
-    return [
-        Entry(
-            key, entry.position, Mapping(at, {word: Entry(word, at, Scalar(at, text)) for word, text in form.items()})
-        )
-        for key, form in forms.items()
-    ]
-
-
-def derived_words(derived: dict[str, Any], units: str = "si") -> list[str]:
-    """Return how inputs were worked out, a line each, by `boulder_sweep.settings.Sweep.derived`."""
-    lines = []
-    for key, path, words in (("soil", "soil", soil_words), (APPROACH, "vehicle.speed", approach_words)):
-        for data in derived.get(key, []):
-            of_set = f" ({data['name']})" if "name" in data else ""
-            lines.append(f"{path}{of_set}: {words(data, units)}")
-    return lines
-
-
-def _speed(speed: float, units: str) -> str:
-    mph = f"{speed / 0.44704:.3g} mph"
-    return f"{speed:.4g} m/s ({mph})" if units == "si" else mph
-
-
-def unfold_approaches(root: Mapping) -> tuple[list[Mistake], list[dict[str, Any]]]:
-    """Replace the approach of every vehicle by its speed.
-
-    Parameters
-    ----------
-    root : Mapping
-        The tree of the file, changed in place.
-
-    Returns
-    -------
-    mistakes : list of Mistake
-        What is wrong with them.
-    data : list of dict
-        What `approach_data` keeps of each, under the name of its vehicle where it is a named one.
-    """
-    mistakes: list[Mistake] = []
-    data: list[dict[str, Any]] = []
-    for vehicle in blocks_of(root, "vehicle"):
-        entry = vehicle.entries.get(APPROACH)
-        if entry is None:
-            continue
-        try:
-            approach = read_approach(entry.value)
-        except LeafError as error:
-            mistakes += error.mistakes
-            del vehicle.entries[APPROACH]
-            continue
-        if SPEED in vehicle.entries:
-            mistakes.append(Mistake(entry.position, f"give {SPEED} or {APPROACH}, not both"))
-        name = vehicle.get("name")
-        data.append(({"name": name.text.strip()} if isinstance(name, Scalar) else {}) | approach_data(approach))
-        speed = Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s")
-        vehicle.replace(APPROACH, [Entry(SPEED, entry.position, speed)])
-    return mistakes, data
-
-
-def blocks_of(root: Mapping, section: str) -> Iterator[Mapping]:
-    """Yield the block of a section, or each of its named sets."""
-    node = root.get(section)
-    for one in node.items if isinstance(node, Sequence) else [node]:
-        if isinstance(one, Mapping):
-            yield one
+    return [Entry(key, entry.position, block_of(entry.value.position, form)) for key, form in forms.items()]
