@@ -12,9 +12,9 @@ from boulder_sweep.answers.moving import narrowed
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
-from boulder_sweep.settings.leaf import outside, read_single
 from boulder_sweep.settings.problems import LeafError, Position
 from boulder_sweep.settings.tree import Scalar
+from boulder_sweep.settings.values import outside, read_single
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -128,7 +128,7 @@ def quantity(text: str | float, unit: str, option: str) -> float:
     QuestionError
         It is not a number of that kind.
     """
-    from boulder_sweep.settings.numbers import read_quantity
+    from boulder_sweep.settings.values import read_quantity
 
     if not isinstance(text, str):
         return float(text)

@@ -169,8 +169,8 @@ def refuse_unwritable_history(
 
 def quantity_of(option: str, text: str, unit: str) -> float:
     """Return the positive number that an option gives with its unit, in the unit of the table."""
-    from boulder_sweep.settings.numbers import NumberError, split_number
     from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+    from boulder_sweep.settings.values import NumberError, split_number
 
     try:
         number, unit_text = split_number(text, unit)

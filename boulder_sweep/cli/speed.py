@@ -63,10 +63,10 @@ def speed(as_json: bool, **given: str | None) -> int:
 
 def _as_block(given: dict[str, str]) -> Mapping:
     """Return the options as the block of a settings file; each needs its unit here, zero too."""
-    from boulder_sweep.settings.numbers import NumberError, split_number
     from boulder_sweep.settings.problems import Position
     from boulder_sweep.settings.tree import Entry, Mapping, Scalar
     from boulder_sweep.settings.units import EXPECTED
+    from boulder_sweep.settings.values import NumberError, split_number
     from boulder_sweep.settings.vehicle import APPROACH_FIELDS
 
     here = Position("sweep speed")

@@ -20,7 +20,6 @@ import numpy as np
 
 from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.errors import ComparisonError
-from boulder_sweep.settings.numbers import NumberError, split_number
 from boulder_sweep.settings.problems import (
     Position,
     ProblemList,
@@ -31,6 +30,7 @@ from boulder_sweep.settings.problems import (
     shorten,
 )
 from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
+from boulder_sweep.settings.values import NumberError, split_number
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory

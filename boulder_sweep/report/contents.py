@@ -45,11 +45,10 @@ from boulder_sweep.settings.checks import (
 )
 from boulder_sweep.settings.choices import LAYER_FIELDS
 from boulder_sweep.settings.fields import BY_NAME, fields_of
-from boulder_sweep.settings.leaf import OUTSIDE, sample_of
 from boulder_sweep.settings.model import FEET, RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
-from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, describe, needed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
+from boulder_sweep.settings.values import EMPTY, NOT_A_NUMBER, OUTSIDE, describe, needed, sample_of
 from boulder_sweep.soils import SLICES, is_layered
 from boulder_sweep.views.wording import REASON_WORDS
 

@@ -18,10 +18,10 @@ from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.fields import BY_NAME, Field
 from boulder_sweep.settings.model import UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
-from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.sweep import Sweep
+from boulder_sweep.settings.values import describe
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 SLIDES = "or the ground slides"

@@ -12,7 +12,6 @@ from typing import Any
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.settings.fields import BOULDER_MASS, BY_NAME, LAYER_TOP, MAX_ELEMENTS, Field
-from boulder_sweep.settings.leaf import read_entries, read_single
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,
@@ -26,11 +25,11 @@ from boulder_sweep.settings.model import (
     Layer,
     ReadingChoice,
 )
-from boulder_sweep.settings.numbers import NumberError, quoted, read_count, split_number
 from boulder_sweep.settings.problems import Mistakes, did_you_mean, unknown_word, wrong
 from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
 from boulder_sweep.settings.units import UnitError, factor
+from boulder_sweep.settings.values import NumberError, quoted, read_count, read_entries, read_single, split_number
 
 MOST_LAYERS = 100
 MOST_POINTS = 100

@@ -10,10 +10,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from boulder_sweep.settings.fields import Field
-from boulder_sweep.settings.leaf import RANGE_KEYS, Leaf, outside, read_leaf, read_single
-from boulder_sweep.settings.numbers import read_quantity
 from boulder_sweep.settings.problems import Mistakes, Position, did_you_mean, shorten, wrong
 from boulder_sweep.settings.tree import Mapping, Node, Scalar
+from boulder_sweep.settings.values import RANGE_KEYS, Leaf, outside, read_leaf, read_quantity, read_single
 
 T = TypeVar("T")
 KINDS = ("normal", "lognormal", "uniform", "triangular", "beta")

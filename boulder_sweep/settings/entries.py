@@ -13,12 +13,12 @@ import numpy as np
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides_of, unfold_scan
 from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
-from boulder_sweep.settings.leaf import read_single
 from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, nearest, shorten, wrong
 from boulder_sweep.settings.shape import ProfilePoint
 from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS, unfold_soils
 from boulder_sweep.settings.sweep import SECTION, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.values import read_single
 from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches, unfold_springs
 
 NAMED_SETS = ("soil", "vehicle")

@@ -41,7 +41,10 @@ def _input(
     section, key = path.split(".")
     column = columns.BY_NAME[name]
     optional = optional or default is not None
-    return Field(section, key, name, column.unit, column.meaning, admitted, usual, default, also, optional)
+    return Field(
+        *(section, key, name, column.unit, column.meaning, admitted, usual, default, also, optional),
+        shown_default=default,
+    )
 
 
 _SIZE = Bound(0.01, 20.0, "the model is for boulders between a pebble and a house")
@@ -206,6 +209,7 @@ _OF_FILES = (
         "1",
         "correlation of friction angle and subgrade reaction, where both have a distribution",
         Bound(-0.99, 0.99, "the correlation of two different soil properties"),
+        shown_default=0.0,
     ),
     Field(
         "partial_factor",
@@ -214,6 +218,7 @@ _OF_FILES = (
         "1",
         "divides the tangent of every friction angle",
         Bound(1.0, 5.0, "1.25 is usual"),
+        shown_default=1.0,
     ),
 )
 """Settings that change what the inputs say, and belong to no part of `boulder_sweep.settings.model`."""

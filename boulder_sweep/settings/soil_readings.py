@@ -14,11 +14,11 @@ import numpy as np
 
 from boulder_sweep import investigation as sand
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.leaf import read_block, read_single
 from boulder_sweep.settings.model import Bound, Field
 from boulder_sweep.settings.problems import LeafError, Mistakes, wrong
 from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
+from boulder_sweep.settings.values import read_block, read_single
 
 SOIL_KEYS = ("friction_angle", "density", "subgrade_reaction")
 """What readings stand for, as far as a file does not give it."""

@@ -13,9 +13,9 @@ from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
 from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.designs import Label
 from boulder_sweep.settings.fields import INPUTS, Field
-from boulder_sweep.settings.leaf import outside
 from boulder_sweep.settings.problems import Position, ProblemList, nearest, refuse, shorten
 from boulder_sweep.settings.units import UnitError, factor, name_suffix
+from boulder_sweep.settings.values import outside
 
 MAX_COLUMNS = 1000
 MAX_ALIKE = 5

@@ -15,11 +15,11 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from boulder_sweep.settings.leaf import read_block
 from boulder_sweep.settings.model import Bound, entries_of, setting
 from boulder_sweep.settings.problems import Mistakes, wrong
 from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.values import read_block
 
 STAGE_KEYS = ({"stiffness"}, {"beyond", "stiffness"})
 """Keys of the first stage of a spring and of the second."""
