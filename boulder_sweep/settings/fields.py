@@ -13,6 +13,7 @@ is computed as given, with a note.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from boulder_sweep import columns
 from boulder_sweep.settings.model import (
@@ -27,24 +28,13 @@ from boulder_sweep.settings.model import (
 from boulder_sweep.settings.problems import did_you_mean, shorten
 
 
-def _input(
-    path: str,
-    name: str,
-    admitted: Bound,
-    usual: Usual | None = None,
-    *,
-    default: float | None = None,
-    also: tuple[str, ...] = (),
-    optional: bool = False,
-) -> Field:
-    """Return the entry of an input column."""
+def _input(path: str, name: str, admitted: Bound, usual: Usual | None = None, **more: Any) -> Field:
+    """Return the entry of an input column; `more` are further attributes, and one with a default is optional."""
     section, key = path.split(".")
     column = columns.BY_NAME[name]
-    optional = optional or default is not None
-    return Field(
-        *(section, key, name, column.unit, column.meaning, admitted, usual, default, also, optional),
-        shown_default=default,
-    )
+    if "default" in more:
+        more |= {"optional": True, "shown_default": more["default"]}
+    return Field(section, key, name, column.unit, column.meaning, admitted, usual, **more)
 
 
 _SIZE = Bound(0.01, 20.0, "the model is for boulders between a pebble and a house")

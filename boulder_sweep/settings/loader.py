@@ -285,10 +285,9 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         value = entries.single(field.name)
         if value is not None:
             constants[field.name] = value
-    choices = _choices(entries)
     if entries.gives_mass and DENSITY not in {*constants, *entries.listed, *entries.leaves}:
         constants[DENSITY] = ROCK_KG_M3
-        choices = (choices[0], replace(choices[1], rock_assumed=True), choices[2])
+        entries.settings["rock_assumed"] = True
     spreads = {name: leaf.distribution for name, leaf in entries.leaves.items() if leaf.distribution is not None}
     sweep = Sweep(
         name,
@@ -296,7 +295,7 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         axes,
         constants,
         entries.table,
-        *choices,
+        *_choices(entries),
         distributions=spreads,
         correlation=entries.settings.get("correlation", 0.0),
         partial_factor=factor,
@@ -305,8 +304,7 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         derived=entries.derived,
     )
     positions = {field.path: entries.position_of(field.path) for field in fields.INPUTS}
-    object.__setattr__(sweep, "notes", tuple(notes_on(sweep, positions)))
-    return sweep
+    return replace(sweep, notes=tuple(notes_on(sweep, positions)))
 
 
 def _apply_partial_factor(entries: Entries, factor: float) -> None:

@@ -22,35 +22,25 @@ from boulder_sweep.settings.values import read_block, read_single
 
 SOIL_KEYS = ("friction_angle", "density", "subgrade_reaction")
 """What readings stand for, as far as a file does not give it."""
-DEPTH = ("depth", "depth_m", "m", "depth of the reading below the ground", Bound(0.1, 30.0, "a depth"))
+_BLOWS, _SHARE = Bound(1.0, 200.0, "a blow count"), Bound(0.3, 1.0, "60 % is usual")
+_DEPTH = ("depth", "depth_m", "m", "depth of the reading below the ground", Bound(0.1, 30.0, "a depth"))
+_READINGS = {
+    "spt": (
+        ("n", "n", "1", "blows for the last 300 mm (1 ft), as logged", _BLOWS),
+        ("energy_ratio", "energy_ratio", "1", "energy of the hammer that reaches the rods", _SHARE),
+        _DEPTH,
+        ("n1_60", "n1_60", "1", "in place of the three: blow count corrected for energy and stress", _BLOWS),
+    ),
+    "cpt": (("q_c", "q_c_MPa", "MPa", "resistance of the cone", Bound(0.01, 150.0, "a cone resistance")), _DEPTH),
+}
 READING_FIELDS = {
     method: {key: Field(f"soil.{method}", key, name, unit, meaning, bound) for key, name, unit, meaning, bound in rows}
-    for method, rows in (
-        (
-            "spt",
-            (
-                ("n", "n", "1", "blows for the last 300 mm (1 ft), as logged", Bound(1.0, 200.0, "a blow count")),
-                (
-                    *("energy_ratio", "energy_ratio", "1", "energy of the hammer that reaches the rods"),
-                    Bound(0.3, 1.0, "60 % is usual"),
-                ),
-                DEPTH,
-                (
-                    *("n1_60", "n1_60", "1", "in place of the three: blow count corrected for energy and stress"),
-                    Bound(1.0, 200.0, "a blow count"),
-                ),
-            ),
-        ),
-        (
-            "cpt",
-            (("q_c", "q_c_MPa", "MPa", "resistance of the cone", Bound(0.01, 150.0, "a cone resistance")), DEPTH),
-        ),
-    )
+    for method, rows in _READINGS.items()
 }
 """Entries of a reading by kind of test and key."""
+_LOOSENESS = Bound(0.0, 1.0, "a share, 0.65 or 65 %")
 RELATIVE_DENSITY = Field(
-    *("soil", "relative_density", "relative_density", "1", "relative density of the sand"),
-    Bound(0.0, 1.0, "a share, 0.65 or 65 %"),
+    "soil", "relative_density", "relative_density", "1", "relative density of the sand", _LOOSENESS
 )
 METHODS = (*READING_FIELDS, RELATIVE_DENSITY.key)
 SOURCES = {

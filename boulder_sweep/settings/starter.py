@@ -127,13 +127,8 @@ def _line(field: Field, vehicle: str, units: int) -> str:
     if not is_published(vehicle):
         of_class |= dict.fromkeys(UNPUBLISHED, "")
     path = field.path
-    value = (
-        of_class[path]
-        if path in of_class
-        else _EXAMPLES[path][units]
-        if path in _EXAMPLES
-        else default_text(field, SYSTEMS[units])
-    )
+    example = _EXAMPLES[path][units] if path in _EXAMPLES else default_text(field, SYSTEMS[units])
+    value = of_class.get(path, example)
     needed = path in of_class or (field in INPUTS and (not field.optional or field.name == EMBEDMENT[0]))
     sign = "" if needed else "# "
     empty = "" if value else "fill in: "
