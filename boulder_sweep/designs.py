@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -176,6 +177,8 @@ class Derived:
 
 
 Quantity = Source | Derived
+Known = TypeVar("Known")
+"""What is known of a quantity: its values, or how they follow from the axes."""
 
 REASONS = (
     "",
@@ -236,6 +239,39 @@ def refusal_of_mass(codes: np.ndarray, mass: np.ndarray, density: np.ndarray, *s
     return np.where(codes == 0, 5 * heavy, codes).astype(np.int8)
 
 
+def _completed(
+    given: Mapping[str, Known], zero: Known, combine: Callable[..., Known]
+) -> tuple[dict[str, Known], Known]:
+    """Return every input column of designs by name, and for every row the place in `REASONS`.
+
+    Parameters
+    ----------
+    given
+        By column name; ``embedment_ratio`` may stand in place of ``embedment_depth_m``, and ``impact_height_m`` may be
+        missing, as in a file.
+    zero
+        Stands for the impact height where it is missing, and lies on every boulder.
+    combine
+        Called with a function of arrays and what it is to be applied to; returns its values.
+    """
+    known = dict(given)
+    height, bumper, hood = known["boulder_height_m"], known["bumper_height_m"], known["hood_height_m"]
+    if "embedment_depth_m" not in known:
+        known["embedment_depth_m"] = combine(embedment_of_ratio, known["embedment_ratio"], height)
+    embedment = known["embedment_depth_m"]
+    impact = known.get("impact_height_m", zero)
+    if "impact_height_m" not in known:
+        known["impact_height_m"] = combine(impact_height_of_face, height, embedment, bumper, hood)
+    refusals = combine(refusal, height, embedment, bumper, hood, impact)
+    if SECOND_SPRING in known:
+        refusals = combine(refusal_of_springs, refusals, known["vehicle_spring_N_m"], known[SECOND_SPRING])
+    if BOULDER_MASS in known:
+        weighed = (known[name] for name in (BOULDER_MASS, "boulder_density_kg_m3", *SIDES))
+        refusals = combine(refusal_of_mass, refusals, *weighed)
+    names = (*INPUT_COLUMNS, *(name for name in OPTIONAL_COLUMNS if name in known))
+    return {name: known[name] for name in names}, refusals
+
+
 class DesignPlan:
     """How every input column of a sweep follows from its axes.
 
@@ -251,7 +287,7 @@ class DesignPlan:
     """
 
     def __init__(
-        self, lengths: Sequence[int], given: dict[str, Source], labels: Mapping[str, Label] | None = None
+        self, lengths: Sequence[int], given: Mapping[str, Source], labels: Mapping[str, Label] | None = None
     ) -> None:
         self.labels = dict(labels or {})
         self.lengths = tuple(int(length) for length in lengths)
@@ -259,29 +295,10 @@ class DesignPlan:
         self.strides = tuple(math.prod(self.lengths[k + 1 :]) for k in range(len(self.lengths)))
         self.given = dict(given)
         quantities: dict[str, Quantity] = dict(given)
-        height, bumper, hood = given["boulder_height_m"], given["bumper_height_m"], given["hood_height_m"]
-        if "embedment_depth_m" not in quantities:
-            ratio = quantities.pop("embedment_ratio")
-            quantities["embedment_depth_m"] = self.combine(embedment_of_ratio, ratio, height)
-        embedment = quantities["embedment_depth_m"]
-        if "impact_height_m" not in quantities:
-            face = self.combine(impact_height_of_face, height, embedment, bumper, hood)
-            quantities["impact_height_m"] = face
-            impact: Quantity = Source(np.zeros(1))
-        else:
-            impact = quantities["impact_height_m"]
-        optional = [name for name in OPTIONAL_COLUMNS if name in quantities]
-        self.columns = {name: quantities[name] for name in (*INPUT_COLUMNS, *optional)}
+        self.columns, self.refusals = _completed(quantities, Source(np.zeros(1)), self.combine)
         for quantity in self.columns.values():
             if isinstance(quantity, Source):
                 quantity.find_dictionary()
-        self.refusals = self.combine(refusal, height, embedment, bumper, hood, impact)
-        if SECOND_SPRING in self.columns:
-            springs = (self.columns[name] for name in ("vehicle_spring_N_m", SECOND_SPRING))
-            self.refusals = self.combine(refusal_of_springs, self.refusals, *springs)
-        if BOULDER_MASS in self.columns:
-            weighed = (self.columns[name] for name in (BOULDER_MASS, "boulder_density_kg_m3", *SIDES))
-            self.refusals = self.combine(refusal_of_mass, self.refusals, *weighed)
 
     def combine(self, function: Callable[..., np.ndarray], *inputs: Quantity) -> Quantity:
         """Return ``function(*inputs)`` over all combinations if these are few, else per row."""
@@ -358,22 +375,8 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
     DesignBlock
         The designs, numbered from 0, with the same bits as the same designs in a grid.
     """
-    values = dict(given)
-    height, bumper, hood = values["boulder_height_m"], values["bumper_height_m"], values["hood_height_m"]
-    if "embedment_depth_m" not in values:
-        values["embedment_depth_m"] = embedment_of_ratio(values["embedment_ratio"], height)
-    embedment = values["embedment_depth_m"]
-    impact = values.get("impact_height_m", np.zeros(1))
-    if "impact_height_m" not in values:
-        values["impact_height_m"] = impact_height_of_face(height, embedment, bumper, hood)
-    codes = refusal(height, embedment, bumper, hood, impact)
-    if SECOND_SPRING in values:
-        codes = refusal_of_springs(codes, values["vehicle_spring_N_m"], values[SECOND_SPRING])
-    if BOULDER_MASS in values:
-        weighed = (values[name] for name in (BOULDER_MASS, "boulder_density_kg_m3", *SIDES))
-        codes = refusal_of_mass(codes, *weighed)
-    names = (*INPUT_COLUMNS, *(name for name in OPTIONAL_COLUMNS if name in values))
-    columns = {name: Column(None, np.ascontiguousarray(values[name])) for name in names}
+    values, codes = _completed(given, np.zeros(1), lambda function, *inputs: function(*inputs))
+    columns = {name: Column(None, np.ascontiguousarray(one)) for name, one in values.items()}
     return DesignBlock(0, len(codes), columns, Reasons(codes, REASONS))
 
 

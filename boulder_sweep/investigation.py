@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from boulder_sweep import elementary
+
 G = 9.80665
 ATMOSPHERE_KPA = 101.325
 LARGEST_FACTOR = 1.7
@@ -51,6 +53,13 @@ RELATIVE_DENSITIES = Range(0.15, 0.85)
 SPT_SD_DEG, CPT_SD_DEG, DENSITY_SD_DEG = 3.0, 2.8, 2.0
 """Transformation uncertainty of the friction angle [deg], as a standard deviation: the scatter about Hatanaka and
 Uchida's line; that of Kulhawy and Mayne, with which Phoon and Kulhawy (1999) calculate; Bowles (1996), Table 3-4."""
+
+# Constant of horizontal subgrade reaction [MN/m^3] over friction angle [deg] of the two families in use.
+API_ANGLES, _API = np.array([30.0, 43.0]), np.array([10.5, 110.0])
+_TERZAGHI_ANGLES, _TERZAGHI = np.array([30.0, 35.0, 40.0]), np.array([2.2, 6.6, 17.6])
+
+FAMILY_FACTOR = 2.0
+"""How far a pair of soil constants may be off the nearer family of data."""
 
 
 class State(NamedTuple):
@@ -160,3 +169,34 @@ def densities(angle_deg: float) -> tuple[float, float]:
     """
     state = next((own for own in STATES if angle_deg <= own.friction_angle_deg), STATES[-1])
     return state.lightest_pcf * PCF, state.heaviest_pcf * PCF
+
+
+def api_curve(angle: np.ndarray) -> np.ndarray:
+    """Constant of horizontal subgrade reaction [MN/m^3] by the API curve, over the friction angle [deg]."""
+    return _log_line(angle, API_ANGLES, _API)
+
+
+def terzaghi_curve(angle: np.ndarray) -> np.ndarray:
+    """The same by Terzaghi's values."""
+    return _log_line(angle, _TERZAGHI_ANGLES, _TERZAGHI)
+
+
+def _log_line(angle: np.ndarray, angles: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return elementary.exp(np.interp(angle, angles, elementary.log(values)))
+
+
+def off_families(angle: np.ndarray, reaction: np.ndarray) -> np.ndarray:
+    """Return which pairs of soil constants belong to neither family of data, bool.
+
+    Parameters
+    ----------
+    angle, reaction : ndarray
+        Friction angles [deg] and constants of horizontal subgrade reaction [MN/m^3].
+    """
+    least, most = family_bounds(angle)
+    return (reaction < least) | (reaction > most)
+
+
+def family_bounds(angle: np.ndarray) -> np.ndarray:
+    """Return least and largest constant of subgrade reaction [MN/m^3] that go with friction angles [deg], (2, n)."""
+    return np.stack([terzaghi_curve(angle) / FAMILY_FACTOR, FAMILY_FACTOR * api_curve(angle)])

@@ -41,8 +41,14 @@ _PART_BYTES = 1 << 24
 """What a file that is read may hold, when its size is not known; a part is smaller."""
 _TRY_S = {"connect_timeout": 3, "read_timeout": 5, "retries": {"total_max_attempts": 1}}
 """Limits of one try, as botocore names them [s]. Without them it tries for minutes by itself."""
-_FINAL = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError, PermissionError)
-"""Answers of a store, not failures: trying again does not help."""
+_FINAL = {
+    FileNotFoundError: errno.ENOENT,
+    FileExistsError: errno.EEXIST,
+    IsADirectoryError: errno.EISDIR,
+    NotADirectoryError: errno.ENOTDIR,
+    PermissionError: errno.EACCES,
+}
+"""Answers of a store, not failures, with their numbers: trying again does not help."""
 
 
 class LocationError(BoulderSweepError):
@@ -221,8 +227,9 @@ def _tried(request: Callable[[], Result], given_up: threading.Event) -> Result:
     for left in range(_TRIES - 1, -1, -1):
         try:
             return request()
-        except _FINAL as answer:
-            failure = OSError(answer.errno or _NUMBERS[_kind(answer)], harmless(answer))
+        except tuple(_FINAL) as answer:
+            number = next(number for kind, number in _FINAL.items() if isinstance(answer, kind))
+            failure = OSError(answer.errno or number, harmless(answer))
             break
         except Exception as problem:  # file systems raise whatever their libraries raise
             failure = OSError(getattr(problem, "errno", None) or errno.EIO, harmless(problem))
@@ -234,19 +241,6 @@ def _tried(request: Callable[[], Result], given_up: threading.Event) -> Result:
 
 Location = Path | RemotePath
 """Where a file or a folder is."""
-
-_NUMBERS = {
-    FileNotFoundError: errno.ENOENT,
-    FileExistsError: errno.EEXIST,
-    IsADirectoryError: errno.EISDIR,
-    NotADirectoryError: errno.ENOTDIR,
-    PermissionError: errno.EACCES,
-}
-
-
-def _kind(answer: OSError) -> type[OSError]:
-    """Return the class in `_NUMBERS` that an answer belongs to."""
-    return next(kind for kind in _NUMBERS if isinstance(answer, kind))
 
 
 def harmless(problem: BaseException) -> str:

@@ -50,12 +50,10 @@ def chance_text(chance: float) -> str:
 
 def printable(text: str) -> str:
     """Escape what a terminal or a log would act on: control characters, line breaks, invisible marks of direction."""
-    return "".join(one if one.isprintable() or one == NO_BREAK_SPACE else _escaped(one) for one in text)
-
-
-def _escaped(character: str) -> str:
-    """Return a character as an escape sequence in ASCII."""
-    return character.encode("unicode_escape").decode("ascii")
+    return "".join(
+        one if one.isprintable() or one == NO_BREAK_SPACE else one.encode("unicode_escape").decode("ascii")
+        for one in text
+    )
 
 
 def script_data(data: Any) -> str:

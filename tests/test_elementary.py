@@ -19,7 +19,7 @@ import hashlib
 import numpy as np
 from boulder_sweep import soils
 from boulder_sweep.settings.model import RESISTANCES, Ground
-from boulder_sweep.settings.notes import api_curve
+from boulder_sweep.investigation import api_curve
 from tests.kernels.samples import random_designs, table_of
 one = table_of(random_designs(1, seed=11))
 table = one._replace(**{name: np.repeat(column, 20_000) for name, column in one._asdict().items()})

@@ -11,10 +11,10 @@ import numpy as np
 from boulder_sweep.answers.spread import narrowed
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.leaf import LeafError, outside, read_single
-from boulder_sweep.settings.names import BOULDER_MASS, UnknownNameError, named
-from boulder_sweep.settings.problems import Position
+from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
+from boulder_sweep.settings.problems import LeafError, Position
 from boulder_sweep.settings.tree import Scalar
+from boulder_sweep.settings.values import outside, read_single
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -99,7 +99,7 @@ def key_of(word: str, *, most: bool = False, tolerance: str | float | None = Non
     Parameters
     ----------
     word
-        As of `boulder_sweep.settings.names.named`; ``mass`` is that of the boulder.
+        As of `boulder_sweep.settings.fields.named`; ``mass`` is that of the boulder.
     most
         Whether its largest value is wanted.
     tolerance
@@ -128,13 +128,13 @@ def quantity(text: str | float, unit: str, option: str) -> float:
     QuestionError
         It is not a number of that kind.
     """
-    from boulder_sweep.settings.numbers import NumberError, read_quantity
+    from boulder_sweep.settings.values import read_quantity
 
     if not isinstance(text, str):
         return float(text)
     try:
         return float(read_quantity(Scalar(Position(option), text), unit).value)
-    except NumberError as problem:
+    except LeafError as problem:
         raise QuestionError(f"{option} {text}: {problem}") from None
 
 

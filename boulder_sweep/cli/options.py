@@ -100,8 +100,8 @@ def load_sweep(
 ) -> Sweep:
     """Load settings and print the notes on them, and how inputs follow from the data of a site, in these units."""
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.overrides import ALL_OPINIONS
-    from boulder_sweep.settings.site_data import derived_words
+    from boulder_sweep.settings.loader import ALL_OPINIONS
+    from boulder_sweep.settings.sweep import derived_words
 
     sweep = load(path, (*overrides, ALL_OPINIONS) if second_opinion else overrides)
     if not quiet:
@@ -170,8 +170,8 @@ def refuse_unwritable_history(
 
 def quantity_of(option: str, text: str, unit: str) -> float:
     """Return the positive number that an option gives with its unit, in the unit of the table."""
-    from boulder_sweep.settings.numbers import NumberError, split_number
     from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+    from boulder_sweep.settings.values import NumberError, split_number
 
     try:
         number, unit_text = split_number(text, unit)

@@ -127,7 +127,7 @@ def _given(text: str) -> tuple[str, str]:
 
 def _column(option: str, word: str) -> str:
     """Return the column of the input that a word names; a name of sets stays as it is."""
-    from boulder_sweep.settings.names import UnknownNameError, named
+    from boulder_sweep.settings.fields import UnknownNameError, named
 
     if word in ("soil", "vehicle"):
         return word
@@ -188,7 +188,7 @@ def report(out: str, page: str | None, designs: tuple[int, ...], units: str, **h
     design and see the impact simulated anew. With -o F.pdf the page is printed by a Chromium or Chrome on this machine.
     """
     from boulder_sweep.report import checked_page, write_report
-    from boulder_sweep.settings.heading import Heading, wrong_with
+    from boulder_sweep.settings.sweep import Heading, wrong_with
 
     given = {key: text for key, text in heading.items() if text is not None}
     for key, text in given.items():

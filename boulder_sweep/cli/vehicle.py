@@ -43,9 +43,9 @@ def speed(as_json: bool, **given: str | None) -> int:
     the vehicle skids, and no largest speed of the vehicle is known. Where there are several ways to the boulder, the
     fastest counts.
     """
-    from boulder_sweep.settings.leaf import LeafError
-    from boulder_sweep.settings.site_data import APPROACH, approach_data, approach_words, read_approach
+    from boulder_sweep.settings.problems import LeafError
     from boulder_sweep.settings.tree import Scalar
+    from boulder_sweep.settings.vehicle import APPROACH, approach_data, approach_words, read_approach
 
     block = _as_block({"from" if key == "start" else key: text for key, text in given.items() if text is not None})
     try:
@@ -64,11 +64,11 @@ def speed(as_json: bool, **given: str | None) -> int:
 
 def _as_block(given: dict[str, str]) -> Mapping:
     """Return the options as the block of a settings file; each needs its unit here, zero too."""
-    from boulder_sweep.settings.numbers import NumberError, split_number
     from boulder_sweep.settings.problems import Position
-    from boulder_sweep.settings.site_data import APPROACH_FIELDS
     from boulder_sweep.settings.tree import Entry, Mapping, Scalar
     from boulder_sweep.settings.units import EXPECTED
+    from boulder_sweep.settings.values import NumberError, split_number
+    from boulder_sweep.settings.vehicle import APPROACH_FIELDS
 
     here = Position("sweep speed")
     for key, text in given.items():

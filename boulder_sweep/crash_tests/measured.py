@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_sweep.errors import FitError
-from boulder_sweep.settings.numbers import NumberError, split_number
 from boulder_sweep.settings.problems import (
     Position,
     ProblemList,
@@ -29,6 +28,7 @@ from boulder_sweep.settings.problems import (
     shorten,
 )
 from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
+from boulder_sweep.settings.values import NumberError, split_number
 
 MOST_ROWS, MOST_COLUMNS = 2_000_000, 1000
 MAX_BYTES = 500_000_000

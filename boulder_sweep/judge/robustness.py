@@ -24,9 +24,9 @@ from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import GRADES
 from boulder_sweep.designs import SECOND_SPRING
+from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS
-from boulder_sweep.settings.notes import family_bounds
 from boulder_sweep.soils import with_law
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Status
+from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.notes import FAMILY_FACTOR, family_bounds
 
 TESTED_OVERLAP_M = 0.49
 """Overlap of bumper and boulder in the tests: 0.492 m and 0.91 m."""

@@ -19,6 +19,7 @@ from boulder_kernels.table import is_paired
 from boulder_kernels.verdict import OF_CRITERION, RULES
 from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
+from boulder_sweep.investigation import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.validity import FLAGS, TESTED_OVERLAP_M, TESTED_ROTATION_DEG, usual_range
@@ -27,23 +28,21 @@ from boulder_sweep.report import entry_points
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, parts_of
 from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, SIZES, Rows, label_of
-from boulder_sweep.settings.choices import LAYER_FIELDS
-from boulder_sweep.settings.consistency import FLOATS, SLIDES, uppermost_is_wet
-from boulder_sweep.settings.fields import BY_NAME, fields_of
-from boulder_sweep.settings.leaf import OUTSIDE, sample_of
-from boulder_sweep.settings.model import FEET, RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
-from boulder_sweep.settings.notes import (
+from boulder_sweep.settings.checks import (
     BEYOND_FRONT,
-    FAMILY_FACTOR,
+    FLOATS,
     LEAST_CRUSH,
     MOST_CRUSH,
     SHORT_OF_FRONT,
-    api_curve,
-    terzaghi_curve,
+    SLIDES,
+    uppermost_is_wet,
 )
-from boulder_sweep.settings.numbers import EMPTY, NOT_A_NUMBER, needed
+from boulder_sweep.settings.choices import LAYER_FIELDS
+from boulder_sweep.settings.fields import BY_NAME, fields_of
+from boulder_sweep.settings.model import FEET, RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text, shown_unit
+from boulder_sweep.settings.values import EMPTY, NOT_A_NUMBER, OUTSIDE, needed, sample_of
 from boulder_sweep.soils import SLICES, is_layered
 from boulder_sweep.views.wording import REASON_WORDS
 

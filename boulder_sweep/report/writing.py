@@ -21,10 +21,9 @@ from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import Named, answers_table
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
 from boulder_sweep.settings.shown_units import check_system, quantity_text
-from boulder_sweep.settings.site_data import derived_words
+from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, wrong_with
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import identity as identity_of

@@ -1,12 +1,17 @@
-"""The entries that are more than a number: rating, readings of the paper, soil representation, accuracy, layers."""
+"""The entries that are more than a number.
+
+Words, readings of the paper, soil representation, accuracy, second opinions, layers, and the shape of the boulder: by a
+profile, or by a scan (``scan: {file: rock.ply, up: a, facing: b}``), which becomes its profile and its density.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.fields import BY_NAME, LAYER_TOP, MAX_ELEMENTS, Field
-from boulder_sweep.settings.leaf import LeafError, Mistake, read_entries, read_single
+from boulder_sweep.errors import ScanError
+from boulder_sweep.settings.fields import BOULDER_MASS, BY_NAME, LAYER_TOP, MAX_ELEMENTS, Field
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,
@@ -20,10 +25,11 @@ from boulder_sweep.settings.model import (
     Layer,
     ReadingChoice,
 )
-from boulder_sweep.settings.numbers import NumberError, read_count, split_number
-from boulder_sweep.settings.problems import did_you_mean, shorten
-from boulder_sweep.settings.shape import ProfilePoint, Shape
-from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.problems import Mistakes, did_you_mean, unknown_word, wrong
+from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
+from boulder_sweep.settings.units import UnitError, factor
+from boulder_sweep.settings.values import NumberError, quoted, read_count, read_entries, read_single, split_number
 
 MOST_LAYERS = 100
 MOST_POINTS = 100
@@ -41,6 +47,13 @@ PROFILE_FIELDS = {
         ("far", "in place of length: reach away from the vehicle", _REACH),
     )
 }
+SCAN_KEYS = ("file", "up", "facing", "unit")
+"""Keys of a scan; all are required but the last."""
+_SCAN_FORM = "{file: rock.ply, up: a, facing: b}"
+SIDES = ("length", "width", "height")
+"""Keys of the boulder that a profile stands for."""
+_OF_SCAN = (*SIDES, "taper", "profile")
+"""Keys of the boulder that a scan stands for."""
 LAYER_FIELDS = {
     field.key: field
     for field in (
@@ -63,33 +76,29 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
     """
     if not isinstance(node, Sequence) or not 1 <= len(node.items) <= MOST_LAYERS:
         message = f"must be a list of 1 to {MOST_LAYERS} layers, each a block of keys: {', '.join(LAYER_FIELDS)}"
-        raise LeafError([Mistake(node.position, message)])
+        raise wrong(node.position, message)
     layers: list[Layer] = []
-    mistakes: list[Mistake] = []
+    mistakes = Mistakes()
     for item in node.items:
-        try:
+        with mistakes:
             layer = _read_layer(item)
-        except LeafError as error:
-            mistakes.extend(error.mistakes)
-            continue
-        if layers and layer.from_m <= layers[-1].from_m:
-            message = f"begins at {layer.from_m:g} m, not below the layer before it ({layers[-1].from_m:g} m)"
-            mistakes.append(Mistake(item.position, message))
-        layers.append(layer)
-    if mistakes:
-        raise LeafError(mistakes)
+            if layers and layer.from_m <= layers[-1].from_m:
+                message = f"begins at {layer.from_m:g} m, not below the layer before it ({layers[-1].from_m:g} m)"
+                mistakes.add(item.position, message)
+            layers.append(layer)
+    mistakes.raise_if_any()
     return tuple(layers)
 
 
 def _read_layer(node: Node) -> Layer:
     """Read one layer; single values only."""
-    values, mistakes = read_entries(node, LAYER_FIELDS, "a layer")
+    mistakes = Mistakes()
+    values = read_entries(node, LAYER_FIELDS, "a layer", mistakes)
     assert isinstance(node, Mapping)  # anything else has been refused
     missing = [key for key in LAYER_FIELDS if key not in node.entries and key != "cohesion"]
     if missing:
-        mistakes.append(Mistake(node.position, f"the layer lacks {', '.join(missing)}"))
-    if mistakes:
-        raise LeafError(mistakes)
+        mistakes.add(node.position, f"the layer lacks {', '.join(missing)}")
+    mistakes.raise_if_any()
     return Layer(**{_NAMES[key]: value for key, value in values.items()})
 
 
@@ -108,53 +117,116 @@ def read_profile(node: Node) -> tuple[ProfilePoint, ...]:
     """
     keys = ", ".join(PROFILE_FIELDS)
     if not isinstance(node, Sequence) or not 2 <= len(node.items) <= MOST_POINTS or node.unit is not None:
-        raise _wrong(
-            node, f"must be a list of 2 to {MOST_POINTS} points from the foot up, each a block of keys: {keys}"
+        raise wrong(
+            node.position, f"must be a list of 2 to {MOST_POINTS} points from the foot up, each a block of keys: {keys}"
         )
     points: list[ProfilePoint] = []
-    mistakes: list[Mistake] = []
+    mistakes = Mistakes()
     for item in node.items:
-        try:
+        with mistakes:
             point = _read_point(item)
-        except LeafError as error:
-            mistakes.extend(error.mistakes)
-            continue
-        if not points and not mistakes and point.height != 0.0:
-            mistakes.append(Mistake(item.position, f"the first point is the foot, at 0 m, not {point.height:g} m"))
-        if points and point.height <= points[-1].height:
-            message = f"is {point.height:g} m high, not above the point before it ({points[-1].height:g} m)"
-            mistakes.append(Mistake(item.position, message))
-        points.append(point)
+            if not points and not mistakes and point.height != 0.0:
+                mistakes.add(item.position, f"the first point is the foot, at 0 m, not {point.height:g} m")
+            if points and point.height <= points[-1].height:
+                message = f"is {point.height:g} m high, not above the point before it ({points[-1].height:g} m)"
+                mistakes.add(item.position, message)
+            points.append(point)
     if (
         not mistakes
         and not max(point.width for point in points) * max(point.near + point.far for point in points) > 0.0
     ):
-        mistakes.append(Mistake(node.position, "has neither width nor length"))
+        mistakes.add(node.position, "has neither width nor length")
     if not mistakes and not Shape(shares_of(tuple(points))).stands_up:
         message = "its centre of mass does not lie over its foot: it would fall over by itself"
-        mistakes.append(Mistake(node.position, message))
-    if mistakes:
-        raise LeafError(mistakes)
+        mistakes.add(node.position, message)
+    mistakes.raise_if_any()
     return tuple(points)
 
 
 def _read_point(node: Node) -> ProfilePoint:
     """Read one point of a profile."""
-    values, mistakes = read_entries(node, PROFILE_FIELDS, "a point")
+    mistakes = Mistakes()
+    values = read_entries(node, PROFILE_FIELDS, "a point", mistakes)
     assert isinstance(node, Mapping)  # anything else has been refused
     given = set(node.entries)
     if "length" in given and given & {"near", "far"}:
-        mistakes.append(Mistake(node.position, "give length, or near and far, not both"))
+        mistakes.add(node.position, "give length, or near and far, not both")
     wanted = ("height", "width", *(("near", "far") if given & {"near", "far"} else ("length",)))
     missing = [key for key in wanted if key not in given]
     if missing and not mistakes:
-        mistakes.append(Mistake(node.position, f"the point lacks {', '.join(missing)}"))
-    if mistakes:
-        raise LeafError(mistakes)
+        mistakes.add(node.position, f"the point lacks {', '.join(missing)}")
+    mistakes.raise_if_any()
     half = 0.5 * values.get("length", 0.0)
     if values.get("near", half) + values.get("far", half) < 0.0:
-        raise _wrong(node, "near and far together are the length, which cannot be negative")
+        raise wrong(node.position, "near and far together are the length, which cannot be negative")
     return ProfilePoint(values["height"], values["width"], values.get("near", half), values.get("far", half))
+
+
+def unfold_scan(boulder: Mapping, folder: Path) -> Scan:
+    """Replace the scan of a boulder, and the mass of the whole stone beside it, by profile and density.
+
+    Parameters
+    ----------
+    boulder
+        The block of the boulder, changed in place.
+    folder
+        Where the scan lies if its name is relative.
+
+    Raises
+    ------
+    LeafError
+        With every mistake in it.
+    """
+    entry = boulder.entries.pop("scan")
+    words = _read_scan_words(entry.value)
+    mistakes = Mistakes()
+    for key in _OF_SCAN:
+        if key in boulder.entries:
+            mistakes.add(boulder.entries[key].position, f"{key} follows from the scan; remove one of them")
+    if len({"mass", "density"} & set(boulder.entries)) != 1:
+        message = "beside a scan give the mass of the whole stone, or its density: one of them"
+        mistakes.add(entry.position, message)
+    mistakes.raise_if_any()
+    mass = boulder.entries.pop("mass", None)
+    mass_kg = None if mass is None else read_single(mass.value, BOULDER_MASS)
+    # What reads scans is needed for them only.
+    from boulder_sweep.stones.weighing import scanned
+
+    try:
+        metres = float(factor(words.get("unit", "m"), "m"))
+        found = scanned(folder / words["file"], metres=metres, mass_kg=mass_kg)
+        standing = found.stone.standing(words["up"], words["facing"])
+    except (ScanError, UnitError) as error:
+        raise wrong(entry.value.position, str(error)) from None
+    profile, place = standing.profile, entry.position
+    if mass_kg is not None:
+        boulder.entries["density"] = Entry("density", place, Scalar(place, f"{found.density_kg_m3!r} kg/m^3"))
+    points: list[Node] = []
+    for values in zip(profile.height, profile.width, profile.near, profile.far, strict=True):
+        texts = (f"{float(value)!r} m" for value in values)
+        points.append(block_of(place, dict(zip(("height", "width", "near", "far"), texts, strict=True))))
+    boulder.entries["profile"] = Entry("profile", place, Sequence(place, points))
+    return Scan(words["file"], found.sha256, standing.up, standing.facing, standing.cut_m)
+
+
+def _read_scan_words(node: Node) -> dict[str, str]:
+    """Return the words of a scan by key."""
+    if not isinstance(node, Mapping) or node.unit is not None:
+        raise wrong(node.position, f"must be a block, as in {_SCAN_FORM}; 'sweep stone' lists the ways to stand")
+    mistakes, words = Mistakes(), {}
+    for one in node:
+        if one.key not in SCAN_KEYS:
+            mistakes.add(one.position, unknown_word(one.key, "a key of a scan", SCAN_KEYS))
+        elif not isinstance(one.value, Scalar) or not one.value.text.strip():
+            mistakes.add(one.value.position, f"{one.key} must be one word")
+        else:
+            words[one.key] = one.value.text.strip()
+    missing = [key for key in SCAN_KEYS if key != "unit" and key not in node.entries]
+    if missing:
+        message = f"the scan lacks {', '.join(missing)}, as in {_SCAN_FORM}; 'sweep stone' lists the ways to stand"
+        mistakes.add(node.position, message)
+    mistakes.raise_if_any()
+    return words
 
 
 def sides_of(points: tuple[ProfilePoint, ...]) -> dict[str, float]:
@@ -187,59 +259,42 @@ def read_setting(node: Node, field: Field) -> Any:
     return read_single(node, field) if reader is None else reader(node)
 
 
-def _wrong(node: Node, message: str) -> LeafError:
-    return LeafError([Mistake(node.position, message)])
-
-
-def _shown(node: Node) -> str:
-    return f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
-
-
 def _one_of(node: Node, choices: tuple[str, ...], what: str) -> str:
     """Return one of some words; capitals do not matter."""
     word = node.text.strip() if isinstance(node, Scalar) else ""
     for choice in choices:
         if word.lower() == choice.lower():
             return choice
-    raise _wrong(node, f"{_shown(node)} is not {what}: {', '.join(choices)}{did_you_mean(word, choices)}")
+    raise wrong(node.position, f"{quoted(node)} is not {what}: {', '.join(choices)}{did_you_mean(word, choices)}")
 
 
 def _read_readings(node: Node) -> ReadingChoice:
     """Read a preset, or single switches on top of one (``corrected`` where none is named)."""
     if not isinstance(node, Mapping):
         return ReadingChoice.of_preset(_one_of(node, PRESETS, "a reading of the paper"))
-    mistakes: list[Mistake] = []
+    mistakes = Mistakes()
     preset, switches = "corrected", {}
     for entry in node:
-        try:
+        with mistakes:
             if entry.key == "preset":
                 preset = _one_of(entry.value, PRESETS, "a reading of the paper")
             elif entry.key in SWITCHES:
                 value = _one_of(entry.value, (PRINTED, SWITCHES[entry.key], "corrected"), f"a value of {entry.key}")
                 switches[entry.key] = SWITCHES[entry.key] if value == "corrected" else value
             else:
-                known = ("preset", *SWITCHES)
-                hint = did_you_mean(entry.key, known)
-                message = f"'{shorten(entry.key)}' is not a reading ({', '.join(known)}){hint}"
-                mistakes.append(Mistake(entry.position, message))
-        except LeafError as error:
-            mistakes.extend(error.mistakes)
-    if mistakes:
-        raise LeafError(mistakes)
+                mistakes.add(entry.position, unknown_word(entry.key, "a reading", ("preset", *SWITCHES)))
+    mistakes.raise_if_any()
     return ReadingChoice(**{**ReadingChoice.of_preset(preset).as_dict(), **switches})
 
 
 def _read_soil(node: Node) -> int:
     """Read ``closed_form`` (0) or ``{elements: N}`` (N)."""
     if isinstance(node, Mapping) and list(node.entries) == ["elements"]:
-        count = node.entries["elements"].value
-        try:
-            return read_count(count, "the number of soil elements", MAX_ELEMENTS)
-        except NumberError as error:
-            raise _wrong(count, str(error)) from None
+        return read_count(node.entries["elements"].value, "the number of soil elements", MAX_ELEMENTS)
     if isinstance(node, Scalar) and node.text.strip() == CLOSED_FORM:
         return 0
-    raise _wrong(node, f"{_shown(node)} is not a representation of the soil: closed_form, or {{elements: 5000}}")
+    message = f"{quoted(node)} is not a representation of the soil: closed_form, or {{elements: 5000}}"
+    raise wrong(node.position, message)
 
 
 def _read_accuracy(node: Node) -> str | float:
@@ -252,9 +307,9 @@ def _read_accuracy(node: Node) -> str | float:
         try:
             split_number(node.text, field.unit)
         except NumberError:
-            choices = ", ".join(ACCURACIES)
-            hint = did_you_mean(word, ACCURACIES)
-            raise _wrong(node, f"{_shown(node)} is not {choices}, nor an angle such as 0.01 deg{hint}") from None
+            choices, hint = ", ".join(ACCURACIES), did_you_mean(word, ACCURACIES)
+            message = f"{quoted(node)} is not {choices}, nor an angle such as 0.01 deg{hint}"
+            raise wrong(node.position, message) from None
     return read_single(node, field)
 
 
@@ -263,21 +318,18 @@ def _read_second_opinion(node: Node) -> tuple[str, ...]:
     if isinstance(node, Scalar) and node.text.strip().lower() == NO_OPINION:
         return ()
     items = node.items if isinstance(node, Sequence) else [node]
-    asked, mistakes = set(), []
+    asked, mistakes = set(), Mistakes()
     for item in items:
         if isinstance(item, Scalar) and item.text.strip().lower() == RESISTANCES[0]:
             message = (
                 f"{RESISTANCES[0]} is no second opinion: with friction and vertical motion it would pass many designs "
                 f"that fail, and no test speaks for that; choose {' or '.join(SECOND_OPINIONS)}"
             )
-            mistakes.append(Mistake(item.position, message))
+            mistakes.add(item.position, message)
             continue
-        try:
+        with mistakes:
             asked.add(_one_of(item, SECOND_OPINIONS, BY_NAME["second_opinion"].kind))
-        except LeafError as error:
-            mistakes.extend(error.mistakes)
-    if mistakes:
-        raise LeafError(mistakes)
+    mistakes.raise_if_any()
     return tuple(law for law in SECOND_OPINIONS if law in asked)
 
 

@@ -1,15 +1,20 @@
-"""Uncertain inputs: what a file says about the spread of a value. Sampling is left to `sweep uncertainty`."""
+"""Uncertain inputs, ``{mean: 38 deg, sd: 3 deg}`` in place of a value. Sampling is left to `sweep uncertainty`."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from boulder_sweep.settings.problems import Position
+from boulder_sweep.settings.fields import Field
+from boulder_sweep.settings.problems import Mistakes, Position, did_you_mean, shorten, wrong
+from boulder_sweep.settings.tree import Mapping, Node, Scalar
+from boulder_sweep.settings.values import RANGE_KEYS, Leaf, outside, read_leaf, read_quantity, read_single
 
+T = TypeVar("T")
 KINDS = ("normal", "lognormal", "uniform", "triangular", "beta")
 FRACTILE_5 = 1.6448536269514722
 """Distance of the 5 % fractile of a normal distribution below its mean, in standard deviations."""
@@ -115,11 +120,151 @@ class SetDistributions:
         return {"sets": [None if own is None else own.to_dict() for own in self.each]}
 
 
-def mean_of_fractile(kind: str, fractile: np.ndarray, sd: float | None, cov: float | None) -> np.ndarray:
-    """Return the means of normal or lognormal distributions whose 5 % fractiles are given.
+@dataclass(frozen=True, eq=False)
+class Input(Leaf):
+    """Values of an input, and the spread about them.
+
+    Attributes
+    ----------
+    distribution : Distribution, SetDistributions or None
+        Spread about the values, which are its means; None where the values are certain.
+    """
+
+    distribution: Distribution | SetDistributions | None = None
+
+
+_CENTRES = ("mean", "characteristic")
+_SPREADS = ("sd", "cov")
+NEEDED = {
+    "normal": (_CENTRES, _SPREADS),
+    "lognormal": (_CENTRES, _SPREADS),
+    "uniform": (("low",), ("high",)),
+    "triangular": (("low",), ("mode",), ("high",)),
+    "beta": (("mean",), _SPREADS, ("low",), ("high",)),
+}
+"""For every kind what must be given, one of each group."""
+_KEYS = ("distribution", *_CENTRES, *_SPREADS, "low", "high", "mode")
+_WORDS = frozenset({*_KEYS, *KINDS})
+
+
+def read_input(node: Node, field: Field) -> Input:
+    """Return what an entry gives for an input: a value, a list, a range or a distribution.
+
+    Raises
+    ------
+    LeafError
+        With every mistake of this entry.
+    """
+    if isinstance(node, Mapping) and not set(RANGE_KEYS) & set(node.entries) and _WORDS & set(node.entries):
+        return _read_distribution(node, field)
+    certain = read_leaf(node, field)
+    return Input(certain.values, certain.is_axis, certain.position)
+
+
+def _read_distribution(node: Mapping, field: Field) -> Input:
+    """Return an uncertain input: its mean, or the axis of its means, and its distribution.
 
     Parameters
     ----------
+    node : Mapping
+        ``{mean: 38 deg, sd: 3 deg}``, ``{distribution: lognormal, mean: [36, 38] deg, cov: 8 %}``,
+        ``{characteristic: 36 deg, cov: 8 %}``, ``{distribution: uniform, low: 36 deg, high: 40 deg}`` and the like.
+    field : Field
+        What it is about.
+
+    Raises
+    ------
+    LeafError
+        With every mistake of this entry.
+    """
+    kind = _kind(node)
+    _check_keys(node, kind)
+    mistakes = Mistakes()
+
+    def read(key: str | None, reader: Callable[[Node], T]) -> T | None:
+        value = None if key is None else node.get(key)
+        if value is not None:
+            with mistakes:
+                return reader(value)
+        return None
+
+    low, high, mode = (read(key, lambda value: read_single(value, field)) for key in ("low", "high", "mode"))
+    sd = read("sd", lambda value: _positive(value, field.unit))
+    cov = read("cov", lambda value: _positive(value, "1"))
+    centre = next((key for key in _CENTRES if key in node.entries), None)
+    given = read(centre, lambda value: read_leaf(value, field))
+    mistakes.raise_if_any()
+    bound = field.admitted
+    assert bound is not None
+    distribution = Distribution(
+        kind,
+        bound.low if low is None else low,
+        bound.high if high is None else high,
+        sd=sd,
+        cov=cov,
+        mode=mode,
+        position=node.position,
+    )
+    if given is None:
+        ends = (distribution.low, *(() if mode is None else (mode,)), distribution.high)
+        values = np.array([sum(ends) / len(ends)])
+    else:
+        values = given.values if centre == "mean" else _means(node, kind, given.values, sd, cov)
+    _check_values(node, values, distribution, field)
+    return Input(values, given is not None and given.is_axis, node.position, distribution)
+
+
+def _kind(node: Mapping) -> str:
+    """Return the kind of the distribution; normal where a mean is given and no kind."""
+    value = node.get("distribution")
+    if value is None:
+        named = next((key for key in node.entries if key in KINDS), None)
+        if named is not None:
+            message = f"write the kind as an entry of its own: {{distribution: {named}, mean: ..., sd: ...}}"
+            raise wrong(node.entries[named].position, message)
+        return "normal"
+    word = value.text.strip() if isinstance(value, Scalar) else ""
+    if word not in KINDS:
+        hint = did_you_mean(word, KINDS)
+        raise wrong(value.position, f"'{shorten(word)}' is not a distribution: {', '.join(KINDS)}{hint}")
+    return word
+
+
+def _check_keys(node: Mapping, kind: str) -> None:
+    """Report keys that are unknown, do not belong to this kind, are missing or exclude each other."""
+    taken = {"distribution", "low", "high", *(key for group in NEEDED[kind] for key in group)}
+    mistakes = Mistakes()
+    for entry in node:
+        if entry.key not in taken:
+            hint = "" if entry.key in _KEYS else did_you_mean(entry.key, _KEYS)
+            known = ", ".join(key for key in _KEYS if key in taken)
+            message = f"'{shorten(entry.key)}' is not a key of a {kind} distribution ({known}){hint}"
+            mistakes.add(entry.position, message)
+    for group in NEEDED[kind]:
+        given = [key for key in group if key in node.entries]
+        if len(given) > 1:
+            mistakes.add(node.entries[given[1]].position, f"give {' or '.join(group)}, not both")
+        elif not given and not mistakes:
+            mistakes.add(node.position, f"a {kind} distribution needs {' or '.join(group)}")
+    if node.unit is not None:
+        mistakes.add(node.unit.position, "write the unit behind each number of a distribution")
+    mistakes.raise_if_any()
+
+
+def _positive(node: Node, unit: str) -> float:
+    value = float(read_quantity(node, unit).value)
+    if not 0.0 < value < math.inf:
+        raise wrong(node.position, "must be more than 0; for a value without doubt, write the value alone")
+    return value
+
+
+def _means(node: Mapping, kind: str, fractile: np.ndarray, sd: float | None, cov: float | None) -> np.ndarray:
+    """Return the means of normal or lognormal distributions whose 5 % fractiles are given, their characteristic values.
+
+    Parameters
+    ----------
+    node : Mapping
+        The distribution.
     kind : str
         ``normal``, or ``lognormal`` (which needs `cov`).
     fractile : ndarray of float64
@@ -127,15 +272,43 @@ def mean_of_fractile(kind: str, fractile: np.ndarray, sd: float | None, cov: flo
     sd, cov : float or None
         Standard deviation, or coefficient of variation.
 
+    Raises
+    ------
+    LeafError
+        A lognormal distribution without `cov`, or a normal one so wide that this fractile is not positive.
+
     Notes
     -----
     Normal: x_k = m - 1.645 s. Lognormal: x_k = m exp(-s_ln**2 / 2 - 1.645 s_ln) with s_ln**2 = ln(1 + cov**2).
     """
     if kind == "lognormal":
-        assert cov is not None
+        if cov is None:
+            raise wrong(node.position, "a characteristic value of a lognormal distribution needs cov")
         spread = math.sqrt(math.log1p(cov * cov))
         return fractile * math.exp(FRACTILE_5 * spread + 0.5 * spread * spread)
-    if cov is not None:
-        return fractile / (1.0 - FRACTILE_5 * cov)
-    assert sd is not None
-    return fractile + FRACTILE_5 * sd
+    if cov is None:
+        assert sd is not None
+        return fractile + FRACTILE_5 * sd
+    if FRACTILE_5 * cov >= 1.0:
+        message = "a normal distribution this wide has no positive 5 % fractile; use lognormal"
+        raise wrong(node.entries["cov"].position, message)
+    return fractile / (1.0 - FRACTILE_5 * cov)
+
+
+def _check_values(node: Mapping, values: np.ndarray, distribution: Distribution, field: Field) -> None:
+    """Report ends in the wrong order, and means and spreads that do not fit between them."""
+    low, high, unit = distribution.low, distribution.high, "" if field.unit == "1" else f" {field.unit}"
+    message = ""
+    if not low < high:
+        message = f"low ({low:g}{unit}) must be less than high ({high:g}{unit})"
+    elif distribution.mode is not None and not low <= distribution.mode <= high:
+        message = f"the mode must be between low and high ({low:g} to {high:g}{unit})"
+    elif not (low < values.min() and values.max() < high):
+        worst = values.min() if values.min() <= low else values.max()
+        message = outside(float(worst), field) or f"the mean must be between low and high ({low:g} to {high:g}{unit})"
+    elif distribution.kind == "beta":
+        largest = np.sqrt((values - low) * (high - values))
+        if np.any(distribution.deviation(values) >= largest):
+            message = f"the standard deviation must be less than {largest.min():.4g}{unit} between these ends"
+    if message:
+        raise wrong(node.position, message)

@@ -3,37 +3,33 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.choices import read_setting, shares_of, sides_of
-from boulder_sweep.settings.distribution_reader import read_input
-from boulder_sweep.settings.distributions import Distribution, SetDistributions
-from boulder_sweep.settings.leaf import Leaf, LeafError, Mistake, read_single
-from boulder_sweep.settings.problems import Position, ProblemList, nearest, shorten
-from boulder_sweep.settings.site_data import APPROACH, CORRELATION, METHODS, SOIL_KEYS, unfold_approaches, unfold_soils
+from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides_of, unfold_scan
+from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
+from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, nearest, shorten, wrong
+from boulder_sweep.settings.shape import ProfilePoint
+from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS, unfold_soils
+from boulder_sweep.settings.sweep import SECTION, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
-
-if TYPE_CHECKING:
-    from boulder_sweep.settings.shape import ProfilePoint
-    from boulder_sweep.settings.sweep import DesignList
-
+from boulder_sweep.settings.values import read_single
+from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches, unfold_springs
 
 NAMED_SETS = ("soil", "vehicle")
 """Blocks that may be a list of named sets."""
 NAME = re.compile(r"\w[\w .+-]{0,79}")
 """Names of sweeps and of named sets."""
-SIDES = ("length", "width", "height")
-"""Keys of the boulder that a profile stands for."""
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
-TOP_KEYS = ("name", *fields.SECTIONS, "table", "report")
+TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION)
 SITE_KEYS = {"soil": METHODS, "vehicle": (APPROACH,)}
-"""Keys of a block that stand for others; see `boulder_sweep.settings.site_data`."""
+"""Keys of a block that stand for others, as the site gives them."""
 
 
 class Entries:
@@ -41,7 +37,7 @@ class Entries:
 
     Attributes
     ----------
-    leaves : dict of str to Leaf
+    leaves : dict of str to Input
         Inputs by column (or axis) name, as far as they have no mistake.
     settings : dict of str to Any
         What holds for all designs, by the name of the attribute, as far as given and without a mistake.
@@ -61,7 +57,7 @@ class Entries:
         self.root = root
         self.path = path
         self.problems = problems
-        self.leaves: dict[str, Leaf] = {}
+        self.leaves: dict[str, Input] = {}
         self.settings: dict[str, Any] = {}
         self.given: set[str] = set()
         self.misspelled: set[str] = set()
@@ -75,11 +71,7 @@ class Entries:
             if entry.key not in TOP_KEYS:
                 self.unknown(entry, "", TOP_KEYS)
         self._read_table()
-        for problem in unfold_springs(self.root):
-            self.given.add("vehicle.spring")
-            self.problems.add(problem.position, "vehicle.spring", problem.message)
-        self._read_site_data()
-        self._read_scan()
+        self._unfold()
         for section in fields.SECTIONS:
             self._read_block(section)
         both = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
@@ -90,50 +82,43 @@ class Entries:
         elif "boulder.profile" in self.given:  # its mistakes are reported, and its sides are not missing
             self.given |= {f"boulder.{key}" for key in SIDES}
 
-    def _read_site_data(self) -> None:
+    @contextmanager
+    def reporting(self, path: str, stands_for: Iterable[str] = ()) -> Iterator[Mistakes]:
+        """Report the mistakes of an entry at its path; what it stands for is given then, right or wrong."""
+        mistakes = Mistakes()
+        with mistakes:
+            yield mistakes
+        for mistake in mistakes:
+            self.given.update(stands_for)
+            self.problems.add(mistake.position, path, mistake.message)
+
+    def _unfold(self) -> None:
         """Replace what stands for other entries by these."""
-        mistakes, approaches = unfold_approaches(self.root)
-        for mistake in mistakes:
-            self.given.add("vehicle.speed")
-            self.problems.add(mistake.position, f"vehicle.{APPROACH}", mistake.message)
-        if approaches:
-            self.derived[APPROACH] = approaches
-        columns = () if self.table is None else self.table.columns
-        listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in columns]
-        mistakes, soils = unfold_soils(self.root, listed)
-        for mistake in mistakes:
-            self.given |= {f"soil.{key}" for key in SOIL_KEYS}
-            self.problems.add(mistake.position, "soil", mistake.message)
-        if soils:
-            self.derived["soil"] = soils
+        with self.reporting("vehicle.spring", ["vehicle.spring"]) as mistakes:
+            unfold_springs(self.root, mistakes)
+        with self.reporting(f"vehicle.{APPROACH}", ["vehicle.speed"]) as mistakes:
+            approaches = unfold_approaches(self.root, mistakes)
+        listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in self.listed]
+        with self.reporting("soil", [f"soil.{key}" for key in SOIL_KEYS]) as mistakes:
+            soils = unfold_soils(self.root, listed, mistakes)
+        self.derived |= {key: data for key, data in ((APPROACH, approaches), ("soil", soils)) if data}
+        boulder = self.root.get("boulder")
+        if isinstance(boulder, Mapping) and "scan" in boulder.entries:
+            self.given.add("boulder.scan")
+            folder = self._folder_of(boulder.entries["scan"].position)
+            with self.reporting("boulder.scan", [f"boulder.{key}" for key in (*SIDES, "density")]):
+                self.settings["scan"] = unfold_scan(boulder, folder)
 
     def _take_sides(self, points: tuple[ProfilePoint, ...]) -> None:
         """Take the sides of the boulder from its profile, which must not be given beside it."""
-        position = self.key_position("boulder", "profile")
         for key in (*SIDES, "taper"):
             if f"boulder.{key}" in self.given:
-                message = "is part of boulder.profile; remove one of them"
-                self.problems.add(self.key_position("boulder", key), f"boulder.{key}", message)
+                self.report(f"boulder.{key}", "is part of boulder.profile; remove one of them")
+        position = self.position_of("boulder.profile")
         for key, value in sides_of(points).items():
             self.given.add(f"boulder.{key}")
-            self.leaves[f"boulder_{key}_m"] = Leaf(np.array([value]), False, position)
+            self.leaves[f"boulder_{key}_m"] = Input(np.array([value]), False, position)
         self.settings["profile"] = shares_of(points)
-
-    def _read_scan(self) -> None:
-        """Replace a scan of the boulder by what follows from it; after a mistake, what it stands for is not missing."""
-        boulder = self.root.get("boulder")
-        if not isinstance(boulder, Mapping) or "scan" not in boulder.entries:
-            return
-        # What reads scans is needed for them only.
-        from boulder_sweep.settings.scan import unfold_scan
-
-        self.given.add("boulder.scan")
-        try:
-            self.settings["scan"] = unfold_scan(boulder, self._folder_of(boulder.entries["scan"].position))
-        except LeafError as error:
-            self.given |= {f"boulder.{key}" for key in (*SIDES, "density")}
-            for mistake in error.mistakes:
-                self.problems.add(mistake.position, "boulder.scan", mistake.message)
 
     def _folder_of(self, position: Position) -> Path:
         """Return where a file lies that is named at a position: beside the settings, or in the current directory."""
@@ -151,40 +136,39 @@ class Entries:
             return
         self.table = read_table(node, self._folder_of(node.position), self.problems)
 
+    def block(self, section: str, known: Iterable[str]) -> Mapping | None:
+        """Return a block of the file; None where it is left out, empty, or reported to be no block of keys."""
+        node = self.root.get(section)
+        if node is None or (isinstance(node, Scalar) and not node.text.strip() and not node.quoted):
+            return None  # not there, or every line of it is commented out
+        if isinstance(node, Mapping) and node.unit is None:
+            return node
+        self.problems.add(node.position, section, f"must be a block of keys: {', '.join(known)}")
+        return None
+
     def _read_block(self, section: str) -> None:
-        entry = self.root.entries.get(section)
-        if entry is None:
-            return
-        node = entry.value
-        if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
-            return  # a block of which every line is commented out
         known = {field.key: field for field in fields.fields_of(section)}
+        node = self.root.get(section)
         if section in NAMED_SETS and isinstance(node, Sequence):
             self._read_sets(section, node, known)
             return
-        if not isinstance(node, Mapping) or node.unit is not None:
-            self.problems.add(node.position, section, f"must be a block of keys: {', '.join(known)}")
-            return
-        for inner in node:
+        for inner in self.block(section, known) or ():
             field = known.get(inner.key)
             if field is None:
                 self.unknown(inner, section, (*known, *SITE_KEYS.get(section, ())))
                 continue
             self.given.add(field.path)
-            try:
+            with self.reporting(field.path):
                 if field in fields.INPUTS:
                     self.leaves[field.name] = read_input(inner.value, field)
                 else:
                     self.settings[field.name] = read_setting(inner.value, field)
-            except LeafError as error:
-                for mistake in error.mistakes:
-                    self.problems.add(mistake.position, field.path, mistake.message)
 
     def _read_sets(self, section: str, node: Sequence, known: dict[str, fields.Field]) -> None:
         """Read a list of named sets: ``[{name: loose, density: 1700 kg/m^3, ...}, ...]``."""
         before = len(self.problems.problems)
         names: list[str] = []
-        columns: dict[str, list[Leaf]] = {}
+        columns: dict[str, list[Input]] = {}
         items = node.items or [Scalar(node.position, "")]
         for item in items:
             if not isinstance(item, Mapping):
@@ -205,16 +189,13 @@ class Entries:
                     self.unknown(inner, section, ("name", *inputs, *SITE_KEYS.get(section, ())))
                     continue
                 self.given.add(field.path)
-                try:
+                with self.reporting(field.path):
                     columns.setdefault(field.name, []).append(_one_of_set(inner.value, field))
-                except LeafError as error:
-                    for mistake in error.mistakes:
-                        self.problems.add(mistake.position, field.path, mistake.message)
             if len(self.problems.problems) == before:
-                ragged = [name for name, values in columns.items() if len(values) != len(names)]
-                for name in ragged:
-                    message = "must be given in every named set, or in none"
-                    self.problems.add(item.position, fields.BY_NAME[name].path, message)
+                for name, values in columns.items():
+                    if len(values) != len(names):
+                        message = "must be given in every named set, or in none"
+                        self.problems.add(item.position, fields.BY_NAME[name].path, message)
         if len(self.problems.problems) == before:
             self.sets[section] = tuple(names)
             self.leaves |= {name: _axis_of_sets(section, leaves, node.position) for name, leaves in columns.items()}
@@ -257,10 +238,15 @@ class Entries:
         path = f"{section}.{name}" if section else name
         self.problems.add(entry.position, path, f"is not a key of {where} (keys: {', '.join(known)}){hint}")
 
+    @property
+    def listed(self) -> set[str]:
+        """Names of the inputs that the table gives."""
+        return set() if self.table is None else set(self.table.columns)
+
     def single(self, name: str) -> float | None:
         """Return the single value of a quantity, its default where it has one, None for axes and tables."""
         field = fields.BY_NAME[name]
-        if self.table is not None and name in self.table.columns:
+        if name in self.listed:
             return None
         leaf = self.leaves.get(name)
         if leaf is None:
@@ -277,23 +263,23 @@ class Entries:
     @property
     def gives_mass(self) -> bool:
         """Whether the file or its table gives the mass of the boulders, right or wrong."""
-        field = fields.BY_NAME[BOULDER_MASS]
-        return field.path in self.given or (self.table is not None and field.name in self.table.columns)
+        return fields.BOULDER_MASS.path in self.given or fields.BOULDER_MASS.name in self.listed
 
-    def position_of(self, field: fields.Field) -> Position:
-        """Return where a quantity stands, else its block, else the beginning of the file."""
-        return self.key_position(field.section, field.key)
-
-    def key_position(self, section: str, key: str) -> Position:
-        """Return where a key stands, else its block, else the beginning of the file."""
+    def position_of(self, path: str) -> Position:
+        """Return where a dotted key stands, else its block, else the beginning of the file."""
+        section, _, key = path.partition(".")
         entry = self.root.entries.get(section)
         if entry is None:
             return self.root.position
         inner = entry.value.entries.get(key) if isinstance(entry.value, Mapping) else None
         return entry.position if inner is None else inner.position
 
+    def report(self, path: str, message: str) -> None:
+        """Report what is wrong with an entry, where it stands."""
+        self.problems.add(self.position_of(path), path, message)
 
-def _one_of_set(node: Node, field: fields.Field) -> Leaf:
+
+def _one_of_set(node: Node, field: fields.Field) -> Input:
     """Return the value that a named set gives for an input, with its distribution if it has one.
 
     Raises
@@ -303,66 +289,14 @@ def _one_of_set(node: Node, field: fields.Field) -> Leaf:
     """
     leaf = read_input(node, field)
     if leaf.distribution is None:
-        return Leaf(np.array([read_single(node, field)]), False, node.position)
+        return Input(np.array([read_single(node, field)]), False, node.position)
     if leaf.is_axis:
-        raise LeafError([Mistake(node.position, "must have one mean in a named set")])
+        raise wrong(node.position, "must have one mean in a named set")
     return leaf
 
 
-def _axis_of_sets(section: str, leaves: list[Leaf], position: Position) -> Leaf:
+def _axis_of_sets(section: str, leaves: list[Input], position: Position) -> Input:
     """Return the values that the named sets give for an input, as an axis."""
     each = tuple(own if isinstance(own := leaf.distribution, Distribution) else None for leaf in leaves)
     spread = SetDistributions(section, each) if any(each) else None
-    return Leaf(np.concatenate([leaf.values for leaf in leaves]), True, position, spread)
-
-
-KEYS = ({"stiffness"}, {"beyond", "stiffness"})
-"""Keys of the first stage and of the second."""
-FORM = "[{stiffness: ...}, {beyond: ..., stiffness: ...}]"
-
-
-def unfold_springs(root: Mapping) -> list[Mistake]:
-    """Replace the stages of every vehicle's spring by entries of their own, and return what is wrong with them.
-
-    Parameters
-    ----------
-    root : Mapping
-        The tree of the file, changed in place.
-    """
-    vehicle = root.get("vehicle")
-    vehicles = vehicle.items if isinstance(vehicle, Sequence) else [vehicle]
-    return [mistake for one in vehicles if isinstance(one, Mapping) for mistake in _unfold(one)]
-
-
-def _unfold(vehicle: Mapping) -> list[Mistake]:
-    """Replace the stages of one vehicle's spring."""
-    spring = vehicle.get("spring")
-    if not isinstance(spring, Sequence) or not any(isinstance(item, Mapping) for item in spring.items):
-        return []
-    stages = [item for item in spring.items if isinstance(item, Mapping)]
-    if len(stages) < len(spring.items) or len(stages) > 2 or spring.unit is not None:
-        del vehicle.entries["spring"]
-        return [Mistake(spring.position, f"takes one stage or two: {FORM}")]
-    mistakes = [
-        Mistake(stage.position, f"a stage of the spring has {' and '.join(sorted(keys))}, as in {FORM}")
-        for stage, keys in zip(stages, KEYS, strict=False)
-        if set(stage.entries) != keys
-    ]
-    entries: dict[str, Entry] = {}
-    for entry in vehicle:
-        if entry.key == "spring" and not mistakes:
-            entries |= _entries(stages)
-        elif entry.key in entries and entry.position.line is not None:
-            mistakes.append(Mistake(entry.position, f"{entry.key} stands in the stages of the spring, too; remove one"))
-        elif entry.key != "spring":
-            entries[entry.key] = entry  # what --set gives takes the place of what the file gives
-    vehicle.entries = entries
-    return mistakes
-
-
-def _entries(stages: list[Mapping]) -> dict[str, Entry]:
-    """Return the entries that the stages stand for."""
-    found = {"spring": stages[0].entries["stiffness"]}
-    for stage in stages[1:]:
-        found |= {"second_spring_from": stage.entries["beyond"], "second_spring": stage.entries["stiffness"]}
-    return {key: Entry(key, entry.position, entry.value) for key, entry in found.items()}
+    return Input(np.concatenate([leaf.values for leaf in leaves]), True, position, spread)

@@ -2,7 +2,8 @@
 
 Inputs are declared here, settings on the attributes of the dataclasses of `boulder_sweep.settings.model`. The reader,
 the checks, the tables of the documentation and the JSON Schema for editors follow from both. Name, unit and meaning of
-an input that is a column of the result come from the register of columns.
+an input that is a column of the result come from the register of columns. Options of commands may call an entry by its
+path, its key or its column: see `named`.
 
 The admitted range is wide: at least a million times either side of what is normal wherever a material or
 mechanical constant is concerned. A value beyond it is a typing mistake and refused. A value outside the usual range
@@ -10,6 +11,9 @@ is computed as given, with a note.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 from boulder_sweep import columns
 from boulder_sweep.settings.model import (
@@ -21,23 +25,16 @@ from boulder_sweep.settings.model import (
     Usual,
     entries_of,
 )
+from boulder_sweep.settings.problems import did_you_mean, shorten
 
 
-def _input(
-    path: str,
-    name: str,
-    admitted: Bound,
-    usual: Usual | None = None,
-    *,
-    default: float | None = None,
-    also: tuple[str, ...] = (),
-    optional: bool = False,
-) -> Field:
-    """Return the entry of an input column."""
+def _input(path: str, name: str, admitted: Bound, usual: Usual | None = None, **more: Any) -> Field:
+    """Return the entry of an input column; `more` are further attributes, and one with a default is optional."""
     section, key = path.split(".")
     column = columns.BY_NAME[name]
-    optional = optional or default is not None
-    return Field(section, key, name, column.unit, column.meaning, admitted, usual, default, also, optional)
+    if "default" in more:
+        more |= {"optional": True, "shown_default": more["default"]}
+    return Field(section, key, name, column.unit, column.meaning, admitted, usual, **more)
 
 
 _SIZE = Bound(0.01, 20.0, "the model is for boulders between a pebble and a house")
@@ -202,6 +199,7 @@ _OF_FILES = (
         "1",
         "correlation of friction angle and subgrade reaction, where both have a distribution",
         Bound(-0.99, 0.99, "the correlation of two different soil properties"),
+        shown_default=0.0,
     ),
     Field(
         "partial_factor",
@@ -210,6 +208,7 @@ _OF_FILES = (
         "1",
         "divides the tangent of every friction angle",
         Bound(1.0, 5.0, "1.25 is usual"),
+        shown_default=1.0,
     ),
 )
 """Settings that change what the inputs say, and belong to no part of `boulder_sweep.settings.model`."""
@@ -241,6 +240,8 @@ SECTIONS: dict[str, str] = {
 BY_NAME: dict[str, Field] = {field.name: field for field in FIELDS}
 BY_PATH: dict[str, Field] = {field.path: field for field in FIELDS}
 
+BOULDER_MASS = BY_NAME["boulder_mass_kg"]
+"""The mass of the boulder: an input where a file gives it; else it follows from four others."""
 EMBEDMENT = ("embedment_ratio", "embedment_depth_m")
 """Exactly one of these is given."""
 
@@ -251,3 +252,56 @@ MAX_ELEMENTS = 1_000_000
 def fields_of(section: str) -> tuple[Field, ...]:
     """Return the entries of one block of the file."""
     return tuple(field for field in FIELDS if field.section == section)
+
+
+class UnknownNameError(ValueError):
+    """A word names no entry, or several.
+
+    Parameters
+    ----------
+    word
+        The word.
+    what
+        What is wrong with it, and which entries there are.
+    """
+
+    def __init__(self, word: str, what: str):
+        super().__init__(word, what)
+        self.word, self.what = word, what
+
+    def __str__(self) -> str:
+        return f"'{shorten(self.word)}' {self.what}"
+
+
+def named(word: str, among: Sequence[Field] = INPUTS) -> Field:
+    """Return the entry that a word names; an input goes before a setting of the same key.
+
+    Parameters
+    ----------
+    word
+        Path of the entry (``boulder.width``), its key (``width``) or its column (``boulder_width_m``).
+    among
+        Entries that may be meant; the inputs by default.
+
+    Raises
+    ------
+    UnknownNameError
+        No entry has this name, or several have this key.
+    """
+    matches = [field for field in among if word in (field.path, field.name)]
+    matches = matches or [field for field in among if word == field.key]
+    matches = [field for field in matches if field in INPUTS] or matches
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        raise UnknownNameError(word, f"is ambiguous; use {' or '.join(field.path for field in matches)}")
+    keys = [field.key for field in among]
+    short = [field.path if keys.count(field.key) > 1 else field.key for field in among]
+    near = [known for known in short if word.lower() in known] or [
+        known for known, field in zip(short, among, strict=True) if word.lower() in field.also
+    ]
+    every = (*short, *(field.path for field in among), *(field.name for field in among))
+    hint = f"; did you mean {' or '.join(near)}?" if near else did_you_mean(word, every)
+    what = "an input" if all(field in INPUTS for field in among) else "an entry of the file"
+    known = hint or f" ({', '.join(short)})"
+    raise UnknownNameError(word, f"is not {what}{known}")

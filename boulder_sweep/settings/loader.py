@@ -1,4 +1,7 @@
-"""Load a file as a checked sweep; every mistake is reported at once."""
+"""Load a file as a checked sweep, with what ``--set KEY=VALUE`` puts in the place of single entries.
+
+Every mistake is reported at once.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +10,29 @@ from collections.abc import Sequence
 from dataclasses import fields as fields_of
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from boulder_sweep import elementary
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.consistency import check_complete, check_pairs
-from boulder_sweep.settings.entries import NAME, NAME_RULE, Entries
-from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading, wrong_with
-from boulder_sweep.settings.model import Criterion, Model, SolverSettings
-from boulder_sweep.settings.overrides import apply_overrides
-from boulder_sweep.settings.problems import ProblemList, SettingsError, check_regular_file, reason_of, refuse, shorten
-from boulder_sweep.settings.tree import Mapping, Scalar, parse
+from boulder_sweep.settings.checks import check_complete, check_pairs, notes_on
+from boulder_sweep.settings.entries import NAME, NAME_RULE, TOP_KEYS, Entries
+from boulder_sweep.settings.model import SECOND_OPINIONS, Criterion, Model, SolverSettings
+from boulder_sweep.settings.problems import (
+    Position,
+    ProblemList,
+    SettingsError,
+    check_regular_file,
+    nearest,
+    reason_of,
+    refuse,
+    shorten,
+)
+from boulder_sweep.settings.sweep import SECTION, Axis, Heading, Sweep, wrong_with
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
+from boulder_sweep.settings.tree import Sequence as List
 from boulder_sweep.stones.rock import ROCK_KG_M3
-
-if TYPE_CHECKING:
-    from boulder_sweep.settings.sweep import Axis, Sweep
 
 MAX_DESIGNS = 2**63 - 1
 """Most designs of a sweep: ``design_id`` is a 64-bit number."""
@@ -38,6 +47,24 @@ _BYTE_ORDER_MARKS = (
     (b"\xff\xfe", "UTF-16"),
     (b"\xfe\xff", "UTF-16"),
 )
+_ALTERNATIVES = {
+    "site.embedment_ratio": "embedment_depth",
+    "site.embedment_depth": "embedment_ratio",
+    "solver.accuracy": "step",
+    "solver.step": "accuracy",
+    "vehicle.speed": "approach",
+    "vehicle.approach": "speed",
+}
+"""Setting one removes the other from the file, which holds only one of them; two options contradict each other."""
+
+OPTIONS = {"--accuracy": "solver.accuracy", "--second-opinion": "model.second_opinion"}
+"""Options that set an entry: a mistake is reported for the option, not for ``--set``."""
+
+ALL_OPINIONS = f"--second-opinion=[{', '.join(SECOND_OPINIONS)}]"
+"""Asks for every second opinion."""
+
+MAX_OVERRIDE = 20_000
+"""Longest option, in characters."""
 
 Part = TypeVar("Part", Criterion, Model, SolverSettings)
 
@@ -124,6 +151,101 @@ def decode(data: bytes, label: str) -> str:
         raise refuse(label, "is not UTF-8 text; save it as UTF-8", line, column) from None
 
 
+def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemList) -> None:
+    """Put every ``key.path=value`` into the tree, in order; mistakes go to `problems`.
+
+    Parameters
+    ----------
+    root : Mapping
+        The tree of the file, changed in place.
+    overrides : sequence of str
+        As typed behind ``--set``, the key as of `boulder_sweep.settings.fields.named`; the value is YAML, so lists and
+        ranges work as in the file. ``--accuracy=fine`` is an option of its own.
+    problems : ProblemList
+        Receives what cannot be understood.
+    """
+    for text in overrides:
+        key, equals, value_text = text.partition("=")
+        option, key = (key, OPTIONS[key]) if key in OPTIONS else ("--set", key)
+        path = key.strip().split(".")
+        position, name = Position(option), shorten(key.strip())
+        if len(path) == 1 and path[0] not in ("", *TOP_KEYS):
+            try:
+                path = fields.named(path[0], fields.FIELDS).path.split(".")
+            except fields.UnknownNameError as unknown:
+                if nearest(path[0], TOP_KEYS) is None:
+                    problems.add(position, name, unknown.what)
+                    continue
+        if not equals or not all(path) or len(path) > 4:
+            problems.add(position, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
+            continue
+        if len(text) > MAX_OVERRIDE:
+            problems.add(position, name, f"is longer than {MAX_OVERRIDE} characters; put it into the file")
+            continue
+        value = _read_value(value_text, name, position, problems)
+        if value is not None:
+            _put(root, path, value, position)
+
+
+def _read_value(text: str, name: str, position: Position, problems: ProblemList) -> Node | None:
+    found = ProblemList()
+    try:
+        value = parse_node(text, position.file, found)
+    except SettingsError:
+        value = None  # its problems are in `found`
+    for problem in found.problems:
+        problems.add(position, name, problem.message)
+    if value is None:
+        return None if found else Scalar(position, "")
+    _move(value, position)
+    return value
+
+
+def _move(node: Node, position: Position) -> None:
+    """Give a whole tree the place of its option: a line number within an option means nothing."""
+    node.position = position
+    if isinstance(node, Scalar):
+        return
+    if node.unit is not None:
+        node.unit.position = position
+    if isinstance(node, Mapping):
+        for entry in node:
+            entry.position = position
+            _move(entry.value, position)
+    else:
+        for item in node.items:
+            _move(item, position)
+
+
+def _put(root: Mapping, path: list[str], value: Node, position: Position) -> None:
+    """Set one entry, opening blocks on the way where there are none."""
+    block = root
+    for depth, key in enumerate(path[:-1]):
+        inner = block.get(key)
+        if isinstance(inner, List) and all(isinstance(item, Mapping) for item in inner.items):
+            for item in inner.items:  # named sets: the entry holds for all of them
+                assert isinstance(item, Mapping)
+                _put(item, path[depth + 1 :], value, position)
+            return
+        if not isinstance(inner, Mapping):
+            opened = Mapping(position)
+            if path[: depth + 1] == ["model", "readings"] and isinstance(inner, Scalar):
+                # `readings: corrected` with one switch on top of it: the preset stays.
+                opened.entries["preset"] = Entry("preset", inner.position, inner)
+            _store(block, key, opened, position)
+            inner = opened
+        block = inner
+    other = _ALTERNATIVES.get(".".join(path))
+    if other in block.entries and block.entries[other].position.file not in ("--set", *OPTIONS):
+        del block.entries[other]
+    _store(block, path[-1], value, position)
+
+
+def _store(block: Mapping, key: str, value: Node, position: Position) -> None:
+    """Replace an entry where it stands, so that axes keep their order, or append it."""
+    block.entries[key] = Entry(key, position, value)
+
+
 def _read_name(entries: Entries) -> str:
     """Return the name of the sweep; it also names files, so few characters are allowed."""
     default = re.sub(r"[^\w.+-]+", "-", entries.path.stem).strip("-.")[:80] or "sweep"
@@ -138,17 +260,8 @@ def _read_name(entries: Entries) -> str:
 
 def _read_heading(entries: Entries) -> Heading:
     """Return the heading in a file; mistakes go to its problems."""
-    entry = entries.root.entries.get(SECTION)
-    if entry is None:
-        return NO_HEADING
-    node = entry.value
-    if isinstance(node, Scalar) and not node.text.strip() and not node.quoted:
-        return NO_HEADING  # a block of which every line is commented out
-    if not isinstance(node, Mapping) or node.unit is not None:
-        entries.problems.add(node.position, SECTION, f"must be a block of keys: {', '.join(Heading._fields)}")
-        return NO_HEADING
     found: dict[str, str] = {}
-    for inner in node:
+    for inner in entries.block(SECTION, Heading._fields) or ():
         path, value = f"{SECTION}.{shorten(inner.key)}", inner.value
         if inner.key not in Heading._fields:
             entries.unknown(inner, SECTION, Heading._fields)
@@ -163,23 +276,18 @@ def _read_heading(entries: Entries) -> Heading:
 
 def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
     """Put the checked parts together."""
-    from boulder_sweep.settings.notes import notes_on
-    from boulder_sweep.settings.sweep import Sweep
-
     factor = entries.settings.get("partial_factor", 1.0)
     if factor != 1.0:
         _apply_partial_factor(entries, factor)
     axes = _axes(entries)
-    listed = set() if entries.table is None else set(entries.table.columns)
     constants: dict[str, float] = {}
     for field in fields.INPUTS:
         value = entries.single(field.name)
-        if value is not None and field.name not in listed:
+        if value is not None:
             constants[field.name] = value
-    choices = _choices(entries)
-    if entries.gives_mass and DENSITY not in {*constants, *listed, *entries.leaves}:
+    if entries.gives_mass and DENSITY not in {*constants, *entries.listed, *entries.leaves}:
         constants[DENSITY] = ROCK_KG_M3
-        choices = (choices[0], replace(choices[1], rock_assumed=True), choices[2])
+        entries.settings["rock_assumed"] = True
     spreads = {name: leaf.distribution for name, leaf in entries.leaves.items() if leaf.distribution is not None}
     sweep = Sweep(
         name,
@@ -187,7 +295,7 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         axes,
         constants,
         entries.table,
-        *choices,
+        *_choices(entries),
         distributions=spreads,
         correlation=entries.settings.get("correlation", 0.0),
         partial_factor=factor,
@@ -195,9 +303,8 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         heading=heading,
         derived=entries.derived,
     )
-    positions = {field.name: entries.position_of(field) for field in fields.INPUTS}
-    object.__setattr__(sweep, "notes", tuple(notes_on(sweep, positions)))
-    return sweep
+    positions = {field.path: entries.position_of(field.path) for field in fields.INPUTS}
+    return replace(sweep, notes=tuple(notes_on(sweep, positions)))
 
 
 def _apply_partial_factor(entries: Entries, factor: float) -> None:
@@ -222,8 +329,6 @@ def _apply_partial_factor(entries: Entries, factor: float) -> None:
 
 def _axes(entries: Entries) -> tuple[Axis, ...]:
     """Return the axes in the order of the file."""
-    from boulder_sweep.settings.sweep import Axis
-
     axes: list[Axis] = []
     count = 1
     for section in entries.root:

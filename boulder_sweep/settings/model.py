@@ -34,7 +34,6 @@ SECOND_OPINIONS = RESISTANCES[1:]
 NO_OPINION = "none"
 """Stands in a file for no second opinion."""
 
-
 FEET = ("flat", "rounded")
 """Shapes of the underside of a boulder; only the first is modelled."""
 FOOT_WORDS = {
@@ -42,7 +41,6 @@ FOOT_WORDS = {
     "rounded": "foot: rounded (boulder.foot), which is not modelled",
 }
 """What every answer says of it."""
-
 
 UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
 """How the soil unloads, in the order of the kernels; the first is the paper's."""
@@ -88,6 +86,8 @@ class Field:
     default : float or None
         Value of an input that the file does not give; None where there is none. (Settings have the defaults of the
         attributes that declare them.)
+    shown_default : float, str or None
+        What holds where the file does not give the entry, as it is written there: a number in `unit`, or a word.
     also : tuple of str
         Other words people try, for "did you mean".
     optional : bool
@@ -110,6 +110,7 @@ class Field:
     optional: bool = False
     choices: tuple[str, ...] = ()
     kind: str = ""
+    shown_default: float | str | None = None
 
     @property
     def path(self) -> str:
@@ -129,9 +130,11 @@ def setting(path: str, unit: str, meaning: str, default: Any = MISSING, **more: 
     default
         Value where the file does not give the entry; none where it must.
     more
-        Further attributes of `Field`.
+        Further attributes of `Field`; the default is shown as it is where it is a number or a word.
     """
     section, _, key = path.rpartition(".")
+    if isinstance(default, float | str):
+        more.setdefault("shown_default", default)
     return field(default=default, metadata={"entry": Field(section, key, "", unit, meaning, **more)})
 
 
@@ -184,21 +187,12 @@ class ReadingChoice:
     @property
     def preset(self) -> str:
         """``as_printed``, ``corrected``, or ``mixed`` where the switches are neither."""
-        for preset in PRESETS:
-            if self == self.of_preset(preset):
-                return preset
-        return "mixed"
+        return next((preset for preset in PRESETS if self == self.of_preset(preset)), "mixed")
 
     @property
-    def corrected(self) -> tuple[bool, bool, bool, bool, bool]:
+    def corrected(self) -> tuple[bool, ...]:
         """Which readings are corrected, in the order of the kernels."""
-        return (
-            self.inertia != PRINTED,
-            self.impact_arm != PRINTED,
-            self.contact != PRINTED,
-            self.restoring != PRINTED,
-            self.separation != PRINTED,
-        )
+        return tuple(reading != PRINTED for reading in self.as_dict().values())
 
     def as_dict(self) -> dict[str, str]:
         """Return switch: value, in order."""
@@ -287,9 +281,15 @@ class Model:
     """
 
     readings: ReadingChoice = setting(
-        "model.readings", "", "how the misprinted equations of the paper are read", ReadingChoice()
+        "model.readings",
+        "",
+        "how the misprinted equations of the paper are read",
+        ReadingChoice(),
+        shown_default=PRESETS[1],
     )
-    soil_elements: int = setting("model.soil", "", "closed form of the soil, or a number of soil elements", 0)
+    soil_elements: int = setting(
+        "model.soil", "", "closed form of the soil, or a number of soil elements", 0, shown_default=CLOSED_FORM
+    )
     """0 means the closed form, the limit of infinitely many."""
     calibrated_crush_m: float = setting(
         "vehicle.calibrated_crush",
@@ -313,6 +313,7 @@ class Model:
         "laws of the soil's resistance under which every pass is simulated again, with friction and vertical motion",
         (),
         kind="a law for a second opinion",
+        shown_default=NO_OPINION,
     )
     unloading: str = setting(
         "model.unloading",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import stat
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -81,6 +81,51 @@ class SettingsError(BoulderSweepError):
     def __reduce__(self) -> tuple[type[SettingsError], tuple[list[Problem]]]:
         """Pickle by the problems, so that the error can pass between processes."""
         return type(self), (self.problems,)
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """One mistake within an entry."""
+
+    position: Position
+    message: str
+
+
+class LeafError(Exception):
+    """An entry that cannot be used, with every mistake in it."""
+
+    def __init__(self, *mistakes: Mistake) -> None:
+        super().__init__("; ".join(mistake.message for mistake in mistakes))
+        self.mistakes = mistakes
+
+
+class Mistakes(list[Mistake]):
+    """Mistakes of an entry, collected so that all are reported at once.
+
+    ``with mistakes:`` takes those of a part of the entry; what follows the block is read all the same.
+    """
+
+    def add(self, position: Position, message: str) -> None:
+        """Add one mistake."""
+        self.append(Mistake(position, message))
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool:
+        if isinstance(error, LeafError):
+            self.extend(error.mistakes)
+        return isinstance(error, LeafError)
+
+    def raise_if_any(self) -> None:
+        """Raise LeafError if there is a mistake."""
+        if self:
+            raise LeafError(*self)
+
+
+def wrong(position: Position, message: str) -> LeafError:
+    """Return the error for an entry with one mistake."""
+    return LeafError(Mistake(position, message))
 
 
 def refuse(file: str, message: str, line: int | None = None, column: int | None = None) -> SettingsError:
@@ -184,3 +229,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return ``"; did you mean ...?"`` for the known word nearest to `word`, or an empty string."""
     near = nearest(word, known)
     return f"; did you mean {near}?" if near else ""
+
+
+def unknown_word(word: str, what: str, known: Collection[str]) -> str:
+    """Say that a word is not `what`; list the known ones, and name the nearest."""
+    return f"'{shorten(word)}' is not {what} ({', '.join(known)}){did_you_mean(word, known)}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -94,8 +94,7 @@ class Shape:
 
     def as_list(self) -> list[dict[str, float]]:
         """Return the points as plain data."""
-        names = [field.name for field in fields(ProfilePoint)]
-        return [{name: getattr(point, name) for name in names} for point in self.points]
+        return [asdict(point) for point in self.points]
 
     @classmethod
     def of_list(cls, points: list[dict[str, float]]) -> Shape:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from boulder_sweep.columns import BY_NAME, column_spec
-from boulder_sweep.settings.units import factor
+from boulder_sweep.settings.units import factor, name_suffix
 
 SYSTEMS = ("si", "us")
 
@@ -23,10 +23,7 @@ _SHOWN: dict[str, tuple[str, str]] = {
     "MPa": ("MPa", "tsf"),
     "m/s^2": ("m/s^2", "ft/s^2"),
 }
-_FORCES = {"kN": ("kN", "kip"), "N": ("kN", "kip"), "J": ("kJ", "kip*ft")}
-_OF_FORCE = {"kN": 1.0, "N": 1e-3, "J": 1e-3}
 KILONEWTONS_PER_KIP = 4.4482216152605
-KILOJOULES_PER_FOOT_KIP = KILONEWTONS_PER_KIP * 0.3048
 
 
 class ShownUnit(NamedTuple):
@@ -34,6 +31,13 @@ class ShownUnit(NamedTuple):
 
     unit: str
     size: float
+
+
+_FORCES = {
+    "kN": (ShownUnit("kN", 1.0), ShownUnit("kip", KILONEWTONS_PER_KIP)),
+    "N": (ShownUnit("kN", 1e3), ShownUnit("kip", KILONEWTONS_PER_KIP / 1e-3)),
+    "J": (ShownUnit("kJ", 1e3), ShownUnit("kip*ft", KILONEWTONS_PER_KIP * 0.3048 / 1e-3)),
+}
 
 
 class Shown(NamedTuple):
@@ -78,8 +82,7 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
     check_system(system)
     position = SYSTEMS.index(system)
     if unit in _FORCES:
-        us_size = KILOJOULES_PER_FOOT_KIP if unit == "J" else KILONEWTONS_PER_KIP
-        return ShownUnit(_FORCES[unit][position], (us_size if system == "us" else 1.0) / _OF_FORCE[unit])
+        return _FORCES[unit][position]
     if unit not in _SHOWN:
         return ShownUnit(unit, 1.0)
     shown = _SHOWN[unit][position]
@@ -121,7 +124,7 @@ def shown_as(stored: str, unit: str, meaning: str, units: str) -> Shown:
     if units == "si" or not unit:
         return Shown(stored, stored, unit, 1.0, meaning)
     other, size = shown_unit(unit, units)
-    name = stored if size == 1.0 else stored.removesuffix(_suffix(unit)) + _suffix(other)
+    name = stored if size == 1.0 else stored.removesuffix(name_suffix(unit)) + name_suffix(other)
     return Shown(stored, name, other, size, meaning)
 
 
@@ -151,17 +154,10 @@ def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
         return dict(settings)
     shown_by_name = {}
     for name, value in settings.items():
-        unit, size = _unit_of(name, units)
-        shown = name if size == 1.0 else name.removesuffix(_suffix(unit)) + _suffix(shown_unit(unit, units).unit)
-        shown_by_name[shown] = _shown_setting(value, size, units)
+        unit = max((unit for unit in _SHOWN if name.endswith(name_suffix(unit))), key=len, default="")
+        shown = shown_as(name, unit, "", units)
+        shown_by_name[shown.name] = _shown_setting(value, shown.size, units)
     return shown_by_name
-
-
-def _unit_of(name: str, units: str) -> tuple[str, float]:
-    """Return the unit that the name of a setting ends in, and the size of the one it is shown in."""
-    ending = [unit for unit in _SHOWN if name.endswith(_suffix(unit))]
-    unit = max(ending, key=len, default="")
-    return unit, shown_unit(unit, units).size if unit else 1.0
 
 
 def _shown_setting(value: Any, size: float, units: str) -> Any:
@@ -174,8 +170,3 @@ def _shown_setting(value: Any, size: float, units: str) -> Any:
     if isinstance(value, list):
         return [_shown_setting(one, size, units) for one in value]
     return value / size if isinstance(value, float) else value
-
-
-def _suffix(unit: str) -> str:
-    """End of the name of a column in this unit: ``_kg_m3`` for kg/m^3."""
-    return "_" + unit.replace("^", "").replace("*", "_").replace("/", "_")

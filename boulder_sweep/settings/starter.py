@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import asdict
 from typing import Literal, NamedTuple
 
 from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, Field, fields_of
-from boulder_sweep.settings.model import CLOSED_FORM, NO_OPINION, Criterion, Model, SolverSettings
-from boulder_sweep.settings.numbers import describe
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
+from boulder_sweep.settings.values import describe
 from boulder_sweep.text import printable
-
-
-def default_of(field: Field) -> float | str | None:
-    """Return the default of an entry: a number in the unit of the field, a word, or None where there is none."""
-    words = {"readings": Model().preset, "soil_elements": CLOSED_FORM, "correlation": 0.0, "partial_factor": 1.0}
-    words |= {"layers": None, "profile": None, "scan": None, "second_opinion": NO_OPINION}
-    attributes = {**asdict(Criterion()), **asdict(Model()), **asdict(SolverSettings()), **words}
-    return attributes.get(field.name, field.default)
 
 
 def default_text(field: Field, units: str = "si") -> str:
     """Return the default of an entry with its unit, to five digits in US units; empty where there is none."""
-    value = default_of(field)
+    value = field.shown_default
     if value is None or isinstance(value, str):
         return value or ""
     unit, size = shown_unit(field.unit, units) if units == "us" else (field.unit, 1.0)
@@ -137,13 +127,8 @@ def _line(field: Field, vehicle: str, units: int) -> str:
     if not is_published(vehicle):
         of_class |= dict.fromkeys(UNPUBLISHED, "")
     path = field.path
-    value = (
-        of_class[path]
-        if path in of_class
-        else _EXAMPLES[path][units]
-        if path in _EXAMPLES
-        else default_text(field, SYSTEMS[units])
-    )
+    example = _EXAMPLES[path][units] if path in _EXAMPLES else default_text(field, SYSTEMS[units])
+    value = of_class.get(path, example)
     needed = path in of_class or (field in INPUTS and (not field.optional or field.name == EMBEDMENT[0]))
     sign = "" if needed else "# "
     empty = "" if value else "fill in: "

@@ -7,21 +7,58 @@ import math
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from boulder_sweep.designs import DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import INPUTS
-from boulder_sweep.settings.heading import NO_HEADING, SECTION, Heading
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import Problem
+from boulder_sweep.settings.soil_readings import soil_words
+from boulder_sweep.settings.vehicle import APPROACH, approach_words
 
 MAX_LISTED = 1000
 """Longest axis that `Sweep.resolved` lists value by value."""
 
 IMPACT_HEIGHT_RULE = "Eq 9: (min(boulder_height - embedment_depth, hood_height) + bumper_height) / 2"
+
+
+SECTION = "report"
+"""Block of the file that holds the heading."""
+MOST_CHARACTERS = 200
+"""Longest entry of a heading."""
+
+
+class Heading(NamedTuple):
+    """The heading of a report: whom and what it is for. An entry that is not given is empty.
+
+    Nothing that is computed depends on it.
+    """
+
+    project: str = ""
+    client: str = ""
+    author: str = ""
+    date: str = ""
+
+    def given(self) -> dict[str, str]:
+        """Return the entries that are given, in order."""
+        return {name: text for name, text in self._asdict().items() if text}
+
+
+NO_HEADING = Heading()
+
+
+def wrong_with(text: str) -> str:
+    """Say what is wrong with an entry of a heading; empty if nothing is."""
+    if not text.strip():
+        return "is empty; write one line of text, or leave it out"
+    if not text.isprintable():
+        return "must be one line of printable text"
+    if len(text) > MOST_CHARACTERS:
+        return f"has {len(text)} characters; at most {MOST_CHARACTERS} fit into a heading"
+    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,3 +284,13 @@ def _texts_listed(label: Label) -> Any:
         return texts
     digest = hashlib.sha256("\x00".join(texts).encode(errors="surrogatepass")).hexdigest()
     return {"count": len(texts), "first": texts[0], "last": texts[-1], "sha256": digest}
+
+
+def derived_words(derived: dict[str, Any], units: str = "si") -> list[str]:
+    """Return how inputs were worked out, a line each, by `Sweep.derived`."""
+    lines = []
+    for key, path, words in (("soil", "soil", soil_words), (APPROACH, "vehicle.speed", approach_words)):
+        for data in derived.get(key, []):
+            of_set = f" ({data['name']})" if "name" in data else ""
+            lines.append(f"{path}{of_set}: {words(data, units)}")
+    return lines

@@ -13,7 +13,6 @@ import numpy as np
 
 from boulder_sweep.designs import Label
 from boulder_sweep.locations import Location, LocationError, is_url, location_of, source_of
-from boulder_sweep.settings.numbers import NumberError, split_number
 from boulder_sweep.settings.problems import (
     Position,
     ProblemList,
@@ -35,6 +34,7 @@ from boulder_sweep.settings.table_columns import (
     to_input_unit,
 )
 from boulder_sweep.settings.tree import Scalar
+from boulder_sweep.settings.values import NumberError, split_number
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:

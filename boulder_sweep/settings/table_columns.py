@@ -13,9 +13,9 @@ from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
 from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.designs import Label
 from boulder_sweep.settings.fields import INPUTS, Field
-from boulder_sweep.settings.leaf import outside
 from boulder_sweep.settings.problems import Position, ProblemList, nearest, refuse, shorten
-from boulder_sweep.settings.units import UnitError, factor
+from boulder_sweep.settings.units import UnitError, factor, name_suffix
+from boulder_sweep.settings.values import outside
 
 MAX_COLUMNS = 1000
 MAX_ALIKE = 5
@@ -46,11 +46,7 @@ class TableColumn:
     factor: Fraction = Fraction(1)
 
 
-def _suffix(unit: str) -> str:
-    return "" if unit == "1" else "_" + unit.replace("^", "").replace("/", "_").replace("*", "_")
-
-
-_STEMS: dict[str, Field] = {field.name.removesuffix(_suffix(field.unit)): field for field in INPUTS}
+_STEMS: dict[str, Field] = {field.name.removesuffix(name_suffix(field.unit)): field for field in INPUTS}
 """Inputs by the name of the column without its unit."""
 
 
@@ -93,7 +89,7 @@ def _column(name: str) -> TableColumn | str:
             if ratio is not None:
                 return TableColumn(name, field, ratio)
     if name in _STEMS:
-        return f"the unit is missing at the end of the name, such as {name}{_suffix(_STEMS[name].unit)}"
+        return f"the unit is missing at the end of the name, such as {name}{name_suffix(_STEMS[name].unit)}"
     meant = "" if _ID.fullmatch(name) else _meant(name)
     if meant:
         return f"is not an input; did you mean {meant}?"
@@ -136,7 +132,7 @@ def _meant(name: str) -> str:
         if suffix and _factor(suffix, unit) is not None:
             return f"{near}_{suffix}"
         if not suffix:
-            return f"{near}{_suffix(unit)}" if unit == "1" else f"{near}, with its unit at the end"
+            return f"{near}{name_suffix(unit)}" if unit == "1" else f"{near}, with its unit at the end"
     for stem, field in _STEMS.items():
         if word in (stem, field.key, *field.also):
             return f"{stem}, with its unit at the end" if field.unit != "1" else stem

@@ -96,6 +96,19 @@ class Mapping:
         entry = self.entries.get(key)
         return None if entry is None else entry.value
 
+    def blocks(self, section: str) -> Iterator[Mapping]:
+        """Yield the block of a section, or each of its named sets."""
+        node = self.get(section)
+        for one in node.items if isinstance(node, Sequence) else [node]:
+            if isinstance(one, Mapping):
+                yield one
+
+    @property
+    def label(self) -> dict[str, str]:
+        """The name of a named set, as plain data; empty for any other block."""
+        name = self.get("name")
+        return {"name": name.text.strip()} if isinstance(name, Scalar) else {}
+
     def replace(self, key: str, new: list[Entry]) -> None:
         """Put entries in the place of one."""
         entries: dict[str, Entry] = {}
@@ -105,6 +118,11 @@ class Mapping:
 
 
 Node = Scalar | Sequence | Mapping
+
+
+def block_of(position: Position, texts: dict[str, str]) -> Mapping:
+    """Return a block of plain texts by key, all of them at one position."""
+    return Mapping(position, {key: Entry(key, position, Scalar(position, text)) for key, text in texts.items()})
 
 
 def parse(text: str, label: str, problems: ProblemList) -> Mapping | None:

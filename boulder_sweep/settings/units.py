@@ -8,6 +8,7 @@ stack; checking a file must be instant.)
 from __future__ import annotations
 
 import re
+from collections import Counter, deque
 from fractions import Fraction
 from functools import cache, lru_cache
 from typing import NamedTuple
@@ -71,23 +72,25 @@ class Expected(NamedTuple):
 
     words: str
     examples: str
+    sample: str
+    """A value that a message suggests."""
 
 
 # By the unit of the table (the unit of a bare number).
 EXPECTED: dict[str, Expected] = {
-    "m": Expected("a length", "m, cm, ft or in"),
-    "kg": Expected("a mass", "kg, t, lb or short_ton"),
-    "s": Expected("a time", "s or ms"),
-    "m/s": Expected("a speed", "m/s, km/h, mph or ft/s"),
-    "m/s^2": Expected("an acceleration", "m/s^2 or ft/s^2"),
-    "deg": Expected("an angle", "deg or rad"),
-    "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3"),
-    "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci"),
-    "kPa": Expected("a pressure", "kPa, Pa or MPa"),
-    "MPa": Expected("a pressure", "MPa, kPa or tsf"),
-    "N/m": Expected("a stiffness", "kN/m, N/m or lb/in"),
-    "N*s/m": Expected("a damping constant", "kN*s/m, N*s/m or lb*s/in"),
-    "1": Expected("a plain number", "no unit, or %"),
+    "m": Expected("a length", "m, cm, ft or in", "1.65 m"),
+    "kg": Expected("a mass", "kg, t, lb or short_ton", "6800 kg or 15000 lb"),
+    "s": Expected("a time", "s or ms", "1 s"),
+    "m/s": Expected("a speed", "m/s, km/h, mph or ft/s", "13.4 m/s or 30 mph"),
+    "m/s^2": Expected("an acceleration", "m/s^2 or ft/s^2", "1.5 m/s^2"),
+    "deg": Expected("an angle", "deg or rad", "36 deg"),
+    "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3", "2650 kg/m^3 or 116 pcf"),
+    "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci", "95 MN/m^3 or 350 pci"),
+    "kPa": Expected("a pressure", "kPa, Pa or MPa", "5 kPa"),
+    "MPa": Expected("a pressure", "MPa, kPa or tsf", "14 MPa"),
+    "N/m": Expected("a stiffness", "kN/m, N/m or lb/in", "3103.3 kN/m"),
+    "N*s/m": Expected("a damping constant", "kN*s/m, N*s/m or lb*s/in", "138.91 kN*s/m"),
+    "1": Expected("a plain number", "no unit, or %", ""),
 }
 
 _KINDS = (
@@ -160,6 +163,11 @@ def factor(text: str, target: str) -> Fraction:
     raise UnitError(f"'{shorten(text)}' is {_kind(unit.dimension)}; {expected.words} is needed ({expected.examples})")
 
 
+def name_suffix(unit: str) -> str:
+    """Return the end of the name of a column in a unit: ``_kg_m3`` for kg/m^3, nothing for a plain number."""
+    return "" if unit == "1" else "_" + unit.replace("^", "").replace("*", "_").replace("/", "_")
+
+
 Dimension = tuple[int, ...]
 
 
@@ -217,76 +225,51 @@ def _read(text: str, known: dict[str, tuple[str, Unit]] | None = None) -> dict[s
     """Return the powers of the units in a product such as ``kN*s/m``, ``lb/ft3`` or ``kN-s/m``."""
     if text in ("1", ""):
         return {}
-    known = _vocabulary() if known is None else known
     if len(text) > MAX_LENGTH:
         raise UnitError(f"'{shorten(text)}' is too long for a unit")
+    malformed = UnitError(f"'{shorten(text)}' is not a unit")
     plain = re.sub(r"\bper\b", "/", text.translate(_TRANSLATION))
     if plain.startswith("1/"):
         plain = plain[1:]
-    tokens: list[tuple[str, str]] = []
+    tokens: deque[tuple[str, str]] = deque()
     position = 0
     while position < len(plain.rstrip()):
         match = _TOKEN.match(plain, position)
         if match is None:
-            raise UnitError(f"'{shorten(text)}' is not a unit")
+            raise malformed
         kind = str(match.lastgroup)
         tokens.append((kind, match[kind]))
         position = match.end()
-    powers: dict[str, int] = {}
-    reader = _Reader(tokens, known)
-    if not reader.product(powers, 1) or reader.index != len(tokens):
-        raise UnitError(f"'{shorten(text)}' is not a unit")
-    if any(abs(power) > MAX_POWER for power in powers.values()):
-        raise UnitError(f"'{shorten(text)}' is not a unit")
+    powers = _product_of(tokens, _vocabulary() if known is None else known)
+    if powers is None or tokens or any(abs(power) > MAX_POWER for power in powers.values()):
+        raise malformed
     return {name: power for name, power in powers.items() if power}
 
 
-class _Reader:
-    """Reads a product of units, in parentheses or not, from its tokens."""
-
-    def __init__(self, tokens: list[tuple[str, str]], known: dict[str, tuple[str, Unit]]) -> None:
-        self.tokens = tokens
-        self.known = known
-        self.index = 0
-
-    def next_is(self, *signs: str) -> bool:
-        return self.index < len(self.tokens) and self.tokens[self.index][1] in signs
-
-    def product(self, powers: dict[str, int], sign: int) -> bool:
-        """Read ``a * b / c ...`` into `powers`; return whether it is well formed."""
-        side = sign
-        if self.next_is("/"):  # 1/s
-            self.index, side = self.index + 1, -sign
-        if not self.factor(powers, side):
-            return False
-        while self.index < len(self.tokens) and not self.next_is(")"):
-            side = sign
-            if self.next_is("*", "-", "/"):
-                side = -sign if self.next_is("/") else sign
-                self.index += 1
-            if not self.factor(powers, side):
-                return False
-        return True
-
-    def factor(self, powers: dict[str, int], side: int) -> bool:
-        """Read one unit or a product in parentheses, with its power; return whether it is well formed."""
-        inner: dict[str, int] = {}
-        if self.next_is("("):
-            self.index += 1
-            if not self.product(inner, 1) or not self.next_is(")"):
-                return False
-        elif self.index < len(self.tokens) and self.tokens[self.index][0] == "name":
-            inner[_full_name(self.tokens[self.index][1], self.known)] = 1
-        else:
-            return False
-        self.index += 1
-        power = 1
-        if self.index < len(self.tokens) and self.tokens[self.index][0] == "power":
-            power = int(self.tokens[self.index][1].lstrip("^* "))
-            self.index += 1
+def _product_of(tokens: deque[tuple[str, str]], known: dict[str, tuple[str, Unit]]) -> dict[str, int] | None:
+    """Take ``a * b / (c d)^2 ...`` from the tokens, up to a closing bracket; None if it is not well formed."""
+    powers: Counter[str] = Counter()
+    signs: tuple[str, ...] = ("/",)  # 1/s
+    while True:
+        side = 1
+        if tokens and tokens[0][1] in signs:
+            side = -1 if tokens.popleft()[1] == "/" else 1
+        kind, word = tokens.popleft() if tokens else ("", "")
+        inner: dict[str, int] | None = None
+        if word == "(":
+            inner = _product_of(tokens, known)
+            if not tokens or tokens.popleft()[1] != ")":
+                return None
+        elif kind == "name":
+            inner = {_full_name(word, known): 1}
+        if inner is None:
+            return None
+        power = int(tokens.popleft()[1].lstrip("^* ")) if tokens and tokens[0][0] == "power" else 1
         for name, exponent in inner.items():
-            powers[name] = powers.get(name, 0) + side * power * exponent
-        return True
+            powers[name] += side * power * exponent
+        if not tokens or tokens[0][1] == ")":
+            return powers
+        signs = ("*", "-", "/")
 
 
 def _full_name(name: str, known: dict[str, tuple[str, Unit]]) -> str:

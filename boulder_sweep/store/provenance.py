@@ -24,8 +24,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.heading import SECTION
 from boulder_sweep.settings.problems import shorten
+from boulder_sweep.settings.sweep import SECTION
 
 PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
@@ -36,8 +36,9 @@ _DECIDING_SOURCES = (
     "columns.py",
     "elementary.py",
     "soils.py",
+    "investigation.py",
     "judge/*.py",
-    *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "notes", "shape")),
+    *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "shape")),
     "stones/rock.py",
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""

@@ -16,13 +16,13 @@ from boulder_sweep import elementary
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.designs import impact_height_of_face
+from boulder_sweep.investigation import api_curve, family_bounds
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import Designs, designs_of, sampled_designs
 from boulder_sweep.judge.judged import FAIL, PASS
 from boulder_sweep.settings import load
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS
-from boulder_sweep.settings.notes import api_curve, family_bounds
 from boulder_sweep.soils import with_law
 from docs.studies.random_designs import RANGES
 

@@ -12,12 +12,12 @@ from scipy.stats import beta as beta_distribution
 from boulder_kernels import DesignTable
 from boulder_sweep import elementary
 from boulder_sweep.crash_tests.tables import Table
+from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.robustness import FREE, FREE_EMBEDMENT, FREE_ROTATION_DEG, is_free
 from boulder_sweep.settings.model import SECOND_OPINIONS
-from boulder_sweep.settings.notes import family_bounds
 from docs.studies.forms import (
     BED_OFFSET_M,
     BUMPER_M,

@@ -6,12 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS, MOST_POINTS, PROFILE_FIELDS
-from boulder_sweep.settings.distribution_reader import NEEDED
-from boulder_sweep.settings.entries import NAME, NAMED_SETS, SIDES
+from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS, MOST_POINTS, PROFILE_FIELDS, SCAN_KEYS, SIDES
+from boulder_sweep.settings.distributions import NEEDED
+from boulder_sweep.settings.entries import NAME, NAMED_SETS
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
-from boulder_sweep.settings.heading import SECTION, Heading
-from boulder_sweep.settings.leaf import MAX_AXIS
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,
@@ -21,18 +19,11 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
 )
-from boulder_sweep.settings.scan import KEYS as SCAN_KEYS
-from boulder_sweep.settings.site_data import (
-    APPROACH,
-    APPROACH_FIELDS,
-    METHODS,
-    READING_FIELDS,
-    RELATIVE_DENSITY,
-    SOIL_KEYS,
-    SPEED,
-)
-from boulder_sweep.settings.starter import default_of
+from boulder_sweep.settings.soil_readings import METHODS, READING_FIELDS, RELATIVE_DENSITY, SOIL_KEYS
+from boulder_sweep.settings.sweep import SECTION, Heading
 from boulder_sweep.settings.units import EXPECTED
+from boulder_sweep.settings.values import MAX_AXIS
+from boulder_sweep.settings.vehicle import APPROACH, APPROACH_FIELDS, SPEED
 
 FILE = Path("docs/sweep.schema.json")
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
@@ -85,7 +76,7 @@ def _block(section: str, words: str) -> Schema:
     for field in FIELDS:
         if field.section == section:
             entry = {"description": _described(field), **_entry(field)}
-            default = default_of(field)
+            default = field.shown_default
             entries[field.key] = entry if default is None else {**entry, "default": default}
     entries |= _SITE_DATA.get(section, {})
     block: Schema = {"description": words, "additionalProperties": False, "properties": entries}

@@ -13,7 +13,7 @@ from boulder_sweep.crash_tests.fitting import fit_pulse
 from boulder_sweep.crash_tests.measured import read_pulse
 from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.settings.overrides import ALL_OPINIONS
+from boulder_sweep.settings.loader import ALL_OPINIONS
 from boulder_sweep.views.crash_curves import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
 from boulder_sweep.views.verdict_map import draw_verdict_map
 from boulder_sweep.views.wording import terms_line

@@ -5,7 +5,7 @@ from __future__ import annotations
 from boulder_sweep.columns import OUTCOMES
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
-from boulder_sweep.settings.starter import default_of, default_text
+from boulder_sweep.settings.starter import default_text
 from boulder_sweep.settings.units import EXPECTED
 
 DEFAULTS = {
@@ -48,7 +48,7 @@ def choices_table() -> Table:
             form = ", ".join(f"`{word}`" for word in field.choices) + PAGES.get(field.name, "")
         else:
             form = FORMS.get(field.name) or f"{EXPECTED[field.unit].words} ({EXPECTED[field.unit].examples})"
-        shown = f"`{default_text(field)}`" if isinstance(default_of(field), str) else default_text(field)
+        shown = f"`{default_text(field)}`" if isinstance(field.shown_default, str) else default_text(field)
         table.add(f"`{field.path}`", form, shown, field.meaning)
     return table
 

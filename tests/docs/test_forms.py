@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boulder_sweep.investigation import off_families
 from boulder_sweep.judge.judged import FAIL, PASS
 from boulder_sweep.judge.robustness import FREE_ROTATION_DEG, is_free
-from boulder_sweep.settings.notes import off_families
 from docs.studies import forms, free_region
 
 ROOT = Path(__file__).parents[2]

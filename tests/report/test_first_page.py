@@ -5,7 +5,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.report import write_report
-from boulder_sweep.settings.heading import Heading
+from boulder_sweep.settings.sweep import Heading
 from tests.report.conftest import SITE, reported
 
 LAYER = "{from: 0.5 m, density: 1900 kg/m^3, friction_angle: 36 deg, subgrade_reaction: 40 MN/m^3}"

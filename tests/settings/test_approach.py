@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from boulder_sweep.approach import Approach, G, NoApproachError
-from boulder_sweep.settings.site_data import derived_words
+from boulder_sweep.settings.sweep import derived_words
+from boulder_sweep.settings.vehicle import Approach, G, NoApproachError
 
 SPEED = "  speed: 14.5"
 WHOLE = "  approach: {length: 80 m, from: 20 mph, acceleration: 1.2 m/s^2}"

@@ -2,8 +2,7 @@
 
 import pytest
 
-from boulder_sweep.settings.fields import FIELDS, INPUTS
-from boulder_sweep.settings.names import BOULDER_MASS, UnknownNameError, named
+from boulder_sweep.settings.fields import BOULDER_MASS, FIELDS, INPUTS, UnknownNameError, named
 
 EVERY = (*FIELDS, BOULDER_MASS)
 

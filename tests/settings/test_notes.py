@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.settings.notes import wall_crush
+from boulder_sweep.settings.checks import wall_crush
 
 
 def _notes(sweep):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boulder_sweep.settings.leaf import MAX_AXIS, spread
+from boulder_sweep.settings.values import MAX_AXIS, spread
 
 
 def _height(sweep):

@@ -9,10 +9,11 @@ import pytest
 
 from boulder_sweep import at_values
 from boulder_sweep import investigation as sand
+from boulder_sweep.investigation import api_curve
 from boulder_sweep.settings import load
 from boulder_sweep.settings.distributions import SetDistributions
-from boulder_sweep.settings.notes import api_curve
-from boulder_sweep.settings.site_data import CORRELATION, derived_words
+from boulder_sweep.settings.soil_readings import CORRELATION
+from boulder_sweep.settings.sweep import derived_words
 
 CONSTANTS = "  density: 1859.9\n  friction_angle: 43.2\n  subgrade_reaction: 95\n"
 ANGLE, DENSITY, REACTION = "friction_angle_deg", "soil_density_kg_m3", "subgrade_reaction_MN_m3"

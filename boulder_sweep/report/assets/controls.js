@@ -154,7 +154,7 @@ class Controls {
     byId("flags").replaceChildren(...[...words, ...this.cautions(design)].map((one) => element("li", one)));
   }
 
-  /** @param {Record<string, number>} design @returns {string[]} cautions on its vehicle: `boulder_sweep.settings.notes` */
+  /** @param {Record<string, number>} design @returns {string[]} cautions on its vehicle: `boulder_sweep.settings.checks` */
   cautions(design) {
     if ("vehicle_second_spring_N_m" in design) return [];
     const { calibrated, least, most, beyond, short } = this.front;

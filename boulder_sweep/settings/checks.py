@@ -1,0 +1,386 @@
+"""Checks across entries: mistakes for which a file is refused, and notes on what deserves a second look.
+
+What is missing, contradictory or mutually exclusive is a mistake. Notes are made on settings that are valid; they never
+stop a run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from boulder_sweep.columns import BOULDER_MASS, SECOND_SPRING_COLUMNS, WAY_OUT
+from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, SIDES
+from boulder_sweep.investigation import api_curve, off_families, terzaghi_curve
+from boulder_sweep.settings import fields
+from boulder_sweep.settings.entries import Entries
+from boulder_sweep.settings.fields import BY_NAME, Field
+from boulder_sweep.settings.model import UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
+from boulder_sweep.settings.problems import Position, Problem
+from boulder_sweep.settings.shape import Shape
+from boulder_sweep.settings.sweep import Sweep
+from boulder_sweep.settings.values import describe
+from boulder_sweep.stones.rock import ROCK_KG_M3
+
+SLIDES = "or the ground slides"
+"""What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""
+FLOATS = "soil of {value} would float; give the density of the saturated soil below it"
+"""Why a density is refused below the water table; the page of a report says the same."""
+
+_FRONT = ("vehicle_mass_kg", "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_damper_N_s_m")
+LEAST_CRUSH, MOST_CRUSH = 0.5, 1.25
+"""Crush at a rigid wall over the calibrated one, between which spring and damper are taken for those of the vehicle. A
+boulder gives way and takes less of the front than a wall: hence more than 1."""
+BEYOND_FRONT = (
+    "against a rigid wall the front of this vehicle would be crushed by {crush}; its spring and damper are calibrated "
+    "up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
+)
+SHORT_OF_FRONT = (
+    "against a rigid wall the front of this vehicle would be crushed by only {crush}; its spring and damper are "
+    "calibrated up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
+)
+"""Cautions where a vehicle is far from the one its spring and damper were fitted to; a report's page says the same."""
+
+
+def check_complete(entries: Entries) -> None:
+    """Report missing entries, entries given twice, and axes beside a table."""
+    # What a table that could not be read may contain is unknown.
+    unread_table = entries.root.get("table") is not None and entries.table is None
+    present = {field.path for field in fields.INPUTS if field.name in entries.listed} | entries.given
+    for field in fields.INPUTS:
+        if field.name in entries.listed and field.path in entries.given:
+            entries.report(field.path, f"is given here and as column {field.name} of the table; remove one")
+        if field.name == "boulder_density_kg_m3" and entries.gives_mass:
+            continue  # that of most rocks is assumed
+        if not field.optional and not unread_table and field.path not in present | entries.misspelled:
+            entries.report(field.path, "is required and missing")
+    _check_embedment(entries, present, unread_table)
+    if entries.root.get("table") is not None:
+        for name, leaf in entries.leaves.items():
+            if leaf.is_axis:
+                message = "must be one value beside a table; lists and ranges are axes of a grid"
+                entries.problems.add(leaf.position, BY_NAME[name].path, message)
+
+
+def _check_embedment(entries: Entries, present: set[str], unread_table: bool) -> None:
+    ways = [BY_NAME[name] for name in fields.EMBEDMENT]
+    given = [field.path for field in ways if field.path in present]
+    keys = " or ".join(field.key for field in ways)
+    if len(given) > 1:
+        entries.report(given[1], f"give {keys}, not both")
+    elif not given and not unread_table and not {field.path for field in ways} & entries.misspelled:
+        entries.problems.add(entries.position_of(ways[0].path), "site", f"{keys} is required and missing")
+
+
+def check_pairs(entries: Entries) -> None:
+    """Report contradictory single values; those of axes and tables are reported row by row in the result."""
+    bumper, hood = entries.single("bumper_height_m"), entries.single("hood_height_m")
+    if bumper is not None and hood is not None and hood < bumper:
+        key = "hood_height" if "vehicle.hood_height" in entries.given else "bumper_height"
+        entries.report(f"vehicle.{key}", f"the hood ({hood:g} m) is lower than the bumper ({bumper:g} m)")
+    _check_impact_height(entries, bumper)
+    _check_second_spring(entries)
+    _check_shape(entries)
+    _check_mass(entries)
+    _check_solver(entries)
+    _check_uncertain(entries)
+    _check_ground(entries)
+
+
+def _check_impact_height(entries: Entries, bumper: float | None) -> None:
+    height, depth = entries.single("boulder_height_m"), entries.single("embedment_depth_m")
+    ratio, impact = entries.single("embedment_ratio"), entries.single("impact_height_m")
+    if depth is None and ratio is not None and height is not None:
+        depth = ratio * height
+    if height is None or depth is None or impact is None or bumper is None:
+        return
+    exposed = height - depth
+    if exposed > bumper and impact > exposed * (1 + 1e-12):
+        message = f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
+        entries.problems.add(entries.leaves["impact_height_m"].position, "site.impact_height", message)
+
+
+def _check_second_spring(entries: Entries) -> None:
+    """Report half of a second spring, and one that is softer than the first."""
+    both = [BY_NAME[name] for name in SECOND_SPRING_COLUMNS]
+    given = [field for field in both if field.path in entries.given or field.name in entries.listed]
+    if len(given) == 1:
+        lacking = next(field for field in both if field not in given)
+        entries.report(given[0].path, f"needs {lacking.key} beside it")
+    spring, second = entries.single("vehicle_spring_N_m"), entries.single(both[0].name)
+    if spring is not None and second is not None and second < spring:
+        message = f"{second:g} N/m is softer than the first spring of {spring:g} N/m; a front that softens is refused"
+        entries.report(both[0].path, message)
+
+
+def shape_in(entries: Entries) -> Shape:
+    """Return the shape of the boulders, as far as it can be read."""
+    return Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
+
+
+def _check_shape(entries: Entries) -> None:
+    """Report plastic soil beside a boulder that is no box."""
+    key = "profile" if "profile" in entries.settings else "taper"
+    if not shape_in(entries).is_box and entries.settings.get("unloading", UNLOADINGS[0]) != UNLOADINGS[0]:
+        message = f"plastic soil knows boxes only; remove boulder.{key} or model.unloading"
+        entries.report(f"boulder.{key}", message)
+
+
+def _check_mass(entries: Entries) -> None:
+    """Report boulders that are all heavier than solid boxes of their size."""
+    density = entries.values("boulder_density_kg_m3")
+    sides = [entries.values(f"boulder_{side}_m") for side in ("length", "width", "height")]
+    mass = entries.values(BOULDER_MASS)
+    if not all(map(len, (mass, *sides))):
+        return
+    assumed = "" if len(density) else " assumed for it (give boulder.density)"
+    rock = float(density.max()) if len(density) else ROCK_KG_M3
+    shape = shape_in(entries)
+    box = rock * math.prod(float(side.max()) for side in sides) * shape.filled
+    solid = "a solid box of this size" if shape.is_box else "solid rock of this profile"
+    if mass.min() > MOST_SOLIDITY * box:
+        message = (
+            f"{mass.min():g} kg is {mass.min() / box:.2f} times the mass of {solid}, {box:.6g} kg at "
+            f"the density of {rock:g} kg/m^3{assumed}; at most {MOST_SOLIDITY:g} times can be a mistake of measurement"
+        )
+        entries.report("boulder.mass", message)
+
+
+def _check_solver(entries: Entries) -> None:
+    step, horizon = entries.settings.get("step_s"), entries.settings.get("horizon_s", SolverSettings().horizon_s)
+    if {"solver.accuracy", "solver.step"} <= entries.given:
+        entries.report("solver.step", "give accuracy or step, not both")
+    elif step is not None and step > horizon:
+        entries.report("solver.step", f"is longer than the horizon of {horizon:g} s")
+
+
+def _check_uncertain(entries: Entries) -> None:
+    """Report a correlation without two distributions, and a partial factor beside a distribution."""
+    uncertain = {name for name, leaf in entries.leaves.items() if leaf.distribution is not None}
+    pair = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
+    if "correlation" in entries.settings and not pair <= uncertain and pair <= set(entries.leaves):
+        message = "needs a distribution of soil.friction_angle and one of soil.subgrade_reaction"
+        entries.report("soil.correlation", message)
+    if "partial_factor" in entries.settings and "friction_angle_deg" in uncertain:
+        message = "give a partial factor or a distribution of soil.friction_angle, not both"
+        entries.report("partial_factor.friction_angle", message)
+
+
+def uppermost_is_wet(layers: Sequence[Layer], water_table_m: float) -> bool:
+    """Return whether the water table lies in the uppermost layer of the soil, which `layers` leaves out."""
+    return not layers or layers[0].from_m > water_table_m
+
+
+def _check_ground(entries: Entries) -> None:
+    """Report ground that falls as steeply as its friction angle, and soil that would float below the water table."""
+    layers = entries.settings.get("layers", ())
+    slope, water = entries.settings.get("slope_deg", 0.0), entries.settings.get("water_table_m")
+    if slope > 0.0:
+        factor = entries.settings.get("partial_factor", 1.0)
+        angles = [*entries.values("friction_angle_deg"), *(layer.friction_angle_deg for layer in layers)]
+        least = math.degrees(math.atan(math.tan(math.radians(min(angles))) / factor)) if len(angles) else math.inf
+        if slope >= least:
+            message = f"must be less than every friction angle (the least is {least:.4g} deg), {SLIDES}"
+            entries.report("soil.slope", message)
+    if water is not None:
+        top_is_wet = uppermost_is_wet(layers, water)
+        bottoms = [*(layer.from_m for layer in layers[1:]), math.inf]
+        densities = [layer.density_kg_m3 for layer, bottom in zip(layers, bottoms, strict=False) if bottom > water]
+        densities += [*entries.values("soil_density_kg_m3")] if top_is_wet else []
+        if densities and min(densities) <= WATER_KG_M3:
+            message = FLOATS.format(value=f"{min(densities):g} kg/m^3")
+            entries.report("soil.water_table", message)
+
+
+def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Problem]:
+    """Yield a note for every unusual value and for data that do not belong together.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        Valid settings.
+    positions : mapping of str to Position
+        Position of each input in the file, by its dotted key.
+    """
+    for path, message in _remarks(sweep):
+        if message:
+            at = positions.get(path, Position(str(sweep.path)))
+            yield Problem(at.file, at.line, at.column, path, message)
+
+
+def _remarks(sweep: Sweep) -> Iterator[tuple[str, str]]:
+    """Yield dotted keys, and what is to be remarked of each; empty where nothing is."""
+    values = {name: np.array([value]) for name, value in sweep.constants.items()}
+    groups = [axis.columns for axis in sweep.axes] + ([] if sweep.table is None else [sweep.table.columns])
+    for group in groups:
+        values |= group
+    for name, of_input in values.items():
+        yield BY_NAME[name].path, _unusual(name, of_input)
+    for axis in sweep.axes:
+        if len(set(axis.values.tolist())) < len(axis.values):
+            yield BY_NAME[axis.name].path, "contains a value more than once"
+    if "embedment_depth_m" in values:
+        depth, height = _pairs(values, groups, "embedment_depth_m", "boulder_height_m")
+        ratio = depth / height
+        off = _without_partner(_outside(ratio, BY_NAME["embedment_ratio"]))
+        if off.any():
+            yield "site.embedment_depth", f"depth over height: {_unusual('embedment_ratio', ratio[off])}"
+    yield "boulder.mass", _on_mass(values, groups, sweep.model)
+    yield "vehicle.spring", _off_front(values, groups, sweep.model.calibrated_crush_m)
+    if not sweep.model.shape.stands_flat:
+        foot = "its foot is less than half as wide or long as the largest section"
+        yield "boulder", f"{foot}: undecided (foot), {WAY_OUT['foot']}"
+    limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
+    if usual is not None and limit > usual.high:
+        yield "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}"
+    if sweep.partial_factor != 1.0:
+        angles = values["friction_angle_deg"]
+        ends = f"{angles.min():.4g}" if angles.min() == angles.max() else f"{angles.min():.4g} to {angles.max():.4g}"
+        message = f"tan(friction angle) is divided by {sweep.partial_factor:g}: simulated and listed as {ends} deg"
+        yield "partial_factor.friction_angle", message
+    angle, reaction = _pairs(values, groups, "friction_angle_deg", "subgrade_reaction_MN_m3")
+    yield "soil.subgrade_reaction", _off_families(angle, reaction) or _mixed_families(angle, reaction)
+
+
+def _on_mass(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], model: Model) -> str:
+    """Return what is assumed of boulders that were weighed, and whether no box stands for them."""
+    if BOULDER_MASS not in values:
+        return ""
+    names = (BOULDER_MASS, "boulder_density_kg_m3", *SIDES)
+    listed = next((group for group in groups if len(group) > 1 and BOULDER_MASS in group), {})
+    if all(name in listed or len(values[name]) == 1 for name in names):
+        mass, rock, *sides = (values[name] for name in names)
+        solidity = mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0))
+    else:
+        ends = [(float(values[name].min()), float(values[name].max())) for name in names]
+        solidity = np.array([ends[0][i] / math.prod(end[1 - i] for end in ends[1:]) for i in range(2)])
+    fills = describe_share(solidity.min(), solidity.max())
+    words = [f"by its mass a boulder fills {fills} of the box of its length, width and height"]
+    if model.rock_assumed:
+        words[0] += f" if its rock has {ROCK_KG_M3:g} kg/m^3, which is assumed: give boulder.density. No pass is robust"
+    if solidity.min() < LEAST_SOLIDITY and model.shape.is_box:
+        words.append(f"below {LEAST_SOLIDITY:.0%} designs are undecided (shape): {WAY_OUT['shape']}")
+    return "; ".join(words) if len(words) > 1 or model.rock_assumed else ""
+
+
+def describe_share(low: float, high: float) -> str:
+    """Return a range of shares in per cent."""
+    ends = f"{low:.0%}", f"{high:.0%}"
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+
+
+def _pairs(
+    values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], one: str, other: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pairs of two inputs that occur, shape (n,) where they are listed together, (n, m) where crossed."""
+    for group in groups:
+        if one in group and other in group:
+            return group[one], group[other]
+    ones, others = np.meshgrid(_thinned(values[one]), _thinned(values[other]))
+    return ones, others
+
+
+def wall_crush(mass: np.ndarray, speed: np.ndarray, spring: np.ndarray, damper: np.ndarray) -> np.ndarray:
+    """Return by how much the front of a vehicle is crushed against a rigid wall (Eqs 49 to 51) [m].
+
+    Parameters
+    ----------
+    mass, speed, spring, damper : ndarray
+        Of vehicles, in SI units, in shapes that broadcast against each other.
+    """
+    by_damper = mass * speed / damper
+    decay, squared = -0.5 * spring / damper, spring / mass - (0.5 * spring / damper) ** 2
+    b = np.sqrt(np.maximum(squared, 0.0))
+    # An over-damped vehicle only comes to rest with its spring released.
+    stops = np.arctan2(b, decay)
+    by_spring = speed * np.exp(decay * stops / np.where(b > 0.0, b, np.inf)) * np.sin(stops)
+    return by_damper + np.where(b > 0.0, by_spring / np.where(b > 0.0, b, 1.0), 0.0)
+
+
+def _off_front(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], calibrated: float) -> str:
+    """Return a caution if a vehicle's front would be crushed far from what spring and damper were fitted to.
+
+    The crush grows with mass and speed, and falls with spring and damper, so the ends of axes suffice.
+    """
+    if "vehicle_second_spring_N_m" in values:
+        return ""  # its front is no single spring and damper
+    listed = [group for group in groups if len(group) > 1 and set(group) & set(_FRONT)]
+    front = []
+    for name in _FRONT:
+        index = next((k for k, group in enumerate(listed) if name in group), None)
+        ends = values[name] if index is not None else np.array([values[name].min(), values[name].max()])
+        dimension = _FRONT.index(name) if index is None else len(_FRONT) + index
+        front.append(ends.reshape([-1 if k == dimension else 1 for k in range(len(_FRONT) + len(listed))]))
+    crush = wall_crush(*front)
+    largest, words = float(crush.max()), BEYOND_FRONT
+    up_to = "" if crush.min() == largest else "up to "
+    if largest <= MOST_CRUSH * calibrated:
+        largest, words, up_to = float(crush.min()), SHORT_OF_FRONT, ""
+        if largest >= LEAST_CRUSH * calibrated:
+            return ""
+    return words.format(crush=f"{up_to}{largest:.3g} m", calibrated=f"{calibrated:g} m")
+
+
+def _without_partner(off: np.ndarray) -> np.ndarray:
+    """Return which pairs are off; of crossed axes, which make pairs nobody means, those with a value always off."""
+    return off if off.ndim == 1 else off & (off.all(axis=0, keepdims=True) | off.all(axis=1, keepdims=True))
+
+
+def _outside(values: np.ndarray, field: Field) -> np.ndarray:
+    """Return which values lie outside the range met in practice, bool."""
+    if field.usual is None:
+        return np.zeros(values.shape, dtype=bool)
+    slack = 1e-9 * field.usual.high
+    return (values < field.usual.low - slack) | (values > field.usual.high + slack)
+
+
+def _unusual(name: str, values: np.ndarray) -> str:
+    """Return a note if a value lies outside the range met in practice."""
+    usual, unit = BY_NAME[name].usual, BY_NAME[name].unit
+    if usual is None or not _outside(values, BY_NAME[name]).any():
+        return ""
+    low, high = float(values.min()), float(values.max())
+    given = describe(low, unit) if low == high else f"{low:.6g} to {describe(high, unit)}"
+    ends = f"{usual.low:g} to {describe(usual.high, unit)}"
+    return f"{given} is outside the usual range of {ends} ({usual.remark}); {_outcome(name, low, high)}"
+
+
+def _outcome(name: str, low: float, high: float) -> str:
+    """Return what becomes of designs with unusual values."""
+    if name != "embedment_ratio" or high < 1.0:
+        return "computed as given"
+    if low < 1.0:
+        return "designs of 1 or more cannot be computed, since the depth must be less than the boulder's height"
+    return "cannot be computed, since the depth must be less than the boulder's height"
+
+
+def _off_families(angle: np.ndarray, reaction: np.ndarray) -> str:
+    """Return a note if some soil constants belong to neither family of data."""
+    off = _without_partner(off_families(angle, reaction))
+    if not off.any():
+        return ""
+    phi, beta = angle[off][0], reaction[off][0]
+    curves = f"Terzaghi's values give {terzaghi_curve(phi):.2g}, the API curve {api_curve(phi):.2g}"
+    return f"{beta:g} MN/m^3 does not go with {phi:g} deg: {curves} MN/m^3; take both soil constants from one source"
+
+
+def _mixed_families(angle: np.ndarray, reaction: np.ndarray) -> str:
+    """Return a note if some soils follow Terzaghi's values and others the API curve."""
+    pairs = angle.ravel(), reaction.ravel()
+    near_api = np.abs(np.log(pairs[1] / api_curve(pairs[0]))) < np.abs(np.log(pairs[1] / terzaghi_curve(pairs[0])))
+    if near_api.all() or not near_api.any():
+        return ""
+    one, other = np.flatnonzero(near_api)[-1], np.flatnonzero(~near_api)[0]
+    return (
+        "two families of data are mixed: "
+        f"{pairs[1][one]:g} MN/m^3 at {pairs[0][one]:g} deg lies near the API curve, "
+        f"{pairs[1][other]:g} MN/m^3 at {pairs[0][other]:g} deg near Terzaghi's values, which are "
+        "several times smaller for the same soil; take both soil constants from one source"
+    )
+
+
+def _thinned(values: np.ndarray) -> np.ndarray:
+    """Return at most 200 values, ends included."""
+    return values if len(values) <= 200 else values[np.linspace(0, len(values) - 1, 200).astype(int)]

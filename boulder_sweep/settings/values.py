@@ -1,0 +1,404 @@
+"""From text to numbers, as engineers write them: a value with or without a unit, a list, a range with exact steps.
+
+A number is kept as an exact fraction of its decimal digits, so that ``0.40 + 15 * 0.02`` is 0.70 to the bit.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from boulder_sweep.settings.fields import Field
+from boulder_sweep.settings.problems import (
+    LeafError,
+    Mistake,
+    Mistakes,
+    Position,
+    did_you_mean,
+    shorten,
+    unknown_word,
+    wrong,
+)
+from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+
+MAX_AXIS = 1_000_000
+"""Most values on one axis."""
+
+OUTSIDE = "{value} is outside the admitted range of {low} to {high} ({reason})"
+"""Why a value is not admitted; the page of a report says the same."""
+
+RANGE_KEYS = ("from", "to", "count", "step")
+_TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
+
+_NUMBER = re.compile(r"([+-]?)(\d*)(?:\.(\d*))?(?:[eE]([+-]?\d+))?", re.ASCII)
+_YES_NO = frozenset({"true", "false", "yes", "no", "on", "off", "y", "n"})
+_NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)\b.*", re.IGNORECASE)
+_FEET_AND_INCHES = re.compile(r"[+-]?[\d.]+\s*['′](?!\d{3}).*|[+-]?[\d.]+\s*(\"|″|'')")
+EMPTY, NOT_A_NUMBER = "is empty", "is not a number"
+"""What may be wrong with a number; the page of a report says the same."""
+_MAX_DIGITS = 40
+_MAX_EXPONENT = 300
+
+
+class NumberError(ValueError):
+    """Not the kind of number that is needed; the message says what is allowed."""
+
+
+class Quantity(NamedTuple):
+    """An exact number in the unit of the table, and whether it was given with a unit."""
+
+    value: Fraction
+    has_unit: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Leaf:
+    """Values of one entry in the unit of the table.
+
+    Attributes
+    ----------
+    values : ndarray of float64, shape (n,)
+        The values in the order given.
+    is_axis : bool
+        Whether it was written as a list or range (an axis of the grid) or as one value.
+    position : Position
+        Where it stands.
+    """
+
+    values: np.ndarray
+    is_axis: bool
+    position: Position
+
+
+def read_leaf(node: Node, field: Field) -> Leaf:
+    """Return the values of an entry.
+
+    Parameters
+    ----------
+    node : Node
+        ``1.65 m``, ``[36, 40] deg``, ``[36 deg, 40 deg]``, ``{from: 1 m, to: 3 m, count: 5}`` or
+        ``{from: 0.4, to: 0.7, step: 0.02}``.
+    field : Field
+        What it is about.
+
+    Raises
+    ------
+    LeafError
+        With every mistake of this entry.
+    """
+    node = _unfold_text_list(node)
+    if isinstance(node, Mapping):
+        return Leaf(np.array(_read_range(node, field)), True, node.position)
+    items: list[Node] = [node]
+    unit = None
+    if isinstance(node, Sequence):
+        items, unit = node.items, node.unit
+    if not items:
+        raise wrong(node.position, "the list is empty; give at least one value")
+    if len(items) > MAX_AXIS:
+        raise wrong(node.position, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")
+    values = _check_values(_read_all(items, field, unit), items, field)
+    return Leaf(np.array(values), isinstance(node, Sequence), node.position)
+
+
+def read_single(node: Node, field: Field) -> float:
+    """Return the one value of an entry that cannot be an axis, within its admitted range.
+
+    Raises
+    ------
+    LeafError
+        Not one number, wrong unit, or outside the admitted range.
+    """
+    if not isinstance(node, Scalar):
+        raise wrong(node.position, "takes one value here, not a list or a range")
+    (value,) = _check_values([read_quantity(node, field.unit, sample=sample_of(field))], [node], field)
+    return value
+
+
+def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mistakes) -> dict[str, float]:
+    """Return the single values of a block by their keys; unknown keys and wrong values go to `mistakes`.
+
+    Raises
+    ------
+    LeafError
+        It is no block.
+    """
+    if not isinstance(node, Mapping) or node.unit is not None:
+        raise wrong(node.position, f"{what} must be a block of keys: {', '.join(known)}")
+    values: dict[str, float] = {}
+    for entry in node:
+        field = known.get(entry.key)
+        if field is None:
+            mistakes.add(entry.position, unknown_word(entry.key, f"a key of {what}", known))
+            continue
+        try:
+            values[entry.key] = read_single(entry.value, field)
+        except LeafError as error:
+            for found in error.mistakes:
+                mistakes.add(found.position, f"{entry.key}: {found.message}")
+    return values
+
+
+def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
+    """Return the single values of a block by the names of its fields.
+
+    Raises
+    ------
+    LeafError
+        With every mistake in it, see `read_entries`.
+    """
+    mistakes = Mistakes()
+    values = read_entries(node, known, what, mistakes)
+    mistakes.raise_if_any()
+    return {known[key].name: value for key, value in values.items()}
+
+
+def sample_of(field: Field) -> str:
+    """Return the value that a message about an entry suggests: its default; empty where it has none."""
+    return "" if field.default is None else describe(field.default, field.unit)
+
+
+def outside(value: float, field: Field) -> str:
+    """Return why a value is not admitted, empty if it is."""
+    bound = field.admitted
+    if bound is None or bound.low <= value <= bound.high:
+        return ""
+    high = describe(bound.high, field.unit)
+    return OUTSIDE.format(value=describe(value, field.unit), low=f"{bound.low:g}", high=high, reason=bound.reason)
+
+
+def _unfold_text_list(node: Node) -> Node:
+    """Turn the text ``"[36, 40] deg"`` in quotation marks into the list it stands for."""
+    if not isinstance(node, Scalar):
+        return node
+    match = _TEXT_LIST.fullmatch(node.text)
+    if match is None:
+        return node
+    items: list[Node] = [Scalar(node.position, part) for part in match[1].split(",")] if match[1].strip() else []
+    unit = match[2].strip()
+    return Sequence(node.position, items, Scalar(node.position, unit) if unit else None)
+
+
+def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quantity]:
+    """Read every number of an entry; all of them with a unit or none."""
+    quantities: list[Quantity] = []
+    mistakes = Mistakes()
+    for item in items:
+        with mistakes:
+            quantities.append(read_quantity(item, field.unit, unit, sample_of(field)))
+    if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:
+        bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.has_unit)
+        message = f"{quoted(bare)} has no unit while the others have one; give all of them a unit, or none"
+        mistakes.add(bare.position, message)
+    unlike: dict[str, Mistake] = {}  # the same mistake in many values is reported once
+    for mistake in mistakes:
+        unlike.setdefault(mistake.message, mistake)
+    Mistakes(unlike.values()).raise_if_any()
+    return quantities
+
+
+def _check_values(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
+    """Return the values; every one of them must be admitted."""
+    values = [_to_float(quantity.value) for quantity in quantities]
+    mistakes = Mistakes()
+    for node, value in zip(nodes, values, strict=True):
+        problem = outside(value, field)
+        if problem:
+            mistakes.add(node.position, problem)
+    mistakes.raise_if_any()
+    return values
+
+
+def _read_range(node: Mapping, field: Field) -> list[float]:
+    """Return the values of ``{from, to, count}`` or ``{from, to, step}``."""
+    _check_range_keys(node)
+    given = [entry for entry in node if entry.key != "count"]
+    quantities = _read_all([entry.value for entry in given], field, node.unit)
+    exact = {entry.key: quantity for entry, quantity in zip(given, quantities, strict=True)}
+    ends = [key for key in exact if key != "step"]
+    _check_values([exact[key] for key in ends], [node.entries[key].value for key in ends], field)
+    first, last = exact["from"].value, exact["to"].value
+    if "step" in exact:
+        position = node.entries["step"].value.position
+        return spread(first, last, _count_of_step(first, last, exact["step"].value, field.unit, position))
+    of_count = node.entries["count"].value
+    count = read_count(of_count, "count", MAX_AXIS)
+    if count == 1 and first != last:
+        message = "a count of 1 cannot hold both ends of the range; give a count of 2 or more, or one value"
+        raise wrong(of_count.position, message)
+    return spread(first, last, count)
+
+
+def _check_range_keys(node: Mapping) -> None:
+    mistakes = Mistakes()
+    for entry in node:
+        if entry.key not in RANGE_KEYS:
+            hint = did_you_mean(entry.key, RANGE_KEYS)
+            message = f"'{shorten(entry.key)}' is not a key of a range (from, to, count or step){hint}"
+            mistakes.add(entry.position, message)
+    mistakes.raise_if_any()
+    missing = [key for key in ("from", "to") if key not in node.entries]
+    if missing:
+        raise wrong(node.position, f"the range lacks {' and '.join(missing)}")
+    if "count" in node.entries and "step" in node.entries:
+        raise wrong(node.entries["step"].position, "give count or step, not both")
+    if "count" not in node.entries and "step" not in node.entries:
+        raise wrong(node.position, "the range lacks count or step")
+
+
+def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str, position: Position) -> int:
+    """Return how many values the steps make; the last one must be the end of the range, exactly."""
+    if step == 0:
+        raise wrong(position, "step must not be 0")
+    steps = (last - first) / step
+    if steps < 0:
+        way = "downwards" if last < first else "upwards"
+        message = f"the range goes {way} and the step does not; swap from and to, or change the sign of the step"
+        raise wrong(position, message)
+    if steps >= MAX_AXIS:
+        raise wrong(position, f"this gives more than {MAX_AXIS} values, the limit for one axis; use a larger step")
+    if steps.denominator != 1:
+        below = first + math.floor(steps) * step
+        start, end, low, high = (describe(float(value), unit) for value in (first, last, below, below + step))
+        raise wrong(
+            position,
+            f"steps of {describe(float(step), unit)} from {start} do not end at {end} but at {low} or {high}; "
+            "use one of these for 'to', or give count",
+        )
+    return int(steps) + 1
+
+
+def spread(first: Fraction, last: Fraction, count: int) -> list[float]:
+    """Return `count` equidistant values from `first` to `last`, each the float nearest to its exact value."""
+    if count == 1:
+        return [float(first)]
+    common = first.denominator * last.denominator
+    start = first.numerator * last.denominator
+    span = last.numerator * first.denominator - start
+    # Integer over integer is rounded once, to the nearest float.
+    return [(start * (count - 1) + span * i) / (common * (count - 1)) for i in range(count)]
+
+
+def _to_float(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sample: str = "") -> Quantity:
+    """Return the number a node holds, converted to `unit`.
+
+    Parameters
+    ----------
+    node : Node
+        Must be a piece of text such as ``1.65``, ``6.5 ft`` or ``95 MN/m^3``.
+    unit : str
+        Unit of the table; the unit of a bare number.
+    outer_unit : Scalar, optional
+        Unit after the bracket of the list that holds the number.
+    sample : str
+        A value of the entry, which a message suggests; one of its unit by default.
+
+    Raises
+    ------
+    LeafError
+        Not a finite decimal number, or an unknown or unfit unit.
+    """
+    if not isinstance(node, Scalar):
+        kind = "a list" if isinstance(node, Sequence) else "a block"
+        raise wrong(node.position, f"one number is needed here, not {kind}")
+    try:
+        number, unit_text = split_number(node.text, unit, sample)
+        if outer_unit is not None:
+            if unit_text:
+                raise NumberError(
+                    f"'{shorten(node.text)}' has a unit and so has the list ('{shorten(outer_unit.text)}'); "
+                    "give one of them"
+                )
+            unit_text = outer_unit.text
+        return Quantity(number * factor(unit_text, unit) if unit_text else number, has_unit=bool(unit_text))
+    except (NumberError, UnitError) as error:
+        raise wrong(node.position, str(error)) from None
+
+
+def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]:
+    """Return the number at the beginning of a text and the rest, its unit; `sample`: see `read_quantity`.
+
+    Raises
+    ------
+    NumberError
+        The text does not begin with a plain, finite decimal number.
+    """
+    stripped = text.strip().replace("−", "-")
+    given = f"'{shorten(text)}'"
+    words = needed(unit, sample)
+    if not stripped or stripped in ("~", "null", "Null", "NULL"):
+        raise NumberError(f"{EMPTY}; {words}")
+    if stripped.lower() in _YES_NO:
+        raise NumberError(f"{given} is a yes/no value; {words}")
+    if _NOT_FINITE.fullmatch(stripped):
+        raise NumberError(f"{given} is not a finite number; {words}")
+    match = _NUMBER.match(stripped)
+    sign, whole, decimals, exponent = match.groups() if match else ("", "", None, None)
+    rest = stripped[match.end() :] if match else stripped
+    if not (whole or decimals):
+        raise NumberError(f"{given} {NOT_A_NUMBER}; {words}")
+    if whole == "0" and rest[:1].lower() in ("x", "o", "b"):
+        raise NumberError(f"{given} is not a decimal number; {words}")
+    if len(whole) > 1 and whole.startswith("0"):
+        raise NumberError(f"{given} begins with a zero, which some programs read as octal; remove the zero")
+    if _FEET_AND_INCHES.fullmatch(stripped):
+        raise NumberError(f"{given} is in feet and inches; write one number, such as 5.5 ft or 66 in")
+    if re.match(r"\s*[,;]\s+\d", rest) or rest[:1] == ";":
+        raise NumberError(f"{given} is not one number; write a list in brackets, such as [34, 38] deg")
+    if rest[:1] in (",", "_", "'", ".") or re.match(r"\s+\d", rest):
+        raise NumberError(
+            f"{given} is not a plain number; use a decimal point and no thousands separators, as in 6800.5"
+        )
+    if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
+        raise NumberError(f"{given} is not one number; {words}, or a range {{from: ..., to: ..., count: ...}}")
+    digits = whole + (decimals or "")
+    power = _MAX_EXPONENT + 1 if len(exponent or "") > 9 else int(exponent or 0)
+    if len(digits) > _MAX_DIGITS or abs(power) > _MAX_EXPONENT:
+        raise NumberError(f"{given} has too many digits or too large an exponent")
+    value = Fraction(int(digits)) * Fraction(10) ** (power - len(decimals or ""))
+    return (-value if sign == "-" else value), rest.strip()
+
+
+def read_count(node: Node, what: str, largest: int) -> int:
+    """Return a whole number from 1 to `largest`.
+
+    Raises
+    ------
+    LeafError
+        Not a whole number, or outside that range.
+    """
+    if isinstance(node, Scalar) and re.fullmatch(r"[1-9]\d{0,17}", node.text.strip(), re.ASCII):
+        value = int(node.text)
+        if value <= largest:
+            return value
+    message = f"{quoted(node)} is not valid; {what} must be a whole number from 1 to {largest}"
+    raise wrong(node.position, message)
+
+
+def quoted(node: Node) -> str:
+    """Return the text of a node, to be quoted in a message; of a list or a block "this"."""
+    return f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
+
+
+def describe(value: float, unit: str) -> str:
+    """Return a value with its unit, for messages."""
+    return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
+
+
+def needed(unit: str, sample: str = "") -> str:
+    """Return what an entry takes whose bare numbers are in a unit of the table, with an example."""
+    expected = EXPECTED[unit]
+    return "a number is needed" if unit == "1" else f"{expected.words} is needed, such as {sample or expected.sample}"
