@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Control, Readings, SecondSpring, Status
+from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
 from boulder_kernels import verdict as verdicts
-from boulder_kernels.design import G
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.table import is_paired
 from boulder_kernels.verdict import OF_CRITERION, RULES
@@ -43,7 +42,7 @@ from boulder_sweep.settings.model import FEET, RESISTANCES, UNLOADINGS, WATER_KG
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text, shown_unit
 from boulder_sweep.settings.values import EMPTY, NOT_A_NUMBER, OUTSIDE, needed, sample_of
-from boulder_sweep.soils import SLICES, is_layered
+from boulder_sweep.soils import SLICES, ground_of, is_layered, layers_count, profile_of
 from boulder_sweep.views.wording import REASON_WORDS
 
 OUTCOME_WORDS = {
@@ -109,8 +108,7 @@ def page_data(
             if spec.name in OUTCOME_WORDS
         ],
         "start": dict(start),
-        "resistance": law,
-        "ground": {**ground.as_dict(), "is_proportional": ground.is_proportional, "water_kg_m3": WATER_KG_M3},
+        "soil": _soil(law, ground, shape, simulated),
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": [*zip(REASONS, REFUSED_AT, strict=True)],
         "refused": {"outside": OUTSIDE, "empty": EMPTY, "not_a_number": NOT_A_NUMBER},
@@ -126,7 +124,6 @@ def page_data(
             "profile": [] if shape.is_box else [astuple(point) for point in shape.points],
             "filled": shape.filled,
             "fixed": FIXED_SIDES if shape.taper is None else [],
-            "slices": SLICES,
             "rock_assumed": settings["model"].get("rock_assumed", False),
             "least_solidity": LEAST_SOLIDITY,
             "most_solidity": MOST_SOLIDITY,
@@ -250,6 +247,24 @@ def _packed(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 6, mtime=0)).decode()
 
 
+def _soil(law: str, ground: Ground, shape: Shape, control: Control) -> dict[str, Any]:
+    """The soil as it lies, as the kernel takes it; plastic soil is a layer also where it is uniform."""
+    lies, profile = ground_of(law, ground), profile_of(shape)
+    numbers = [float(value) for value in lies[:-1]]
+    return {
+        "ground": [
+            *(value if math.isfinite(value) else None for value in numbers),
+            float(not ground.is_proportional),
+            float(SLICES),
+        ],
+        "below": lies.below.ravel().tolist(),
+        "profile": profile.ravel().tolist(),
+        "deeper": len(lies.below),
+        "points": len(profile),
+        "layers": max(layers_count(law, ground, shape), int(control.unloading != ELASTIC)),
+    }
+
+
 def _layout() -> dict[str, Any]:
     """Order of the kernel's numbers, and the table column of each input."""
     return {
@@ -292,7 +307,6 @@ def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
         "rotation": math.radians(rotation),
         "crush": model["calibrated_crush_m"],
         "overlap": TESTED_OVERLAP_M,
-        "gravity": G,
         "usual": {name: usual_range(name) for name in (*SIZES, "embedment_ratio")},
         "soil": {
             "angle": ANGLES.tolist(),

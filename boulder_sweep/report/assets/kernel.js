@@ -10,9 +10,11 @@
  */
 
 /**
- * The soil of a design: its layers, none in a uniform elastic soil beside a box, and the outline of a boulder that is no
- * box, point by point.
- * @typedef {{layers: number[], outline: number[]}} Soil
+ * The soil of all designs as it lies, numbers in the kernel's order: what holds for all of it, null for a water table out
+ * of reach, and the deeper layers; points of the profile of boulders that are no boxes; and how many deeper layers and
+ * points there are, and how many layers the kernel makes of them. Written by Python.
+ * @typedef {{ground: (number | null)[], below: number[], profile: number[], deeper: number, points: number,
+ *   layers: number}} Soil
  */
 
 /**
@@ -33,11 +35,13 @@ class Kernel {
   /**
    * @param {WebAssembly.Instance} instance
    * @param {Layout} layout
+   * @param {Soil} soil
    */
-  constructor(instance, layout) {
+  constructor(instance, layout, soil) {
     /** @type {any} */
     this.exports = instance.exports;
     this.layout = layout;
+    this.soil = soil;
     this.exports._initialize();
     /** Where the memory is free; the first two places are those of `call`. */
     this.base = Math.ceil(this.exports.__heap_base.value / 8) * 8;
@@ -46,10 +50,11 @@ class Kernel {
   /**
    * @param {string} packed the module
    * @param {Layout} layout
+   * @param {Soil} soil
    */
-  static async load(packed, layout) {
+  static async load(packed, layout, soil) {
     const { instance } = await WebAssembly.instantiate(await unpacked(packed));
-    return new Kernel(instance, layout);
+    return new Kernel(instance, layout, soil);
   }
 
   /**
@@ -71,17 +76,31 @@ class Kernel {
   }
 
   /**
-   * @param {number} layers of the soil of a design
-   * @param {number} points of its outline
    * @param {number[]} settings in the order of `Layout.settings`
-   * @param {number} [samples] of its motion
-   * @returns {number} how many numbers the kernel needs for the soil
+   * @param {number} n designs
+   * @param {number} [samples] of a motion
+   * @returns {number[]} lengths of the arrays for the soil: what is given, and room for layers, outlines and their numbers
    */
-  soilRoom(layers, points, settings, samples = 0) {
-    const { layer_room, piece_room, element_room, memory_room } = this.layout;
+  soilLengths(settings, n, samples = 0) {
+    const { layer, layer_room, piece_room, element_room, memory_room } = this.layout;
+    const { ground, below, profile, points, layers } = this.soil;
     const elements = settings[this.layout.settings.indexOf("elements")];
     const pieces = piece_room * (layers + points);
-    return Math.max(layer_room * layers, pieces, samples * (2 * elements + 1) + element_room * elements + memory_room);
+    const room = Math.max(layer_room * layers, pieces, samples * (2 * elements + 1) + element_room * elements + memory_room);
+    return [ground.length, below.length, profile.length, layer * layers * n, 4 * points * n, room];
+  }
+
+  /**
+   * Write the soil, and return the arguments of an exported function for it.
+   * @param {number[]} at addresses of the arrays of `soilLengths`
+   * @param {Float64Array[]} views of them
+   */
+  soilArguments(at, views) {
+    const { ground, below, profile, deeper, points, layers } = this.soil;
+    views[0].set(ground.map((one) => one ?? Infinity));
+    views[1].set(below);
+    views[2].set(profile);
+    return [at[0], at[1], deeper, at[2], points, at[3], layers, at[4], at[5]];
   }
 
   /**
@@ -98,26 +117,19 @@ class Kernel {
   /**
    * Simulate designs up to their verdict.
    * @param {KernelDesign[]} designs
-   * @param {Soil[]} soils of each, of as many layers and points for all
    * @param {number[]} settings in the order of `Layout.settings`
    * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome`
    */
-  outcomes(designs, soils, settings) {
-    const { design, outcome, layer } = this.layout;
+  outcomes(designs, settings) {
+    const { design, outcome } = this.layout;
     const n = designs.length;
-    const layers = soils.flatMap((one) => one.layers);
-    const outlines = soils.flatMap((one) => one.outline);
-    const [m, points] = n > 0 ? [layers.length / n / layer, outlines.length / n / 4] : [0, 0];
     const { at, views } = this.room([
-      2, design.length * n, layers.length, outlines.length, this.soilRoom(m, points, settings), settings.length,
-      outcome.length * n, outcome.length * n,
+      2, design.length * n, ...this.soilLengths(settings, n), settings.length, outcome.length * n, outcome.length * n,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
-    views[2].set(layers);
-    views[3].set(outlines);
-    views[5].set(settings);
-    this.call("outcomes", [at[1], n, at[2], m, at[3], points, ...at.slice(4)]);
-    return Object.fromEntries(outcome.map((name, k) => [name, views[6].slice(k * n, (k + 1) * n)]));
+    views[8].set(settings);
+    this.call("outcomes", [at[1], n, ...this.soilArguments(at.slice(2, 8), views.slice(2, 8)), ...at.slice(8)]);
+    return Object.fromEntries(outcome.map((name, k) => [name, views[9].slice(k * n, (k + 1) * n)]));
   }
 
   /**
@@ -141,25 +153,21 @@ class Kernel {
   /**
    * Simulate one design over time.
    * @param {KernelDesign} one
-   * @param {Soil} soil
    * @param {number[]} settings in the order of `Layout.settings`
    * @param {Float64Array} times ascending [s]
    * @returns {Motion}
    */
-  history(one, { layers, outline }, settings, times) {
-    const { design, history, layer } = this.layout;
+  history(one, settings, times) {
+    const { design, history } = this.layout;
     const n = times.length;
-    const [m, points] = [layers.length / layer, outline.length / 4];
     const { at, views } = this.room([
-      2, design.length, layers.length, outline.length, this.soilRoom(m, points, settings, n), settings.length, n, 6 * n,
-      2 * n, 4 * n, n, history.length * n, 2,
+      2, design.length, ...this.soilLengths(settings, 1, n), settings.length, n, 6 * n, 2 * n, 4 * n, n,
+      history.length * n, 2,
     ]);
     design.forEach((name, field) => (views[1][field] = one[name]));
-    views[2].set(layers);
-    views[3].set(outline);
-    views[5].set(settings);
-    views[6].set(times);
-    this.call("history", [at[1], at[2], m, at[3], points, at[4], at[5], n, ...at.slice(6)]);
+    views[8].set(settings);
+    views[9].set(times);
+    this.call("history", [at[1], ...this.soilArguments(at.slice(2, 8), views.slice(2, 8)), at[8], n, ...at.slice(9)]);
     const [found, centre] = views.slice(-2);
     const end = found.subarray(0, n).findIndex(Number.isNaN);
     const reached = end < 0 ? n : end;

@@ -430,7 +430,7 @@ class Page {
 async function main() {
   const data = JSON.parse(byId("data").textContent);
   const [kernel, plots, codes] = await Promise.all([
-    Kernel.load(data.kernel, data.layout),
+    Kernel.load(data.kernel, data.layout, data.soil),
     Plots.load(data.bokeh),
     data.rows === null ? new Uint8Array(0) : unpacked(data.rows.codes),
   ]);

@@ -13,7 +13,7 @@ const [WIDTH, NEAR, FAR] = [1, 2, 3];
 const BOX = [[0, 1, 0.5, 0.5], [1, 1, 0.5, 0.5]];
 
 /**
- * The outline of a boulder of a design: `boulder_sweep.soils.outlines_of`.
+ * The outline of a boulder of a design, to be drawn.
  * @param {Outline} profile as shares; without points that of a box
  * @param {{H: number, W: number, L: number}} sides [m]
  * @returns {Outline}
@@ -51,31 +51,6 @@ function facesOf(outline, blow) {
   };
 }
 
-/**
- * Layers cut into slices in which a law that depends on the width takes that of their middle:
- * `boulder_sweep.soils.beside_outlines`.
- * @param {number[]} layers six numbers for each, from the top down
- * @param {string} law
- * @param {KernelDesign} design
- * @param {Outline} outline
- * @param {number} slices of the buried depth
- * @returns {number[]}
- */
-function inSlices(layers, law, design, outline, slices) {
-  const { d } = design;
-  const given = Array.from({ length: layers.length / 6 }, (_, m) => layers.slice(6 * m, 6 * m + 6));
-  const cuts = Array.from({ length: slices - 1 }, (_, k) => (d * (k + 1)) / slices);
-  const bottoms = [...given.map(([to]) => to), ...cuts].sort((a, b) => a - b);
-  return bottoms.flatMap((bottom, m) => {
-    const top = m > 0 ? bottoms[m - 1] : 0;
-    const [, rho_s, phi, beta, pressure, slope] = given.find(([to]) => to > top) ?? given[given.length - 1];
-    const middle = 0.5 * (Math.min(top, d) + Math.min(bottom, d));
-    const local = resistanceFactor(law, { ...design, phi, W: atHeight(outline, WIDTH, d - middle) });
-    const factor = local / resistanceFactor(law, { ...design, phi });
-    return [bottom, rho_s, phi, beta, factor * pressure, factor * slope];
-  });
-}
-
 const SAMPLES = 400;
 /** A crush that no vehicle reaches [m]. */
 const NEVER = 1e300;
@@ -85,79 +60,6 @@ const BEFORE_THE_END = 1 - 1e-14;
 const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"];
 /** Those of the maxima, which are the same unless the boulder overturns. */
 const ERRORS = ["rotation_error_deg", "displacement_error_m"];
-
-/**
- * The soil where it is not the same at every depth or not level; written by Python.
- * @typedef {{from_m: number, density_kg_m3: number, friction_angle_deg: number, subgrade_reaction_MN_m3: number,
- *   cohesion_kPa: number}} Layer
- * @typedef {{layers: Layer[], cohesion_kPa: number, water_table_m: number | null, slope_deg: number,
- *   is_proportional: boolean, water_kg_m3: number}} Ground `is_proportional`: whether resistance grows with depth
- */
-
-/** @param {number} phi [rad] @returns {number} Rankine's coefficient of passive earth pressure */
-function passiveCoefficient(phi) {
-  return Math.tan(Math.PI / 4 + phi / 2) ** 2;
-}
-
-/**
- * The coefficient of a law of the soil's ultimate resistance over the paper's: `boulder_sweep.soils`.
- * @param {string} law
- * @param {KernelDesign} design
- * @returns {number}
- */
-function resistanceFactor(law, { phi, W, d }) {
-  const K_p = passiveCoefficient(phi);
-  if (law === "broms") return 3 / K_p;
-  if (law === "width_capped") return Math.min(1, (1 + (1.6 * (K_p - 1 / K_p) ** 0.67) / (1 + (5 * W) / d)) / K_p);
-  return 1;
-}
-
-/**
- * What a slope leaves of the resistance: `boulder_sweep.soils.slope_factor`.
- * @param {Ground} ground
- * @param {number} phi [rad]
- * @returns {number}
- */
-function slopeFactor({ slope_deg }, phi) {
-  const slope = slope_deg / DEGREES;
-  const falling = 1 - Math.sqrt((Math.sin(phi) * Math.sin(Math.max(phi - slope, 0))) / Math.cos(slope));
-  return slope ? ((1 - Math.sin(phi)) / falling) ** 2 : 1;
-}
-
-/**
- * The layers of the soil of a design as the kernel takes them: `boulder_sweep.soils.layers_of`.
- * @param {string} law
- * @param {Ground} ground
- * @param {KernelDesign} design
- * @param {number} gravity [m/s^2]
- * @returns {number[]} six numbers for each, from the top down
- */
-function layersOf(law, ground, design, gravity) {
-  const water = ground.water_table_m ?? Infinity;
-  const uppermost = { from: 0, rho_s: design.rho_s, phi: design.phi, beta: design.beta, cohesion: ground.cohesion_kPa };
-  const soils = [
-    uppermost,
-    ...ground.layers.map((layer) => ({
-      from: layer.from_m,
-      rho_s: layer.density_kg_m3,
-      phi: layer.friction_angle_deg / DEGREES,
-      beta: layer.subgrade_reaction_MN_m3,
-      cohesion: layer.cohesion_kPa,
-    })),
-  ];
-  const bounds = [...new Set([...soils.map(({ from }) => from), ...(water < Infinity ? [water] : [])])].sort((a, b) => a - b);
-  let stress = 0;
-  return bounds.flatMap((top, m) => {
-    const bottom = bounds[m + 1] ?? Infinity;
-    const { rho_s, phi, beta, cohesion } = soils.filter(({ from }) => from <= top).at(-1) ?? uppermost;
-    const K_p = passiveCoefficient(phi);
-    const factor = resistanceFactor(law, { ...design, phi }) * K_p * slopeFactor(ground, phi);
-    const weight = gravity * (rho_s - (top >= water ? ground.water_kg_m3 : 0));
-    const above = K_p * (stress - weight * top) + 2000 * cohesion * Math.sqrt(K_p);
-    stress += weight * (bottom - top);
-    return [bottom, rho_s, phi, beta, factor * above, factor * K_p * weight];
-  });
-}
 
 /**
  * Volume of a boulder over that of the box of its sides: `boulder_sweep.designs.solidity_of`.
@@ -207,7 +109,7 @@ class Simulator {
    * @returns {KernelDesign}
    */
   kernelDesign(inputs) {
-    const { layout, resistance, ground, boulder } = this.data;
+    const { layout, boulder } = this.data;
     /** @type {KernelDesign} */
     const design = Object.fromEntries(
       layout.design.map((/** @type {string} */ field) => {
@@ -219,30 +121,7 @@ class Simulator {
     if ("boulder_mass_kg" in inputs) design.rho_b = inputs.boulder_mass_kg / (design.L * design.W * design.H * boulder.filled);
     // Without a second spring it is like the first, from a crush on that is never reached.
     const springs = { k_2: design.k_2 ?? design.k_v, s_2: design.s_2 ?? NEVER };
-    const submerged = ground.water_table_m === 0 ? 1 - ground.water_kg_m3 / design.rho_s : 1;
-    const factor = slopeFactor(ground, design.phi) * submerged * resistanceFactor(resistance, design);
-    return { ...design, ...springs, K_epsilon: design.K_epsilon * (ground.is_proportional ? factor : 1) };
-  }
-
-  /**
-   * @param {KernelDesign} design
-   * @returns {Soil} without layers where it is elastic, beside a box, and its resistance grows with depth
-   */
-  soil(design) {
-    const { resistance, ground, rules, boulder } = this.data;
-    const { rho_s, phi, beta } = design;
-    const g = rules.tested.gravity;
-    const isBox = boulder.profile.length === 0;
-    const outline = outlineOf(boulder.profile, /** @type {any} */ (design));
-    /** @type {number[]} */
-    let layers = [];
-    if (!ground.is_proportional) layers = layersOf(resistance, ground, design, g);
-    else if (!isBox || this.data.settings[this.at("unloading")] > 0) {
-      layers = [Infinity, rho_s, phi, beta, 0, passiveCoefficient(phi) ** 2 * rho_s * g];
-    }
-    if (isBox) return { layers, outline: [] };
-    if (resistance === "width_capped") layers = inSlices(layers, resistance, design, outline, boulder.slices);
-    return { layers, outline: outline.flat() };
+    return { ...design, ...springs };
   }
 
   /** @param {Record<string, number>} inputs @returns {Outline} of the boulder [m] */
@@ -324,8 +203,7 @@ class Simulator {
     const names = decided.reason === "overturns" ? DECIDED : [...DECIDED, ...ERRORS];
     if (judged.verdict !== "error") for (const name of names) judged[name] = decided[name];
     const times = refusal === "" ? this.times : new Float64Array(0);
-    const one = this.kernelDesign(inputs);
-    return { judged, motion: this.kernel.history(one, this.soil(one), this.settings(beyond), times), inputs };
+    return { judged, motion: this.kernel.history(this.kernelDesign(inputs), this.settings(beyond), times), inputs };
   }
 
   /** @returns {Motion} of what is not simulated */
@@ -347,7 +225,7 @@ class Simulator {
   judged(designs, changed) {
     const complete = designs.map((design) => this.completed(design));
     const given = complete.map((one) => this.kernelDesign(one.inputs));
-    const outcomes = this.kernel.outcomes(given, given.map((one) => this.soil(one)), this.settings(changed));
+    const outcomes = this.kernel.outcomes(given, this.settings(changed));
     const { rules } = this.data;
     const rulings = this.kernel.rulings(outcomes, complete.map(({ inputs }) => inputs), rules.limits);
     return complete.map(({ inputs, refusal }, row) => {

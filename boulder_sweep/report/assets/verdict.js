@@ -21,7 +21,6 @@
  * @property {number} rotation [rad]
  * @property {number} crush [m]
  * @property {number} overlap [m]
- * @property {number} gravity [m/s^2]
  * @property {Record<string, [number, number]>} usual range of sizes, embedment ratio and density of rock
  * @property {{angle: number[], least: number[], most: number[]}} soil subgrade reaction [MN/m^3] over friction angle [deg]
  * @property {Record<string, string>} meanings of every flag, in their order
