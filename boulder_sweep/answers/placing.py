@@ -78,7 +78,7 @@ class Placing:
         PictureError
             It cannot be drawn.
         """
-        draw("stone", "draw_placing", self, path)
+        draw("scanned_stone", "draw_placing", self, path)
 
 
 def boulder_block(found: ScannedStone, own: Standing) -> str:

@@ -19,14 +19,14 @@ import click
 # `sweep --help` and `sweep check` are instant.
 from boulder_sweep.cli.ask import capacity, need, uncertainty
 from boulder_sweep.cli.compare import compare
-from boulder_sweep.cli.model import tradeoff, validate
 from boulder_sweep.cli.output import ready_streams, say
+from boulder_sweep.cli.quality import tradeoff, validate
 from boulder_sweep.cli.run import run, status
 from boulder_sweep.cli.settings_files import check, new
 from boulder_sweep.cli.share import explore, export, plot, report
 from boulder_sweep.cli.simulate import explain, simulate
 from boulder_sweep.cli.stone import stone
-from boulder_sweep.cli.vehicle import fit_vehicle, speed
+from boulder_sweep.cli.vehicle_commands import fit_vehicle, speed
 from boulder_sweep.errors import (
     EXIT_INTERNAL,
     EXIT_INTERRUPTED,

@@ -142,7 +142,7 @@ def refuse_unwritable(table: str | None, picture: str | None = None) -> None:
 
         checked_parquet(table)
     if picture is not None:
-        from boulder_sweep.views.figures import checked_kind, require_matplotlib
+        from boulder_sweep.views.pictures import checked_kind, require_matplotlib
 
         require_matplotlib()
         checked_kind(picture)

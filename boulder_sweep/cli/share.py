@@ -26,7 +26,7 @@ from boulder_sweep.locations import beside, location_of
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
-    from boulder_sweep.answers.files import AnswerFile
+    from boulder_sweep.answers.outputs import AnswerFile
 
 PLOT_EXAMPLES = """\b
 Examples:
@@ -67,9 +67,9 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
         if name in given:
             raise click.UsageError(f"--at {name} is given twice; give each column one value")
         given[name] = text
-    from boulder_sweep.answers.files import AnswerFile, result_of
+    from boulder_sweep.answers.outputs import AnswerFile, result_of
     from boulder_sweep.errors import PictureError
-    from boulder_sweep.views.figures import checked_kind, require_matplotlib
+    from boulder_sweep.views.pictures import checked_kind, require_matplotlib
     from boulder_sweep.views.slices import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
     from boulder_sweep.views.wording import terms_line
@@ -100,7 +100,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
 
 def _plot_answers(file: AnswerFile, target: Path, units: str, asked: Sequence[str]) -> int:
     """Draw a file of answers as its command does; which inputs are across and up follows from what varies."""
-    from boulder_sweep.answers.files import NEED, UNCERTAINTY
+    from boulder_sweep.answers.outputs import NEED, UNCERTAINTY
     from boulder_sweep.drawing import draw
 
     if asked:

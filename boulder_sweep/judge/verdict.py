@@ -1,6 +1,6 @@
 """From computed outcomes to pass, fail, undecided or error, with the reason.
 
-The rules, worst first; the first that applies decides the row. `boulder_kernels.verdict` applies them, for tables and
+The rules, worst first; the first that applies decides the row. `boulder_kernels.rules` applies them, for tables and
 for the page of a report:
 
 1. ``error``: the row could not be computed; the reason says why.
@@ -30,9 +30,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-import boulder_kernels.verdict as verdicts
+import boulder_kernels.rules as verdicts
 from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
-from boulder_kernels.verdict import OF_CRITERION, RULES, RULINGS, VerdictLimits, write_rulings
+from boulder_kernels.rules import OF_CRITERION, RULES, RULINGS, VerdictLimits, write_rulings
 from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, VERDICTS, Rows
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
@@ -73,7 +73,7 @@ class Limits(NamedTuple):
     rating: str
     """Required penetration rating, one of `RATINGS`."""
     criterion: Criterion = Criterion()
-    """Further limits, under the names that they have in `boulder_kernels.verdict.VerdictLimits`."""
+    """Further limits, under the names that they have in `boulder_kernels.rules.VerdictLimits`."""
     calibrated_crush: float = Model().calibrated_crush_m
     """Crush beyond which a row is flagged [m]."""
     tested_rotation: float = math.radians(TESTED_ROTATION_DEG["corrected"])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.files import CAPACITY, NEED
+from boulder_sweep.answers.outputs import CAPACITY, NEED
 from boulder_sweep.columns import GRADES, TO_BUILD
 from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS, meaning_of
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.files import CAPACITY, NEED, UNCERTAINTY, AnswerFile
 from boulder_sweep.answers.lightest import SIDES
 from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile
 from boulder_sweep.answers.search import BLOCKED, NEVER, WORDS
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS
 from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, Rows, condition_of, label_of

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from boulder_sweep.answers.files import MARKS, NEED, RUN, UNCERTAINTY, AnswerFile, answered, result_of
 from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.outputs import MARKS, NEED, RUN, UNCERTAINTY, AnswerFile, answered, result_of
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import Location, RemotePath, location_of

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status
-from boulder_kernels import verdict as verdicts
+from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status, rules
 from boulder_kernels.layered import PRESSURE_SLOPE
+from boulder_kernels.rules import OF_CRITERION, RULES
 from boulder_kernels.table import is_paired
-from boulder_kernels.verdict import OF_CRITERION, RULES
 from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.investigation import FAMILY_FACTOR, api_curve, terzaghi_curve
@@ -272,8 +271,8 @@ def _layout() -> dict[str, Any]:
         "settings": entry_points.SETTINGS,
         "outcome": entry_points.OUTCOME,
         "history": entry_points.HISTORY,
-        "sizes": [(SOURCES | OF_THE_PAGE).get(name, name) for name in verdicts.SIZES],
-        "rulings": verdicts.RULINGS,
+        "sizes": [(SOURCES | OF_THE_PAGE).get(name, name) for name in rules.SIZES],
+        "rulings": rules.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": entry_points.LAYER_ROOM,
         "piece_room": entry_points.PIECE_ROOM,

@@ -39,10 +39,10 @@ from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import LAST, PLASTIC_WITH_GAP, Memory, memory_of
+from boulder_kernels.rules import VerdictLimits, limits_in, write_rulings
 from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.time_history import sample_of, state_of
 from boulder_kernels.unloading import plastic_work, recall
-from boulder_kernels.verdict import VerdictLimits, limits_in, write_rulings
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its

@@ -10,7 +10,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from boulder_sweep.answers.files import AnswerFile, result_of
+from boulder_sweep.answers.outputs import AnswerFile, result_of
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by

@@ -20,7 +20,7 @@ from bokeh.plotting import figure
 from boulder_kernels import ELASTIC, Control
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import BOX, Shape
-from boulder_sweep.views.figures import VERDICTS
+from boulder_sweep.views.pictures import VERDICTS
 
 COLOURS = {**VERDICTS, "none": "#BBBBBB"}
 """Colours of verdicts, those of `sweep plot`."""

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.files import CAPACITY, NEED, UNCERTAINTY, AnswerFile, answered, kind_of, result_of
 from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile, answered, kind_of, result_of
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.impact.explanation import one_design

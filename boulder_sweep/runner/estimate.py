@@ -17,7 +17,7 @@ import numpy as np
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.runner.workers import COMMIT_EVERY_S
-from boulder_sweep.store.errors import DoesNotFitError
+from boulder_sweep.store.failures import DoesNotFitError
 from boulder_sweep.store.writer import ROWS_PER_PART
 from boulder_sweep.text import size_text
 

@@ -33,7 +33,7 @@ from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.pool import DASK, telling_start_failure
 from boulder_sweep.runner.summary import Progress, progress_of
 from boulder_sweep.runner.workers import Computation, Computed, Ended, InOrder, Message, Note, ThreadWorkers, Workers
-from boulder_sweep.store.errors import DamagedError, DoesNotFitError
+from boulder_sweep.store.failures import DamagedError, DoesNotFitError
 from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.provenance import cpu_name, file_metadata
 from boulder_sweep.store.writer import OutputFolder, StagedPart

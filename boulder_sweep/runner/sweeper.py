@@ -25,7 +25,7 @@ from boulder_sweep.runner.running import FINISHED, Report, Run, repeat_command
 from boulder_sweep.runner.running import resume_command as default_resume_command
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.runner.workers import COMMIT_EVERY_S
-from boulder_sweep.store.errors import NotASweepError
+from boulder_sweep.store.failures import NotASweepError
 from boulder_sweep.store.manifest import Manifest, check_own, load
 from boulder_sweep.store.opening import ClaimedFolder, claim_output
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
@@ -100,7 +100,7 @@ def run(
     Raises
     ------
     StoreError
-        `out` cannot be used, see `boulder_sweep.store.errors`; nothing has been computed then. `WriteError`
+        `out` cannot be used, see `boulder_sweep.store.failures`; nothing has been computed then. `WriteError`
         also when the disk fills up during the run: what is written is whole, and the run can be resumed.
     TypeError, ValueError
         An argument is of the wrong type, or a count is below one.

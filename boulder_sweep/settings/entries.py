@@ -129,7 +129,7 @@ class Entries:
         if node is None:
             return
         # The csv module is needed for tables only.
-        from boulder_sweep.settings.table import read_table
+        from boulder_sweep.settings.design_list import read_table
 
         if not isinstance(node, Scalar) or not node.text.strip():
             self.problems.add(node.position, "table", "must be the name of a .csv, .xlsx or .parquet file")

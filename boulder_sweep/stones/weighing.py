@@ -71,7 +71,7 @@ class ScannedStone:
         PictureError
             It cannot be drawn.
         """
-        draw("stone", "draw_stone", self, path)
+        draw("scanned_stone", "draw_stone", self, path)
 
     def to_dict(self, standings: Sequence[Standing] | None = None) -> dict[str, Any]:
         """Return everything as plain data, with some ways to stand; with all of them by default."""

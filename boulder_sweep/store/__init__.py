@@ -12,7 +12,7 @@ A folder contains
     A file that is not finished; exists for a moment only, or after a run was killed.
 """
 
-from boulder_sweep.store.errors import StoreError
+from boulder_sweep.store.failures import StoreError
 from boulder_sweep.store.reader import read
 from boulder_sweep.store.verify import RunStatus, status
 

@@ -20,7 +20,7 @@ from typing import BinaryIO
 
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.locations import Location
-from boulder_sweep.store.errors import LinkError
+from boulder_sweep.store.failures import LinkError
 
 MANIFEST_NAME = "_manifest.parquet"
 """A folder with such a file is the result of a run, see `manifest`."""

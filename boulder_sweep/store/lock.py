@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from boulder_sweep.locations import Location, RemotePath
-from boulder_sweep.store.errors import FolderInUseError, FolderRemovedError, LinkError, StoreError, WriteError
+from boulder_sweep.store.failures import FolderInUseError, FolderRemovedError, LinkError, StoreError, WriteError
 from boulder_sweep.store.files import LOCK_NAME
 
 HEARTBEAT_S = 10.0

@@ -23,7 +23,7 @@ from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OP
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.store import errors
+from boulder_sweep.store import failures
 from boulder_sweep.store.files import MANIFEST_NAME, PART_SUFFIX, hidden_name, part_name
 from boulder_sweep.store.provenance import IDENTITY_KINDS, Session
 from boulder_sweep.store.storage import Storage, storage_of
@@ -231,15 +231,15 @@ def load(folder: Location) -> Manifest:
         with storage_of(folder).open_manifest() as file:  # pyarrow takes no names that are not Unicode
             found = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
-        raise errors.NotASweepError(_no_result(folder)) from None
+        raise failures.NotASweepError(_no_result(folder)) from None
     except (OSError, pa.ArrowException) as problem:
-        raise errors.DamagedError(f"{path} cannot be read: {problem}") from problem
+        raise failures.DamagedError(f"{path} cannot be read: {problem}") from problem
     except ValueError as problem:  # a name of a column that is no text
-        raise errors.ImpossibleRecordsError(path, str(problem)) from None
+        raise failures.ImpossibleRecordsError(path, str(problem)) from None
     value = (found.metadata or {}).get(_KEY, b"")
     checksum, text = value[:64], value[64:]
     if hashlib.sha256(text).hexdigest().encode() != checksum:
-        raise errors.DamagedError(
+        raise failures.DamagedError(
             f"{path} is damaged: its checksum does not match. The parts beside it can still be read as a "
             f"table, but no run can resume from them"
         )
@@ -248,7 +248,7 @@ def load(folder: Location) -> Manifest:
         if _is_deep(content):
             raise ValueError("its records are nested too deeply")
     except (ValueError, RecursionError) as problem:
-        raise errors.ImpossibleRecordsError(path, str(problem)) from None
+        raise failures.ImpossibleRecordsError(path, str(problem)) from None
     try:
         manifest = _from_json(content)
         _check_claims(path, manifest)
@@ -258,7 +258,7 @@ def load(folder: Location) -> Manifest:
     except ValueError as unfamiliar:
         version = _version_of(content)
         why = shorten(str(unfamiliar), _LONGEST_REASON)
-        raise errors.OtherVersionError(path, why, None if version is None else shorten(version)) from None
+        raise failures.OtherVersionError(path, why, None if version is None else shorten(version)) from None
 
 
 def _check_claims(path: Location, manifest: Manifest) -> None:
@@ -271,26 +271,28 @@ def _check_claims(path: Location, manifest: Manifest) -> None:
     """
     rows, size, parts, merge = manifest.rows, manifest.rows_per_part, manifest.parts, manifest.merge
     if not (0 <= rows <= _MOST_ROWS and 1 <= size <= _MOST_ROWS):
-        raise errors.ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
+        raise failures.ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
     for name, part in (*parts.items(), *([] if merge is None else [(merge.name, merge.part)])):
         within = 0 <= part.first < part.stop <= rows and part.first // size == (part.stop - 1) // size
         own = part_name(part.first, part.stop, rows) if within else ""
         # The first tables named the first row only. More zeros would sort otherwise than the rows do.
         if not within or name not in (own, own.rpartition("-")[0] + PART_SUFFIX):
-            raise errors.ImpossibleRecordsError(path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}")
+            raise failures.ImpossibleRecordsError(
+                path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}"
+            )
         if part.bytes < 1 or not all(type(count) is int and count >= 0 for count in part.verdicts.values()):
-            raise errors.ImpossibleRecordsError(path, f"{name} with impossible counts")
+            raise failures.ImpossibleRecordsError(path, f"{name} with impossible counts")
     for (_, stop), (first, _) in pairwise(manifest.ranges):
         if first < stop:
-            raise errors.ImpossibleRecordsError(path, f"row {first} twice")
+            raise failures.ImpossibleRecordsError(path, f"row {first} twice")
     if merge is not None:
         if not all(isinstance(name, str) and name in parts for name in merge.replaced) or merge.name in parts:
-            raise errors.ImpossibleRecordsError(path, "a merge of parts that it does not have")
+            raise failures.ImpossibleRecordsError(path, "a merge of parts that it does not have")
         edges = sorted(edge for name in merge.replaced for edge in (parts[name].first, parts[name].stop))
         # Neighbours share an edge, each of which is there twice, and the ends are those of the merged part.
         ends = [merge.part.first, merge.part.stop]
         if [*edges[:1], *edges[-1:]] != ends or edges[1:-1:2] != edges[2:-1:2]:
-            raise errors.ImpossibleRecordsError(path, "a merge of other rows than it replaces")
+            raise failures.ImpossibleRecordsError(path, "a merge of other rows than it replaces")
     _check_kinds(path, "identity", manifest.identity, IDENTITY_KINDS)
 
 
@@ -304,7 +306,7 @@ def check_own(manifest: Manifest, folder: Location) -> None:
     """
     if manifest.differing:
         why = "; ".join(manifest.differing[:3]) + ("; ..." if len(manifest.differing) > 3 else "")
-        raise errors.OtherVersionError(
+        raise failures.OtherVersionError(
             folder / MANIFEST_NAME, shorten(why, 300), _version_of({"identity": manifest.identity})
         )
 
@@ -315,7 +317,7 @@ def _no_result(folder: Location) -> str:
         return f"there is no {folder}; the result of a run is a folder, such as m30-sizing.sweep"
     if folder.is_dir():
         return f"{folder} is not the result of a sweep (no {MANIFEST_NAME})"
-    if advice := errors.settings_file(folder):
+    if advice := failures.settings_file(folder):
         return advice
     around = folder.resolve().parent
     advice = "; `sweep report`, `plot`, `export` and `compare` take a file of answers"
@@ -421,7 +423,7 @@ def _check_kinds(path: Location, what: str, content: Any, kinds: Any) -> None:
     """
     if isinstance(kinds, type):
         if not isinstance(content, kinds):
-            raise errors.ImpossibleRecordsError(path, f"{what} that is {type(content).__name__}")
+            raise failures.ImpossibleRecordsError(path, f"{what} that is {type(content).__name__}")
         return
     _check_kinds(path, what, content, dict)
     for name in kinds.keys() & content.keys():

@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 from boulder_sweep.locations import Location
-from boulder_sweep.store import errors
+from boulder_sweep.store import failures
 from boulder_sweep.store.files import MANIFEST_NAME, is_kept, is_ours, is_part_name
 from boulder_sweep.store.manifest import Manifest, check_own, load, save
 from boulder_sweep.store.provenance import PREFIX, Session, differences
@@ -59,7 +59,7 @@ class ClaimedFolder:
             folder.manifest.sessions.append(session)
             save(folder.manifest, self._storage)
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self._storage.path}: {why(problem)}") from problem
+            raise failures.WriteError(f"cannot write into {self._storage.path}: {why(problem)}") from problem
         return folder
 
     def release(self) -> None:
@@ -74,7 +74,7 @@ class ClaimedFolder:
         if there.rows != manifest.rows:
             different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
         if different:
-            raise errors.SettingsDifferError(storage.path, different)
+            raise failures.SettingsDifferError(storage.path, different)
         there.identity = manifest.identity  # the heading of reports may be another
         recover_merge(there, storage)
         # Where the storage checks content itself, reading all of it again may take hours.
@@ -105,7 +105,7 @@ def claim_output(out: Location, *, resume: bool = False, overwrite: bool = False
         The folder cannot be used; see the classes in `errors` for the reasons.
     """
     if resume and overwrite:
-        raise errors.StoreError("--resume and --overwrite cannot be used together")
+        raise failures.StoreError("--resume and --overwrite cannot be used together")
     storage = storage_of(out)
     storage.make()
     lock = None
@@ -117,14 +117,14 @@ def claim_output(out: Location, *, resume: bool = False, overwrite: bool = False
             lock.release()
         storage.unmake()
         if isinstance(problem, OSError):
-            raise errors.WriteError(f"cannot write into {out}: {why(problem)}") from problem
+            raise failures.WriteError(f"cannot write into {out}: {why(problem)}") from problem
         raise
 
 
 def _locked(storage: Storage) -> Lock:
     """Lock the folder; an error names who else may hold it."""
     holder, host = "another run", None
-    with suppress(errors.StoreError):
+    with suppress(failures.StoreError):
         sessions = load(storage.path).sessions
         if sessions and sessions[-1].ended is None:
             last = sessions[-1]
@@ -140,23 +140,23 @@ def _allowed(storage: Storage, names: list[str], resume: bool, overwrite: bool) 
     there = None
     try:
         there = load(out)
-    except errors.NotASweepError:
+    except failures.NotASweepError:
         pass
-    except (errors.DamagedError, errors.OtherVersionError):
+    except (failures.DamagedError, failures.OtherVersionError):
         if not overwrite:
             raise
     parts = [name for name in names if is_part_name(name)]
     if there is None and not overwrite and parts:
-        raise errors.DamagedError(f"{out} contains parts but no {MANIFEST_NAME}; use --overwrite to start again")
+        raise failures.DamagedError(f"{out} contains parts but no {MANIFEST_NAME}; use --overwrite to start again")
     if there is None or overwrite:
         unknown = parts if there is None else [name for name in parts if name not in there.parts]
         foreign += [name for name in unknown if not _is_written_by_us(out / name)]
         if foreign:
-            raise errors.ForeignFilesError(out, foreign)
+            raise failures.ForeignFilesError(out, foreign)
     if there is not None and not overwrite:
         check_own(there, out)
     if there is not None and not (resume or overwrite):
-        raise errors.OutputExistsError(out, there.rows_done, there.rows)
+        raise failures.OutputExistsError(out, there.rows_done, there.rows)
     return there
 
 

@@ -18,7 +18,7 @@ from boulder_sweep.columns import COLUMNS, OUTCOMES, column_spec
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.store.errors import DamagedError, StoreError, refuse_to_guess
+from boulder_sweep.store.failures import DamagedError, StoreError, refuse_to_guess
 from boulder_sweep.store.manifest import Manifest, Part, load
 from boulder_sweep.store.provenance import judged_by
 from boulder_sweep.store.verify import load_checked, wrong_bytes

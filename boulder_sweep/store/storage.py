@@ -25,7 +25,7 @@ from stat import S_ISREG
 from typing import IO, Any, NamedTuple
 
 from boulder_sweep.locations import Location, RemotePath
-from boulder_sweep.store import errors
+from boulder_sweep.store import failures
 from boulder_sweep.store.files import (
     MANIFEST_NAME,
     PROBE_PREFIX,
@@ -78,14 +78,14 @@ class DiskStorage(_Storage):
         """Create the folder if it does not exist."""
         path = self.path
         if not path.parent.is_dir():
-            raise errors.StoreError(f"the folder {path.parent} does not exist: {path.name} cannot be created in it")
+            raise failures.StoreError(f"the folder {path.parent} does not exist: {path.name} cannot be created in it")
         try:
             path.mkdir()
         except FileExistsError:
             if not path.is_dir():
-                raise errors.StoreError(f"{path} is a file; the output of a sweep is a folder") from None
+                raise failures.StoreError(f"{path} is a file; the output of a sweep is a folder") from None
         except OSError as problem:
-            raise errors.WriteError(f"cannot create the folder {path}: {why(problem)}") from problem
+            raise failures.WriteError(f"cannot create the folder {path}: {why(problem)}") from problem
         else:
             self._is_made = True
 
@@ -169,11 +169,11 @@ class ObjectStorage(_Storage):
         """Create nothing, for folders exist by their files only."""
         try:
             if S_ISREG(self.path.stat().st_mode):
-                raise errors.StoreError(f"{self.path} is a file; the output of a sweep is a folder")
+                raise failures.StoreError(f"{self.path} is a file; the output of a sweep is a folder")
         except FileNotFoundError:
             pass
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
+            raise failures.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
 
     def unmake(self) -> None:
         """Do nothing."""
@@ -184,7 +184,7 @@ class ObjectStorage(_Storage):
             self._only_new = refuses_existing(self.path, self._token)
             self._lock = ObjectLock(self.path, self._token, self._only_new, holder)
         except OSError as problem:
-            raise errors.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
+            raise failures.WriteError(f"cannot write into {self.path}: {problem.strerror}") from None
         try:
             with suppress(FileNotFoundError):
                 self._version = newest(self.path).number
@@ -234,7 +234,7 @@ class ObjectStorage(_Storage):
         except FileNotFoundError:
             raise
         except OSError as problem:
-            raise errors.StoreError(f"{self.path} cannot be read: {problem.strerror}") from None
+            raise failures.StoreError(f"{self.path} cannot be read: {problem.strerror}") from None
 
     def put_manifest(self, encode: Encode) -> None:
         """Write the next version of the manifest, then the copy.
@@ -257,7 +257,7 @@ class ObjectStorage(_Storage):
                     self._version = number  # it may arrive late, and must then not replace another
                 raise
             if there != content and _metadata(there).get(_WRITER_KEY, b"") != own:
-                raise errors.FolderInUseError(f"{self.path} was taken over by another run")
+                raise failures.FolderInUseError(f"{self.path} was taken over by another run")
             self._version = number
             if there == content:
                 break  # else: what this run wrote before, and was told it could not
@@ -286,7 +286,7 @@ class ObjectStorage(_Storage):
         """Copy one staged file to its final name."""
         staged = self.path / staged_name
         if size is not None and staged.stat().st_size != size:
-            raise errors.DamagedError(f"{staged} is not what a worker wrote there: it has another size")
+            raise failures.DamagedError(f"{staged} is not what a worker wrote there: it has another size")
         staged.copy_to(self.path / name)
         with suppress(OSError):
             staged.unlink(missing_ok=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from boulder_sweep.locations import Location, LocationError, location_of
-from boulder_sweep.store.errors import refuse_to_guess
+from boulder_sweep.store.failures import refuse_to_guess
 from boulder_sweep.store.lock import is_locked
 from boulder_sweep.store.manifest import Manifest, Merge, Part, load
 from boulder_sweep.store.provenance import Session, judged_by

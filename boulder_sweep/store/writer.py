@@ -23,7 +23,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from boulder_sweep.store import errors
+from boulder_sweep.store import failures
 from boulder_sweep.store.files import WRITING_SUFFIX, hidden_name, is_ours, is_part_name, part_name, staged_name
 from boulder_sweep.store.manifest import Manifest, Merge, Part, save, total_verdicts
 from boulder_sweep.store.provenance import now
@@ -142,7 +142,7 @@ class OutputFolder:
             unchecked = {} if self._storage.checks_content else parts
             for name, wrong in damaged_parts(self.path, unchecked, read_parts=True).items():
                 self.check()
-                raise errors.DamagedError(
+                raise failures.DamagedError(
                     f"{self.path / name} is not what a worker wrote there ({wrong}). "
                     f"Resume with: {self.manifest.resume_command}"
                 )
@@ -151,7 +151,7 @@ class OutputFolder:
             self.manifest.parts.update(staged)
             try:
                 save(self.manifest, self._storage)
-            except (OSError, errors.StoreError):
+            except (OSError, failures.StoreError):
                 for one in staged:
                     del self.manifest.parts[one.name]
                 raise
@@ -183,7 +183,7 @@ class OutputFolder:
             try:
                 save(self.manifest, self._storage)
                 self._storage.put(hidden_name(name), content)
-            except (OSError, errors.StoreError):
+            except (OSError, failures.StoreError):
                 self.manifest.merge = None
                 raise
             finish_merge(self.manifest, self._storage)
@@ -223,7 +223,7 @@ class OutputFolder:
                 session = self.manifest.sessions[-1]
                 session.ended, session.how = now(), self._ended
                 self._remove_staged()
-                with suppress(OSError, errors.StoreError):  # a full disk must not hide what stopped the run
+                with suppress(OSError, failures.StoreError):  # a full disk must not hide what stopped the run
                     save(self.manifest, self._storage)
                 self._lock.release()
         finally:
@@ -236,7 +236,7 @@ class OutputFolder:
             return
         self._open = False
         self._remove_staged()
-        with suppress(OSError, errors.StoreError):  # a folder that is gone must not hide why the run was refused
+        with suppress(OSError, failures.StoreError):  # a folder that is gone must not hide why the run was refused
             self._storage.discard_manifest()
         self._lock.release()
         self._storage.unmake()
@@ -257,13 +257,13 @@ class OutputFolder:
         """Return the temporary name of a part of this run."""
         return staged_name(staged.name, self.token, staged.part.sha256)
 
-    def write_error(self, problem: OSError) -> errors.StoreError:
+    def write_error(self, problem: OSError) -> failures.StoreError:
         """Describe why the folder cannot be written, and how to resume."""
         if problem.errno == errno.ENOENT and isinstance(self.path, Path) and not self.path.exists():
-            return errors.FolderRemovedError(self.path)
+            return failures.FolderRemovedError(self.path)
         done = f"{self.rows_safe:,} of {self.manifest.rows:,} rows are safe"
         advice = "free some space and resume" if problem.errno in NO_SPACE else "resume"
-        return errors.WriteError(
+        return failures.WriteError(
             f"cannot write into {self.path}: {problem.strerror}. {done}; {advice} with: {self.manifest.resume_command}"
         )
 
@@ -271,12 +271,12 @@ class OutputFolder:
         """Remove parts that were staged and not committed."""
         merge = self.manifest.merge
         keep = set(self.manifest.parts) | set(() if merge is None else merge.names)
-        with suppress(OSError, errors.StoreError):
+        with suppress(OSError, failures.StoreError):
             self._storage.remove(name for name in self._storage.names() if _is_staged(name) and name not in keep)
 
     def _remove(self, names: Iterable[str]) -> None:
         """Remove files that nobody needs, if the storage lets it."""
-        with suppress(OSError, errors.StoreError):
+        with suppress(OSError, failures.StoreError):
             self._storage.remove(names)
 
 

@@ -171,8 +171,8 @@ class Tradeoff:
         import pyarrow.parquet as pq
 
         target = Path(folder)
-        draw("figures", "require_matplotlib")
-        draw("figures", "make_folder", target)
+        draw("pictures", "require_matplotlib")
+        draw("pictures", "make_folder", target)
         if not self.points:
             return []
         files = [target / f"tradeoff.{kind}" for kind in ("parquet", "csv", "png")]

@@ -19,7 +19,7 @@ from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import chance_text
-from boulder_sweep.views.figures import (
+from boulder_sweep.views.pictures import (
     AMBER,
     BLACK,
     BLUE,

@@ -14,8 +14,8 @@ from boulder_sweep.crash_tests.measured import PULSE_UNITS
 from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
 from boulder_sweep.crash_tests.score import simulated_signal
 from boulder_sweep.store.files import replacing
-from boulder_sweep.views import figures
-from boulder_sweep.views.figures import BLACK, BLUE, GREY, ORANGE
+from boulder_sweep.views import pictures
+from boulder_sweep.views.pictures import BLACK, BLUE, GREY, ORANGE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,8 +64,8 @@ def write_validation(result: Validation, folder: Path) -> list[Path]:
     PictureError
         The folder cannot be made or written, or matplotlib is not installed.
     """
-    figures.require_matplotlib()
-    figures.make_folder(folder)
+    pictures.require_matplotlib()
+    pictures.make_folder(folder)
     written = [folder / "figure_10_rigid_wall.png"]
     draw_rigid_wall(result.wall, written[0])
     for test, (_, name) in FIGURES.items():
@@ -94,7 +94,7 @@ def draw_crash_test(
         Test data to lay over it.
     """
     names = [name for name, _, _ in SIGNALS] if measured is None else list(measured.signals)
-    with figures.figure(path, 3.6 * len(names), 3.6) as fig:
+    with pictures.figure(path, 3.6 * len(names), 3.6) as fig:
         row = fig.subplots(1, len(names), squeeze=False)[0]
         for axes, name in zip(row, names, strict=True):
             _signal(axes, name, trajectories, measured)
@@ -104,7 +104,7 @@ def draw_crash_test(
             f" (Figures {FIGURES[test][0]})" if test in FIGURES and measured is None else ""
         )
         words = ", ".join(f"{t.verdict} ({preset.replace('_', ' ')})" for preset, t in trajectories.items())
-        figures.headline(fig, f"{title}: {words}", size=11.0)
+        pictures.headline(fig, f"{title}: {words}", size=11.0)
 
 
 def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory | None) -> None:
@@ -121,7 +121,7 @@ def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measu
     if measured is not None:
         axes.plot(measured.time_s, measured.signals[name], ".", color=GREY, markersize=3.5, label="measured")
     end = max(float(trajectory.time_s[-1]) for trajectory in trajectories.values())
-    figures.time_axis(axes, end)
+    pictures.time_axis(axes, end)
     axes.set_title(title)
     axes.set_ylabel(label)
     overturned = any(math.isfinite(t.motion.outcome.t_limit) for t in trajectories.values())
@@ -140,7 +140,7 @@ def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
     """Draw the paper's truck against a rigid wall, the response of the Maxwell element in Figure 10."""
     time = np.linspace(0.0, 0.2, 401)
     x, v, acceleration = wall.response(time)
-    with figures.figure(path, 9.6, 3.3) as fig:
+    with pictures.figure(path, 9.6, 3.3) as fig:
         row = fig.subplots(1, 3)
         curves = (
             (x, "Displacement", "displacement [m]", wall.max_displacement_time_s, wall.max_displacement_m, "{:.3f} m"),
@@ -156,19 +156,19 @@ def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
         )
         for axes, (values, title, label, when, peak, words) in zip(row, curves, strict=True):
             axes.plot(time, values, color=BLUE)
-            figures.time_axis(axes, float(time[-1]))
+            pictures.time_axis(axes, float(time[-1]))
             axes.set_title(title)
             axes.set_ylabel(label)
             bottom, top = axes.get_ylim()
             axes.set_ylim(bottom - (0.06 * (top - bottom) if peak < 0.0 else 0.0), top + 0.08 * (top - bottom))
-            figures.mark_peak(axes, when, peak, words.format(peak).replace("-", "−"), BLUE, below=peak < 0.0)
+            pictures.mark_peak(axes, when, peak, words.format(peak).replace("-", "−"), BLUE, below=peak < 0.0)
         words = f"Rigid wall (Figure 10): {wall.mass_kg:.0f} kg at {wall.speed_m_s:g} m/s, Maxwell element of the paper"
-        figures.headline(fig, words, size=11.0)
+        pictures.headline(fig, words, size=11.0)
 
 
 def draw_convergence(study: Convergence, path: Path) -> None:
     """Draw how element sums approach the closed form."""
-    with figures.figure(path, 6.4, 4.0) as fig:
+    with pictures.figure(path, 6.4, 4.0) as fig:
         axes = fig.subplots()
         for preset, style in STYLES.items():
             n = np.array([n for n in study.elements if study.difference("rwg", preset, n) != 0.0])
@@ -236,7 +236,7 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
     names = [name for name in ORDER if name in fit.pulse.signals]
     residuals = fit.residuals
     fine = np.linspace(0.0, float(fit.pulse.time_s[-1]), POINTS)
-    with figures.figure(path, max(3.4 * len(names), 5.6), 4.9) as fig:
+    with pictures.figure(path, max(3.4 * len(names), 5.6), 4.9) as fig:
         grid = fig.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(2.4, 1.0))
         for (above, below), name in zip(grid.T, names, strict=True):
             unit = PULSE_UNITS[name].replace("^2", "²")
@@ -249,13 +249,13 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
             reach = 1.15 * float(np.nanmax(np.abs(residuals[name])))
             below.set_ylim(-reach or -1.0, reach or 1.0)
             below.set_ylabel(f"residual [{unit}]")
-            figures.time_axis(below, float(fine[-1]))
+            pictures.time_axis(below, float(fine[-1]))
             below.locator_params(axis="x", nbins=5)  # more numbers run into one another
         grid[0, 0].legend(loc="best")
-        figures.headline(fig, fit_line(fit), size=10.5)
+        pictures.headline(fig, fit_line(fit), size=10.5)
         if fit.warnings:
             first = "Caution: " + fit.warnings[0].split(":")[0]
-            figures.caption(fig, first, size=8.5, colour=ORANGE)
+            pictures.caption(fig, first, size=8.5, colour=ORANGE)
 
 
 def fit_line(fit: VehicleFit) -> str:

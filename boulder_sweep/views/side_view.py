@@ -14,7 +14,7 @@ import numpy as np
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store.files import replacing
 from boulder_sweep.text import ProgressCallback, script_data, why
-from boulder_sweep.views import figures
+from boulder_sweep.views import pictures
 from boulder_sweep.views.scene import STYLES, Shape, SideView, samples_shown
 from boulder_sweep.views.time_curves import require_samples
 from boulder_sweep.views.wording import NOT_A_TEST, design_line, verdict_line
@@ -52,7 +52,7 @@ def draw_still(trajectory: Trajectory, path: str | Path, *, time_s: float | None
     when = trajectory.motion.outcome.maxima.t_F_v if time_s is None else time_s
     sample = int(np.argmin(np.abs(trajectory.time_s - when)))
     view = SideView(trajectory)
-    with figures.figure(path, WIDTH_IN, height_of(view)) as fig:
+    with pictures.figure(path, WIDTH_IN, height_of(view)) as fig:
         axes = stage(fig, view)
         draw(axes, view.moving(sample))
         axes.set_title(view.caption(sample), fontsize=8.5, fontweight="normal", family="monospace")
@@ -73,8 +73,8 @@ def stage(fig: Figure, view: SideView) -> Axes:
     axes.set_aspect("equal")
     axes.set_axis_off()
     draw(axes, view.ground(), behind=True)
-    figures.headline(fig, verdict_line(view.trajectory), size=11.0)
-    fig.text(0.99, 0.01, NOT_A_TEST, ha="right", fontsize=7.5, color=figures.GREY)
+    pictures.headline(fig, verdict_line(view.trajectory), size=11.0)
+    fig.text(0.99, 0.01, NOT_A_TEST, ha="right", fontsize=7.5, color=pictures.GREY)
     return axes
 
 
@@ -167,7 +167,7 @@ def checked_animation(path: str | Path) -> Path:
     PictureError
         The kind is unknown, its folder does not exist or holds the result of a run, or ffmpeg is missing.
     """
-    target = figures.checked_kind(path, KINDS)
+    target = pictures.checked_kind(path, KINDS)
     if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise PictureError(
             f"{path}: an MP4 animation needs the program ffmpeg, which is not installed; "
@@ -184,13 +184,13 @@ def frames(trajectory: Trajectory, progress: ProgressCallback | None = None) -> 
     ndarray of uint8, shape (height, width, 3)
         One picture; height and width are even, as video formats require.
     """
-    figures.require_matplotlib()
+    pictures.require_matplotlib()
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     view = SideView(trajectory)
-    with matplotlib.rc_context(figures.STYLE):
+    with matplotlib.rc_context(pictures.STYLE):
         fig = Figure(figsize=(WIDTH_IN, height_of(view)), dpi=FILM_DPI, layout="constrained")
         canvas = FigureCanvasAgg(fig)
         axes = stage(fig, view)

@@ -10,8 +10,8 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.model import UNLOADINGS
-from boulder_sweep.views import figures
-from boulder_sweep.views.figures import (
+from boulder_sweep.views import pictures
+from boulder_sweep.views.pictures import (
     AMBER,
     BLACK,
     BLUE,
@@ -55,7 +55,7 @@ def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "s
         There is nothing to draw, or the picture cannot be written.
     """
     require_samples(trajectory)
-    with figures.figure(path, 9.0, 6.2) as fig:
+    with pictures.figure(path, 9.0, 6.2) as fig:
         (rotation, force), (boulder, vehicle) = fig.subplots(2, 2, sharex=True)
         _rotation(rotation, trajectory)
         _force(force, trajectory, units)
@@ -64,10 +64,10 @@ def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "s
         for axes in (rotation, force, boulder, vehicle):
             shade_unreliable(axes, trajectory)
         for axes in (boulder, vehicle):  # those above share their axis
-            figures.time_axis(axes, float(trajectory.time_s[-1]))
+            pictures.time_axis(axes, float(trajectory.time_s[-1]))
         _peaks(rotation, force, boulder, vehicle, trajectory, units)
-        figures.headline(fig, verdict_line(trajectory))
-        figures.caption(fig, design_line(trajectory, units), size=8.5)
+        pictures.headline(fig, verdict_line(trajectory))
+        pictures.caption(fig, design_line(trajectory, units), size=8.5)
 
 
 def require_samples(trajectory: Trajectory) -> None:
@@ -135,7 +135,7 @@ def _force(axes: Axes, trajectory: Trajectory, units: str) -> None:
     axes.plot(trajectory.time_s, soil, color=GREEN, linestyle="--", label="soil against boulder")
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     top = max(float(soil.max()), float(contact.max()))
-    figures.limit_y(axes, min(1.15 * float(soil.min()), -0.05 * top), top)
+    pictures.limit_y(axes, min(1.15 * float(soil.min()), -0.05 * top), top)
     _legend_above(axes)
     axes.set_title("Horizontal forces")
     axes.set_ylabel(f"force [{unit}]")
@@ -179,11 +179,11 @@ def _peaks(rotation: Axes, force: Axes, boulder: Axes, vehicle: Axes, trajectory
     # The largest |rotation| may be a backward one.
     at = np.interp(m.t_theta, trajectory.time_s, trajectory.rotation_rad)
     theta = math.copysign(math.degrees(m.theta), float(at))
-    figures.mark_peak(rotation, m.t_theta, theta, f"{abs(theta):.2f}°", BLUE)
+    pictures.mark_peak(rotation, m.t_theta, theta, f"{abs(theta):.2f}°", BLUE)
     (force_unit, force_size), (unit, size) = sized("N", units), sized("m", units)
-    figures.mark_peak(force, m.t_F_v, m.F_v / force_size, f"{m.F_v / force_size:.0f} {force_unit}", ORANGE)
-    figures.mark_peak(boulder, m.t_x_b, m.x_b / size, f"{m.x_b / size:.3f} {unit}", BLUE, below=True)
-    figures.mark_peak(vehicle, m.t_x_v, m.x_v / size, f"{m.x_v / size:.3f} {unit}", ORANGE)
+    pictures.mark_peak(force, m.t_F_v, m.F_v / force_size, f"{m.F_v / force_size:.0f} {force_unit}", ORANGE)
+    pictures.mark_peak(boulder, m.t_x_b, m.x_b / size, f"{m.x_b / size:.3f} {unit}", BLUE, below=True)
+    pictures.mark_peak(vehicle, m.t_x_v, m.x_v / size, f"{m.x_v / size:.3f} {unit}", ORANGE)
 
 
 LAYERS = (
@@ -227,7 +227,7 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
     time = ledger.time_s
     unit, size = sized("J", units)
     initial = ledger.initial / size
-    with figures.figure(path, 8.0, 4.9) as fig:
+    with pictures.figure(path, 8.0, 4.9) as fig:
         axes = fig.subplots()
         above, below = np.zeros_like(time), np.zeros_like(time)
         layers = [(getattr(ledger, name) / size, label, colour) for name, label, colour in LAYERS]
@@ -253,8 +253,8 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
             textcoords="offset points",
             fontsize=8.5,
         )
-        figures.time_axis(axes, float(time[-1]))
-        figures.limit_y(axes, 1.05 * float(below.min()), 1.09 * max(float(above.max()), initial))
+        pictures.time_axis(axes, float(time[-1]))
+        pictures.limit_y(axes, 1.05 * float(below.min()), 1.09 * max(float(above.max()), initial))
         axes.grid(visible=False)
         _mark_limit(axes, trajectory)
         axes.set_ylabel(f"energy [{unit}]")
@@ -264,8 +264,8 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
             fontweight="normal",
         )
         axes.legend(handles=handles[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5))
-        figures.headline(fig, verdict_line(trajectory))
-        figures.caption(fig, design_line(trajectory, units))
+        pictures.headline(fig, verdict_line(trajectory))
+        pictures.caption(fig, design_line(trajectory, units))
 
 
 def _mark_limit(axes: Axes, trajectory: Trajectory) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from boulder_sweep.columns import GRADES
 from boulder_sweep.errors import PictureError
-from boulder_sweep.views import figures
-from boulder_sweep.views.figures import VERDICTS
+from boulder_sweep.views import pictures
+from boulder_sweep.views.pictures import VERDICTS
 from boulder_sweep.views.slices import ROBUSTNESS, Pieces, Slice, plane, select
 from boulder_sweep.views.wording import USUAL, keep_together, label, name_of, size_of, value_text
 
@@ -104,7 +104,7 @@ def draw_verdict_map(
     width = max(2.2 * n_columns + 1.9, 5.2) + LEGEND_IN * (n_columns <= NARROW)
     caption = _caption(shown, terms, int(CHARACTERS_PER_INCH * width), units)
     height = max(1.9 * n_rows + 1.45, 3.45) + CAPTION_LINE_IN * (caption.count("\n") + 1)
-    with figures.figure(path, width, height) as fig:
+    with pictures.figure(path, width, height) as fig:
         grid = fig.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
         present: set[int] = set()
         for row, row_value in enumerate(shown.row_values):
@@ -118,7 +118,7 @@ def draw_verdict_map(
         for axes in grid[:, 0]:
             axes.set_ylabel(label(shown.up, units))
         _titles(fig, grid, present, shown, f"{title}: which" if title else "Which", units)
-        figures.caption(fig, caption)
+        pictures.caption(fig, caption)
     return shown
 
 
@@ -188,13 +188,13 @@ def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, whic
     words = f"{which} designs stop the truck"
     beside = n_columns <= NARROW
     legend_in = _legend(fig, present, shown, beside=beside)
-    headline = figures.headline(fig, words, legend_in + GAP_IN)
+    headline = pictures.headline(fig, words, legend_in + GAP_IN)
     if not beside and "\n" in headline:
         fig.legends[0].remove()
         beside = True
         fig.set_figwidth(fig.get_figwidth() + LEGEND_IN)
         legend_in = _legend(fig, present, shown, beside=True)
-        headline = figures.headline(fig, words, legend_in + GAP_IN)
+        headline = pictures.headline(fig, words, legend_in + GAP_IN)
     map_in = (fig.get_figwidth() - AXIS_IN - legend_in * beside) / n_columns - GAP_IN
     style: Any = {"fontsize": 8.5, "fontweight": "bold"}
     further = headline.count("\n") * LINE_IN["title"]
@@ -202,9 +202,9 @@ def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, whic
         lines = []
         for column, column_value in enumerate(shown.column_values):
             parts = _panel_title(shown, row_value, column_value, units)
-            name = figures.break_lines(fig, ", ".join(parts), map_in, **style)
+            name = pictures.break_lines(fig, ", ".join(parts), map_in, **style)
             if "\n" in name:
-                name = figures.break_lines(fig, "\n".join(parts), map_in, **style)
+                name = pictures.break_lines(fig, "\n".join(parts), map_in, **style)
             grid[row, column].set_title(name, **style)
             lines.append(name.count("\n"))
         further += max(lines) * LINE_IN["map"]

@@ -20,7 +20,7 @@ from boulder_kernels import (
     simulate_table,
 )
 from boulder_kernels.control import STEP_RATIO
-from boulder_sweep.views.figures import BLUE, GREY, ORANGE, figure
+from boulder_sweep.views.pictures import BLUE, GREY, ORANGE, figure
 from docs.studies.coverage import HORIZON_S, LIMIT, random_table
 
 EXAMPLE = Design(

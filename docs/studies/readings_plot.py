@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boulder_sweep.views import figures
-from boulder_sweep.views.figures import BLACK, BLUE, ORANGE, PALE_ORANGE, SKY
+from boulder_sweep.views import pictures
+from boulder_sweep.views.pictures import BLACK, BLUE, ORANGE, PALE_ORANGE, SKY
 
 if TYPE_CHECKING:
     from docs.studies.readings import ReadingsStudy
@@ -28,7 +28,7 @@ def draw_readings(study: ReadingsStudy, path: str | Path) -> None:
     places = [-k - (0.6 if k >= len(labels) // 2 else 0.0) for k in range(len(labels))]
     presets = {"as_printed": (ORANGE, PALE_ORANGE), "corrected": (BLUE, SKY)}
     colours = [presets[row.base][1 if row.switch else 0] for row in study.rows]
-    with figures.figure(path, 9.0, 4.6) as fig:
+    with pictures.figure(path, 9.0, 4.6) as fig:
         rotation, share = fig.subplots(1, 2, sharey=True)
         panels = (
             (rotation, [row.rwg_rotation_deg for row in study.rows], "{:.1f}°"),

@@ -14,7 +14,7 @@ from boulder_sweep.judge.judged import PASS
 from boulder_sweep.settings.model import RESISTANCES, Ground
 from boulder_sweep.settings.shape import ProfilePoint, Shape
 from boulder_sweep.soils import with_soil
-from boulder_sweep.views.figures import BLUE, caption, figure, headline
+from boulder_sweep.views.pictures import BLUE, caption, figure, headline
 from boulder_sweep.views.scene import STYLES
 from docs.studies.forms import SPEEDS, drawn_of_grid, grid_evaluation
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from click.testing import CliRunner
 
 from boulder_sweep import load
-from boulder_sweep.cli.vehicle import speed
+from boulder_sweep.cli.vehicle_commands import speed
 from boulder_sweep.settings.sweep import derived_words
 
 STREET = ("--length", "80 m", "--from", "0 mph", "--acceleration", "1.2 m/s^2")

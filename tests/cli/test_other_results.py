@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from boulder_sweep.store import read
-from boulder_sweep.store.errors import OtherVersionError
+from boulder_sweep.store.failures import OtherVersionError
 from tests.store.folders import OTHER_FORMS, READABLE_FORMS, rewrite_records
 
 RESULT = "small-grid.sweep"

@@ -14,7 +14,7 @@ import threading
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.judge.evaluation import by_kernels
 from boulder_sweep.runner.sweeper import Progress, run
-from boulder_sweep.store.errors import StoreError
+from boulder_sweep.store.failures import StoreError
 from tests.faults import faulty
 from tests.runner.grids import grid_of
 

@@ -14,7 +14,7 @@ import pytest
 from boulder_sweep.runner import estimate as limits
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import files, status
-from boulder_sweep.store.errors import DoesNotFitError, StoreError, WriteError
+from boulder_sweep.store.failures import DoesNotFitError, StoreError, WriteError
 from boulder_sweep.store.reader import read_table
 from tests.faults.processes import ROOT
 from tests.runner.grids import grid, grid_of, plausible, same_bits
@@ -133,7 +133,7 @@ def _never(table, readings, control):
 _NO_LONG_FILES = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
-from boulder_sweep.store.errors import WriteError
+from boulder_sweep.store.failures import WriteError
 from boulder_sweep.runner.sweeper import run
 from tests.runner.grids import grid_of, plausible
 try:

@@ -12,7 +12,7 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner import remote
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.runner.workers import Computation
-from boulder_sweep.store.errors import FolderRemovedError
+from boulder_sweep.store.failures import FolderRemovedError
 from boulder_sweep.store.files import MANIFEST_NAME, is_part_name
 from boulder_sweep.store.reader import read_table
 from boulder_sweep.store.writer import OutputFolder

@@ -13,7 +13,7 @@ import boulder_sweep
 from boulder_sweep import at_values, load
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import words_of
-from boulder_sweep.store.errors import StoreError
+from boulder_sweep.store.failures import StoreError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE, SOILS = CONFIGS / "uncertain_site.yaml", CONFIGS / "site.yaml"

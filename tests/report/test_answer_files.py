@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
-from boulder_sweep.answers.files import AnswerFile
 from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report

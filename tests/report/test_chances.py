@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
-from boulder_sweep.answers.files import AnswerFile
+from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import Quantity, answer_of

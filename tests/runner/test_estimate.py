@@ -28,7 +28,7 @@ from boulder_sweep.runner.estimate import (
 )
 from boulder_sweep.runner.sweeper import estimate, run
 from boulder_sweep.runner.workers import Admission
-from boulder_sweep.store.errors import DoesNotFitError
+from boulder_sweep.store.failures import DoesNotFitError
 from boulder_sweep.store.schema import encode, part_table
 from boulder_sweep.text import size_text
 from tests.runner.grids import grid, grid_of, plausible

@@ -11,7 +11,7 @@ from boulder_sweep.runner import estimate, sweeper
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import Sweep
 from boulder_sweep.store import files
-from boulder_sweep.store.errors import DoesNotFitError, OutputExistsError, StoreError, WriteError
+from boulder_sweep.store.failures import DoesNotFitError, OutputExistsError, StoreError, WriteError
 from tests.runner.grids import grid, grid_of
 
 HUGE = {

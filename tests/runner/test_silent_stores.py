@@ -16,7 +16,7 @@ from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import lock as locks
 from boulder_sweep.store import status, storage
-from boulder_sweep.store.errors import WriteError
+from boulder_sweep.store.failures import WriteError
 from boulder_sweep.store.reader import read_table
 from boulder_sweep.store.writer import OutputFolder
 from tests.runner.grids import grid_of, plausible, same_bits

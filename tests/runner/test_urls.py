@@ -9,7 +9,7 @@ from boulder_sweep.impact.explanation import explain
 from boulder_sweep.locations import location_of
 from boulder_sweep.runner import sweeper
 from boulder_sweep.store import read, status
-from boulder_sweep.store.errors import OutputExistsError
+from boulder_sweep.store.failures import OutputExistsError
 from boulder_sweep.store.files import is_part_name
 from boulder_sweep.store.reader import read_table
 from tests.runner.grids import grid, plausible, same_bits

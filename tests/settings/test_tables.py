@@ -384,7 +384,7 @@ def test_files_that_are_no_spreadsheet(messages_of, content):
 
 
 def test_a_spreadsheet_that_unpacks_to_too_much(messages_of, tmp_path, monkeypatch):
-    monkeypatch.setattr("boulder_sweep.settings.table.MAX_UNPACKED_BYTES", 1_000_000)
+    monkeypatch.setattr("boulder_sweep.settings.design_list.MAX_UNPACKED_BYTES", 1_000_000)
     with zipfile.ZipFile(tmp_path / "designs.xlsx", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("xl/workbook.xml", bytes(1_000_001))
     (message,) = messages_of(None, "designs.xlsx")

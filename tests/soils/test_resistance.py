@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boulder_kernels.ground import BROMS, KP_SQUARED, WATER, WIDTH_CAPPED
+from boulder_kernels.ground import BROMS, KP_SQUARED, WIDTH_CAPPED
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import PRESETS, RESISTANCES, WATER_KG_M3, Model
+from boulder_sweep.settings.model import PRESETS, RESISTANCES, Model
 from boulder_sweep.soils import coefficients, with_law
 from boulder_sweep.views.wording import LAW_WORDS, design_line
 from tests import oracle

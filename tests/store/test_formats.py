@@ -20,7 +20,7 @@ import boulder_sweep
 from boulder_sweep.columns import COLUMNS, INPUT_COLUMNS
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.store import status
-from boulder_sweep.store.errors import DamagedError, OtherVersionError, SettingsDifferError
+from boulder_sweep.store.failures import DamagedError, OtherVersionError, SettingsDifferError
 from boulder_sweep.store.files import MANIFEST_NAME, part_name
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.provenance import judged_by

@@ -13,7 +13,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store import files, status
-from boulder_sweep.store.errors import DamagedError, LinkError
+from boulder_sweep.store.failures import DamagedError, LinkError
 from boulder_sweep.store.files import (
     MANIFEST_NAME,
     check_target,

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from boulder_sweep.store import lock as locks
-from boulder_sweep.store.errors import FolderInUseError, WriteError
+from boulder_sweep.store.failures import FolderInUseError, WriteError
 from boulder_sweep.store.files import LOCK_NAME
 from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, FolderLock, is_locked
 

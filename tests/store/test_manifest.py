@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boulder_sweep.store.errors import DamagedError, NotASweepError, OtherVersionError
+from boulder_sweep.store.failures import DamagedError, NotASweepError, OtherVersionError
 from boulder_sweep.store.files import MANIFEST_NAME, is_ours, is_part_name, part_name
 from boulder_sweep.store.manifest import Manifest, Merge, Part, Session, check_own, load, save
 from boulder_sweep.store.storage import DiskStorage

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from boulder_sweep.store import status, storage, verify, writer
-from boulder_sweep.store.errors import DamagedError, StoreError, WriteError
+from boulder_sweep.store.failures import DamagedError, StoreError, WriteError
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import FinishedRows, read_table

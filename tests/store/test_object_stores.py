@@ -18,7 +18,7 @@ from boulder_sweep import locations
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.store import lock as locks
 from boulder_sweep.store import status
-from boulder_sweep.store.errors import (
+from boulder_sweep.store.failures import (
     DamagedError,
     FolderInUseError,
     ForeignFilesError,

@@ -8,7 +8,7 @@ import pytest
 
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.store import read
-from boulder_sweep.store.errors import DamagedError, NotASweepError
+from boulder_sweep.store.failures import DamagedError, NotASweepError
 from tests.store.folders import ROWS, commit, finished_folder, open_folder
 
 

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from boulder_sweep.store import status
-from boulder_sweep.store.errors import NotASweepError
+from boulder_sweep.store.failures import NotASweepError
 from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder
 
 

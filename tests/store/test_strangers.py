@@ -16,7 +16,7 @@ from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.locations import location_of
 from boulder_sweep.store import lock as locks
 from boulder_sweep.store import read, status
-from boulder_sweep.store.errors import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
+from boulder_sweep.store.failures import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
 from boulder_sweep.store.files import MANIFEST_NAME, hidden_name, is_ours, part_name, staged_name
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import FinishedRows, read_table

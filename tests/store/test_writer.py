@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from boulder_sweep.store import status, storage, writer
-from boulder_sweep.store.errors import (
+from boulder_sweep.store.failures import (
     DamagedError,
     FolderInUseError,
     ForeignFilesError,

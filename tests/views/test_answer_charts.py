@@ -38,7 +38,7 @@ def changed(found: Uncertainty, p_pass: float, passing: int) -> Uncertainty:
 def figure_of(found: Uncertainty, path: Path, monkeypatch: pytest.MonkeyPatch, design_id: int = 1) -> Figure:
     figures: list[Figure] = []
     with monkeypatch.context() as patch:
-        patch.setattr("boulder_sweep.views.figures.save", lambda fig, target: figures.append(fig))
+        patch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: figures.append(fig))
         found.plot(path / "chance.png", design_id)
     FigureCanvasAgg(figures[0]).draw()
     return figures[0]
@@ -104,7 +104,7 @@ def test_the_title_says_for_which_probability(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, probability: str | None, words: str
 ) -> None:
     drawn: list[Figure] = []
-    monkeypatch.setattr("boulder_sweep.views.figures.save", lambda fig, target: drawn.append(fig))
+    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: drawn.append(fig))
     friction = "{mean: 40 deg, sd: 1 deg}" if probability else "40 deg"
     sweep = site(height="[3.2, 3.4] m", site="embedment_depth: [1.9, 2.3] m", friction=friction)
     need(sweep, probability=probability, tolerance="1 cm").plot(tmp_path / "chart.png")

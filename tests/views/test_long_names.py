@@ -7,7 +7,7 @@ import itertools
 import pandas as pd
 import pytest
 
-from boulder_sweep.views import figures
+from boulder_sweep.views import pictures
 from boulder_sweep.views.verdict_map import draw_verdict_map
 
 LONG = ("compacted limestone gravel 2A modified", "砂礫 of the river", "W" * 80)
@@ -28,8 +28,8 @@ def test_long_names_leave_the_maps_their_room(table, tmp_path, monkeypatch, soil
     rows = table.query("friction_angle_deg == 36 and subgrade_reaction_MN_m3 == 40 and boulder_width_m == 1.5")
     frames = [rows.assign(soil=soil, vehicle=truck) for soil in soils for truck in trucks]
     finished = []
-    plain = figures.save
-    monkeypatch.setattr(figures, "save", lambda fig, target: finished.append(fig) or plain(fig, target))
+    plain = pictures.save
+    monkeypatch.setattr(pictures, "save", lambda fig, target: finished.append(fig) or plain(fig, target))
     words = {"title": title, "sets": {"soil": soils, "vehicle": trucks}, "columns": "soil", "rows": "vehicle"}
     draw_verdict_map(pd.concat(frames, ignore_index=True), tmp_path / f"map.{kind}", **words)
     (fig,) = finished

@@ -22,8 +22,8 @@ from boulder_sweep.errors import PictureError
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.settings import load, load_text
-from boulder_sweep.views import figures
-from boulder_sweep.views.figures import checked_kind
+from boulder_sweep.views import pictures
+from boulder_sweep.views.pictures import checked_kind
 from boulder_sweep.views.time_curves import AFTER_PEAK, LAYERS, unreliable_from
 from boulder_sweep.views.verdict_map import CLASSES
 
@@ -86,7 +86,7 @@ def test_the_rebound_in_plastic_soil_is_not_shaded(tmp_path: Path) -> None:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """Figures in the order in which they are finished."""
     figures: list[Figure] = []
-    monkeypatch.setattr("boulder_sweep.views.figures.save", lambda fig, target: figures.append(fig))
+    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: figures.append(fig))
     return figures
 
 
@@ -107,7 +107,7 @@ def test_legends_cover_nothing(
                     assert not any(legend.contains(x, y) for x, y in points)
                 assert not any(legend.overlaps(text.get_window_extent()) for text in axes.texts)
 
-    monkeypatch.setattr("boulder_sweep.views.figures.save", look)
+    monkeypatch.setattr("boulder_sweep.views.pictures.save", look)
     for trajectory in trajectories.values():
         trajectory.plot(tmp_path / "history.png")
     assert looked_at == ["Horizontal forces", "Displacement of the centre of mass"] * 4
@@ -159,7 +159,7 @@ def test_a_caption_tells_all_of_the_ground_within_the_picture(drawn: list[Figure
 @pytest.mark.parametrize("inches", [0.01, 0.5, 2.0])
 def test_a_broken_text_loses_nothing_but_spaces(words: str, inches: float) -> None:
     fig = Figure()
-    found = figures.break_lines(fig, words, inches)
+    found = pictures.break_lines(fig, words, inches)
     assert found.replace("\n", "").replace(" ", "") == words.replace("\n", "").replace(" ", "")
     lines = found.split("\n")
     for line in lines:
@@ -261,7 +261,7 @@ def test_a_name_in_a_picture_is_only_text(tmp_path: Path, kind: str) -> None:
 
 
 def test_logarithmic_ticks_keep_their_powers(tmp_path: Path) -> None:
-    with figures.figure(tmp_path / "powers.svg", 3.0, 2.0) as fig:
+    with pictures.figure(tmp_path / "powers.svg", 3.0, 2.0) as fig:
         axes = fig.subplots()
         axes.loglog([1.0, 1e6], [1.0, 1e6])
         axes.set_title("$a$")

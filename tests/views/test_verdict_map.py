@@ -154,7 +154,7 @@ def drawn(table, monkeypatch: pytest.MonkeyPatch, path: Path, **options: Any) ->
     with monkeypatch.context() as patch:
         patch.setattr(Axes, "pcolormesh", noted)
         patch.setattr(Axes, "scatter", noted)
-        patch.setattr("boulder_sweep.views.figures.save", lambda fig, target: None)
+        patch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: None)
         return draw_verdict_map(table, path, **options), numbers
 
 

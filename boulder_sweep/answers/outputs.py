@@ -27,7 +27,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Criterion, completed
 from boulder_sweep.settings.sweep import Axis, DesignList
-from boulder_sweep.store.errors import settings_file
+from boulder_sweep.store.failures import settings_file
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.provenance import identity_in, judged_by, settings_sha256
 from boulder_sweep.store.reader import FinishedRows

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels.verdict import (
+from boulder_kernels.rules import (
     CRUSH,
     FOOT,
     NO_CONTACT,

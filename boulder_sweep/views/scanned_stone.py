@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boulder_sweep.errors import PictureError
-from boulder_sweep.views.figures import BLACK, BLUE, GREY, caption, figure, headline
+from boulder_sweep.views.pictures import BLACK, BLUE, GREY, caption, figure, headline
 from boulder_sweep.views.scene import STYLES
 
 if TYPE_CHECKING:

@@ -88,7 +88,7 @@ def tradeoff(
         raise click.UsageError("--seconds nan: give a number of seconds")
     sweep = take_values(load(grid, overrides), at, quiet)
     if out is not None:
-        from boulder_sweep.views.figures import make_folder, require_matplotlib
+        from boulder_sweep.views.pictures import make_folder, require_matplotlib
 
         require_matplotlib()
         make_folder(Path(out))
