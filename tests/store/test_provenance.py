@@ -65,7 +65,7 @@ def test_every_module_that_decides_a_row_is_hashed(tmp_path, monkeypatch):
         "designs.py",
         "soils.py",
         "investigation.py",
-        *(f"judge/{name}.py" for name in ("accuracy", "evaluation", "judged", "pilot", "verdict")),
+        *(f"judge/{name}.py" for name in ("accuracy", "evaluation", "inputs", "judged", "verdict")),
         "settings/fields.py",
     ]
     for name in deciding:
