@@ -64,7 +64,7 @@ def test_every_module_that_decides_a_row_is_hashed(tmp_path, monkeypatch):
     deciding = [
         "designs.py",
         "soils.py",
-        *(f"judge/{name}.py" for name in ("accuracy", "evaluation", "judged", "pilot", "verdict")),
+        *(f"judge/{name}.py" for name in ("accuracy", "evaluation", "inputs", "judged", "verdict")),
         *(f"settings/{name}.py" for name in ("fields", "notes")),
     ]
     for name in deciding:
