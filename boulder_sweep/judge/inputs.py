@@ -6,7 +6,6 @@ They are in the units of the kernels, with what only the verdict asks for beside
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -207,8 +206,8 @@ def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:
 
 
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
-    """Return about this many designs of a sweep, without those that cannot be computed; stones as boxes."""
-    return designs_of(*_sampled(sweep, count), replace(sweep.model, profile=(), taper=1.0))
+    """Return about this many designs of a sweep, without those that cannot be computed."""
+    return designs_of(*_sampled(sweep, count), sweep.model)
 
 
 def plain_designs(sweep: Sweep, count: int) -> Designs:

@@ -55,6 +55,16 @@ def test_less_resistance_is_what_it_says() -> None:
     assert found.lost["broms"] == 0.0
 
 
+def test_stones_are_sampled_with_their_shape() -> None:
+    """Not as boxes of their sides, to which changed stones would be compared."""
+    box = grid()
+    stone = replace(box, model=replace(box.model, taper=0.7))
+    found, own = firmness_of(stone), passes(stone)
+    assert found.passes == own.sum() < passes(box).sum()
+    by_broms = replace(stone, model=replace(stone.model, resistance="broms"))
+    assert found.lost["broms"] == pytest.approx(np.mean(~passes(by_broms)[own]))
+
+
 def test_soil_that_stays_pressed_is_sampled_as_elastic() -> None:
     sweep = grid()
     assert firmness_of(replace(sweep, model=replace(sweep.model, unloading="plastic"))) == firmness_of(sweep)
