@@ -34,11 +34,11 @@ MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "sin", "cos"}
 
 
 def sources_hash() -> str:
-    """Return the hash of what the kernel is built from: kernels, entry points and this module (SHA-256, hex)."""
+    """Return the hash of what the kernel is built from: kernels, entry points, their records and this module (SHA-256, hex)."""
     from boulder_kernels import source_hash
 
     digest = hashlib.sha256(source_hash().encode())
-    for source in ("build.py", "entry_points.py"):
+    for source in ("build.py", "entry_points.py", "page_records.py"):
         digest.update(Path(__file__).with_name(source).read_bytes())
     return digest.hexdigest()
 

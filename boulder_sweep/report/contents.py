@@ -22,7 +22,7 @@ from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.validity import FLAGS, TESTED_OVERLAP_M, TESTED_ROTATION_DEG, usual_range
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, STEP_REASONS
-from boulder_sweep.report import entry_points
+from boulder_sweep.report import page_records
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, parts_of
 from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, SIZES, Rows, label_of
@@ -267,17 +267,17 @@ def _soil(law: str, ground: Ground, shape: Shape, control: Control) -> dict[str,
 def _layout() -> dict[str, Any]:
     """Order of the kernel's numbers, and the table column of each input."""
     return {
-        "design": entry_points.DESIGN,
-        "settings": entry_points.SETTINGS,
-        "outcome": entry_points.OUTCOME,
-        "history": entry_points.HISTORY,
+        "design": page_records.DESIGN,
+        "settings": page_records.SETTINGS,
+        "outcome": page_records.OUTCOME,
+        "history": page_records.HISTORY,
         "sizes": [(SOURCES | OF_THE_PAGE).get(name, name) for name in rules.SIZES],
         "rulings": rules.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
-        "layer_room": entry_points.LAYER_ROOM,
-        "piece_room": entry_points.PIECE_ROOM,
-        "element_room": entry_points.ELEMENT_ROOM,
-        "memory_room": entry_points.MEMORY_ROOM,
+        "layer_room": page_records.LAYER_ROOM,
+        "piece_room": page_records.PIECE_ROOM,
+        "element_room": page_records.ELEMENT_ROOM,
+        "memory_room": page_records.MEMORY_ROOM,
         "columns": {**SOURCES, **dict(zip(SecondSpring._fields, SECOND_SPRING_COLUMNS, strict=True))},
     }
 

@@ -73,7 +73,7 @@ function solidityOf(inputs, filled) {
   return inputs.boulder_mass_kg / (inputs.boulder_density_kg_m3 * box);
 }
 
-/** How the kernel estimates errors, see `boulder_sweep.report.entry_points`. */
+/** How the kernel estimates errors, see `boulder_sweep.report.page_records`. */
 const PAIRED = 1;
 const ONCE = 2;
 
