@@ -222,8 +222,9 @@ def solve(
     outcome = simulate_in_soil(*soil, design, second, readings, control, record, nothing, nowhere)
     out[:, row] = np.nan
     write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
+    second_solution = int(out[SECOND, row])  # stands where the step is written
     out[STEP, row] = control.h / STEP_RATIO if control.refined else control.h
-    return int(out[SECOND, row])
+    return second_solution
 
 
 @array_kernel
