@@ -34,7 +34,7 @@ MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "sin", "cos"}
 
 
 def sources_hash() -> str:
-    """Return the hash of what the kernel is built from: kernels, entry points, their records and this module (SHA-256, hex)."""
+    """Return the hash of what the kernel is built from: kernels, modules of the page, this one (SHA-256, hex)."""
     from boulder_kernels import source_hash
 
     digest = hashlib.sha256(source_hash().encode())
