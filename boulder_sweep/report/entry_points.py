@@ -181,7 +181,7 @@ def simulate_in_soil(
     """Simulate one design in its soil; layers, outline and room for the soil are as of `history`."""
     m, points, n, samples = len(layers), len(outline), control.elements, record.times.size
     kept = samples * (2 * n + 1)
-    room = carray(soil_at, (kept + max(LAYER_ROOM * m, ELEMENT_ROOM * n + MEMORY_ROOM),))[kept:]
+    room = carray(soil_at, (kept + ELEMENT_ROOM * n + MEMORY_ROOM,))[kept:]
     if m == 0:
         return simulate_recorded(None, design, second, readings, control, record, out, centre)
     if points > 0 and n == 0:
@@ -193,7 +193,9 @@ def simulate_in_soil(
         beside = SoilProfile(layers, outlined_elements_from(room, n, outline), None)
         return simulate_recorded(beside, design, second, readings, control, record, out, centre)
     if n == 0:
-        in_layers = SoilProfile(layers, layers_from(carray(soil_at, (6, m)), room[6 * m :]), None)
+        in_layers = SoilProfile(
+            layers, layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]), None
+        )
         return simulate_recorded(in_layers, design, second, readings, control, record, out, centre)
     if control.unloading == ELASTIC:
         by_elements = SoilProfile(layers, elements_from(room, n), None)
