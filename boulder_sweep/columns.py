@@ -311,7 +311,7 @@ AT_REST: tuple[OutcomeColumn, ...] = (
         lambda facts: np.degrees(facts.outcomes.rest_error),
     ),
 )
-"""Outcomes in plastic soil only (`model.unloading` other than ``elastic``); behind the others in a table.
+"""Outcomes in plastic soil only; behind the others in a table.
 Null where the boulder overturns, where the vehicle still drives on at the end, or where the readings allow no proof."""
 
 TO_BUILD: tuple[ColumnSpec, ColumnSpec, ColumnSpec] = (

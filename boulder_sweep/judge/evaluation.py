@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
+from boulder_kernels.plastic import is_plastic
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
@@ -209,7 +210,7 @@ class Evaluation:
     @property
     def columns(self) -> tuple[OutcomeColumn, ...]:
         """Outcome columns of the rows, where `only` does not leave some out."""
-        return (*OUTCOMES, *AT_REST) if self.control.unloading else OUTCOMES
+        return (*OUTCOMES, *AT_REST) if is_plastic(self.control.unloading) else OUTCOMES
 
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return readings and control as plain data, for the record."""

@@ -18,7 +18,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, Control, OutcomeTable, Status
+from boulder_kernels import Control, OutcomeTable, Status
+from boulder_kernels.plastic import is_plastic
 from boulder_kernels.table import finer_step, some_rows
 from boulder_sweep.columns import REASONS
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
@@ -95,7 +96,7 @@ def is_late(judged: Judged, outcomes: OutcomeTable, control: Control) -> np.ndar
     None where errors are not confirmed, as by `fast`. None either in plastic soil, where every
     motion goes on until it rests, and loses its energy to the soil instead of rocking.
     """
-    if not control.error_estimate or control.unloading != ELASTIC:
+    if not control.error_estimate or is_plastic(control.unloading):
         return np.zeros(len(judged), dtype=bool)
     return (outcomes.t_end > control.horizon) & ((judged.verdict == PASS) | (judged.reason == OVERTURNS))
 

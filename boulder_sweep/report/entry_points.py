@@ -6,12 +6,12 @@ that of its verdicts, and `history` that of ``sweep simulate``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from boulder_kernels import (
-    ELASTIC,
     Control,
     Design,
     Outcome,
@@ -33,10 +33,11 @@ from boulder_kernels.error_estimates import (
     step_errors,
 )
 from boulder_kernels.ground import Ground, put_soil
-from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
-from boulder_kernels.plastic import PLASTIC_WITH_GAP, memory_of
+from boulder_kernels.impact import failed
+from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, Status, write_outcome
+from boulder_kernels.plastic import memory_of
 from boulder_kernels.rules import limits_in, write_rulings
-from boulder_kernels.soil_laws import SoilProfile, constants_in
+from boulder_kernels.soil_laws import ELEMENT_LAWS, SoilProfile, constants_in
 from boulder_kernels.time_history import sample_of, state_of
 from boulder_kernels.unloading import plastic_work, recall
 from boulder_sweep.report.page_records import (
@@ -51,7 +52,6 @@ from boulder_sweep.report.page_records import (
     PAIRED_AT,
     PIECE_ROOM,
     SETTINGS_COUNT,
-    elements_from,
     first_control,
     given_control,
     halved_control,
@@ -62,6 +62,8 @@ from boulder_sweep.report.page_records import (
     pieces_from,
     readings_from,
     table_from,
+    taking_elements,
+    written_out,
 )
 
 EXPORTS = {"outcomes": "pippipipippppp", "rulings": "ipppp", "history": "pppipipipppippppppp"}
@@ -165,6 +167,24 @@ def simulate_recorded(
     return outcome
 
 
+def by_element_laws() -> Callable[..., Outcome]:
+    """Return a kernel that simulates one design in soil elements of the law that its control asks for."""
+    last = "design, second, readings, control, record, out, centre"
+    lines, names = [f"def simulate(layers, room, memories, {last}):"], {}
+    for code, law in enumerate(ELEMENT_LAWS):
+        names[f"elements_{code}"] = taking_elements(law.record)
+        memory = None if law.gap is None else f"memory_from(room, control.elements, {law.gap}, memories)"
+        lines.append(f"if control.unloading == {code}:")
+        lines.append(f" soil_{code} = SoilProfile(layers, elements_{code}(room, control.elements), {memory})")
+        lines.append(f" return simulate_recorded(soil_{code}, {last})")
+    lines.append("return failed(INVALID)")
+    known = {"SoilProfile": SoilProfile, "memory_from": memory_from, "simulate_recorded": simulate_recorded}
+    return written_out("\n ".join(lines), failed=failed, INVALID=Status.INVALID.value, **known, **names)
+
+
+simulate_by_elements = by_element_laws()
+
+
 @array_kernel
 def simulate_in_soil(
     layers: np.ndarray,
@@ -197,12 +217,8 @@ def simulate_in_soil(
             layers, layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]), None
         )
         return simulate_recorded(in_layers, design, second, readings, control, record, out, centre)
-    if control.unloading == ELASTIC:
-        by_elements = SoilProfile(layers, elements_from(room, n), None)
-        return simulate_recorded(by_elements, design, second, readings, control, record, out, centre)
-    memory = memory_from(room, n, control.unloading == PLASTIC_WITH_GAP, carray(soil_at, (samples, 2 * n + 1)))
-    plastic = SoilProfile(layers, elements_from(room, n), memory)
-    return simulate_recorded(plastic, design, second, readings, control, record, out, centre)
+    memories = carray(soil_at, (samples, 2 * n + 1))
+    return simulate_by_elements(layers, room, memories, design, second, readings, control, record, out, centre)
 
 
 @array_kernel

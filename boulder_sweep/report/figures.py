@@ -17,7 +17,8 @@ from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
 from bokeh.models.annotations import BoxAnnotation, Legend
 from bokeh.plotting import figure
 
-from boulder_kernels import ELASTIC, Control
+from boulder_kernels import Control
+from boulder_kernels.plastic import is_plastic
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import BOX, Shape
 from boulder_sweep.views.pictures import VERDICTS
@@ -52,7 +53,7 @@ CAB_M = 0.85
 
 def parts_of(control: Control) -> list[str]:
     """Return the energies that there are in a soil, in stacking order."""
-    return [part for part in PARTS if part != PLASTIC_WORK or control.unloading != ELASTIC]
+    return [part for part in PARTS if part != PLASTIC_WORK or is_plastic(control.unloading)]
 
 
 def curves(panel: str, parts: Sequence[str]) -> list[figure]:

@@ -10,13 +10,14 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, Control, Design, DesignTable, OutcomeTable, Readings, SecondSpring
+from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings, SecondSpring
 from boulder_kernels._jit import function_of, inlined
 from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
-from boulder_kernels.plastic import LAST, Memory
+from boulder_kernels.plastic import LAST, Memory, is_plastic
 from boulder_kernels.rules import VerdictLimits
+from boulder_kernels.soil_laws import ELEMENT_LAWS
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
@@ -68,7 +69,7 @@ def changing_control(arguments: str, **changed: str) -> Callable[..., Control]:
     """Return a kernel that takes a control c and other arguments, and changes fields to expressions of them."""
     fields = [changed.get(name, f"c.{name}") for name in Control._fields]
     source = f"def change({arguments}):\n return Control({', '.join(fields)})"
-    return written_out(source, Control=Control, ELASTIC=ELASTIC)
+    return written_out(source, Control=Control, is_plastic=is_plastic)
 
 
 readings_from, given_control = taking(Readings), taking(Control, len(Readings._fields))
@@ -76,11 +77,11 @@ table_from, outcomes_from = taking(DesignTable), taking(OutcomeTable)
 first_control = changing_control(
     "c, refined",
     refined="refined",
-    locate_yield="c.locate_yield and c.unloading == ELASTIC",  # what yields in plastic soil depends on its memory
+    locate_yield="c.locate_yield and not is_plastic(c.unloading)",  # what yields in plastic soil depends on its memory
     paired="False",
 )
 """Control of a solution, with its step or a third of it."""
-halved_control = changing_control("c", h="0.5 * c.h", locate_yield="True", unloading="ELASTIC")
+halved_control = changing_control("c", h="0.5 * c.h", locate_yield="True")
 """Control of a second solution, `boulder_kernels.table.halved`."""
 
 
@@ -90,7 +91,9 @@ LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 
 PIECE_ROOM = len(OutlinedPieces._fields) - 1
 """The same for each piece of the soil beside a boulder with an outline: of M layers and P points M + P - 2."""
-ELEMENT_ROOM, MEMORY_ROOM = 6, LAST + 6
+MEMORY_AT = max(len(law.record._fields) for law in ELEMENT_LAWS)  # type: ignore[attr-defined]
+"""Where the memory of N soil elements begins, over N."""
+ELEMENT_ROOM, MEMORY_ROOM = MEMORY_AT + 2, LAST + 6
 """The same for each of N soil elements with what it remembers, and once for all; before them, where a record is kept,
 2 N + 1 for each of its samples."""
 
@@ -101,10 +104,13 @@ def layers_from(t: np.ndarray, sums: np.ndarray) -> SoilLayers:
     return SoilLayers(t[0], t[1], t[2], t[3], t[4], t[5], sums)
 
 
-@inlined
-def elements_from(room: np.ndarray, n: int) -> SoilElements:
-    """Return the first numbers of an array as n soil elements of one design."""
-    return SoilElements(room[:n], room[n : 2 * n], room[2 * n : 3 * n], room[3 * n : 4 * n])
+def taking_elements(record: Any) -> Callable[[np.ndarray, int], Any]:
+    """Return a kernel that takes the first numbers of an array as n soil elements of one design."""
+    fields = [f"room[{k} * n : {k + 1} * n]" for k in range(len(record._fields))]
+    return written_out(f"def take(room, n):\n return Record({', '.join(fields)})", Record=record)
+
+
+elements_from = taking_elements(SoilElements)
 
 
 @inlined
@@ -122,4 +128,5 @@ def outlined_elements_from(room: np.ndarray, n: int, outline: np.ndarray) -> Out
 @inlined
 def memory_from(room: np.ndarray, n: int, gap: bool, samples: np.ndarray) -> Memory:
     """Return the numbers behind n soil elements as what they remember."""
-    return Memory(room[4 * n : 5 * n], room[5 * n : 6 * n], gap, room[6 * n :], samples)
+    front, back = MEMORY_AT * n, (MEMORY_AT + 1) * n
+    return Memory(room[front:back], room[back : ELEMENT_ROOM * n], gap, room[ELEMENT_ROOM * n :], samples)

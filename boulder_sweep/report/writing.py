@@ -249,7 +249,7 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
     if not control.error_estimate:
         notes.append("Numerical errors are those of one solution: a verdict nearer to a limit than that is undecided.")
     if control.unloading:
-        notes.append(f"The soil is plastic ({UNLOADING_WORDS[control.unloading]}).")
+        notes.append(f"The soil has {UNLOADING_WORDS[control.unloading]}.")
     if control.elements > MOST_ELEMENTS:
         notes.append(
             f"The settings ask for {control.elements:,} soil elements; what is simulated in this page uses "

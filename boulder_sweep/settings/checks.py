@@ -121,10 +121,10 @@ def shape_in(entries: Entries) -> Shape:
 
 
 def _check_shape(entries: Entries) -> None:
-    """Report plastic soil beside a boulder that is no box."""
+    """Report soil that is not elastic beside a boulder that is no box."""
     key = "profile" if "profile" in entries.settings else "taper"
     if not shape_in(entries).is_box and entries.settings.get("unloading", UNLOADINGS[0]) != UNLOADINGS[0]:
-        message = f"plastic soil knows boxes only; remove boulder.{key} or model.unloading"
+        message = f"soil that is not elastic is modelled beside boxes only; remove boulder.{key} or model.unloading"
         entries.report(f"boulder.{key}", message)
 
 

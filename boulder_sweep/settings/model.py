@@ -42,10 +42,12 @@ FOOT_WORDS = {
 }
 """What every answer says of it."""
 
-UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
-"""How the soil unloads, in the order of the kernels; the first is the paper's."""
+PLASTIC_UNLOADINGS = ("plastic", "plastic_with_gap")
+"""Ways to unload after which boulders come to rest; see `boulder_kernels.plastic`."""
+UNLOADINGS = ("elastic", *PLASTIC_UNLOADINGS)
+"""How the soil unloads, in the order of `boulder_kernels.soil_laws.ELEMENT_LAWS`; the first is the paper's."""
 PLASTIC_ELEMENTS = 200
-"""Soil elements where the soil is plastic and no number is given."""
+"""Soil elements where the soil is not elastic and no number is given."""
 
 
 class Bound(NamedTuple):
@@ -387,9 +389,9 @@ class Model:
 
     @property
     def elements(self) -> int:
-        """Number of soil elements that is computed with; 0 for the closed form, which plastic soil does not have."""
-        is_plastic = self.unloading != UNLOADINGS[0]
-        return PLASTIC_ELEMENTS if is_plastic and self.soil_elements == 0 else self.soil_elements
+        """Number of soil elements that is computed with; 0 for the closed form, which elastic soil has."""
+        is_elastic = self.unloading == UNLOADINGS[0]
+        return PLASTIC_ELEMENTS if not is_elastic and self.soil_elements == 0 else self.soil_elements
 
     @property
     def ground(self) -> Ground:

@@ -21,7 +21,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.locations import Location
-from boulder_sweep.settings.model import UNLOADINGS
+from boulder_sweep.settings.model import PLASTIC_UNLOADINGS
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store import failures
 from boulder_sweep.store.files import MANIFEST_NAME, PART_SUFFIX, hidden_name, part_name
@@ -157,8 +157,8 @@ class Manifest:
         settings = self.identity.get("settings")
         if not isinstance(settings, dict):
             return ()
-        elastic = settings.get("model", {}).get("unloading", UNLOADINGS[0]) == UNLOADINGS[0]
-        resting = [] if elastic else [spec.name for spec in AT_REST]
+        is_plastic = settings.get("model", {}).get("unloading") in PLASTIC_UNLOADINGS
+        resting = [spec.name for spec in AT_REST] if is_plastic else []
         inputs = settings.get("inputs", {})
         return (*resting, *(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
 

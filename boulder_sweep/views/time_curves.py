@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.errors import PictureError
-from boulder_sweep.settings.model import UNLOADINGS
+from boulder_sweep.settings.model import PLASTIC_UNLOADINGS
 from boulder_sweep.views import pictures
 from boulder_sweep.views.pictures import (
     AMBER,
@@ -92,7 +92,7 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     if math.isfinite(outcome.t_limit):
         limit = math.degrees(trajectory.motion.control.theta_limit)
         return outcome.t_limit, f"shaded: beyond {limit:g}° the model no longer holds"
-    if trajectory.settings["model"].get("unloading", UNLOADINGS[0]) != UNLOADINGS[0]:
+    if trajectory.settings["model"].get("unloading") in PLASTIC_UNLOADINGS:
         return math.inf, ""
     peak = max(outcome.maxima.t_theta, outcome.maxima.t_x_b)
     return peak, "shaded: rebound (the soil of the model has no memory)"

@@ -63,8 +63,9 @@ class Control(NamedTuple):
     """Whether a design that needs more steps than are allowed is simulated all the same, see
     `boulder_kernels.impact.simulate_last_resort`."""
     unloading: int = ELASTIC
-    """How the soil unloads: ELASTIC, or PLASTIC or PLASTIC_WITH_GAP by plastic elements, of which there must be
-    some. Their simulations go on until the boulder is at rest, and are not ended by a proof before the horizon."""
+    """How the soil unloads: ELASTIC, or another of `boulder_kernels.soil_laws.ELEMENT_LAWS`, for which there must be
+    elements. In plastic soil simulations go on until the boulder is at rest, and are not ended by a proof before the
+    horizon."""
     paired: bool = False
     """Where errors are estimated: whether every design is solved twice for it, and not only doubtful ones."""
     event_tolerance: float = TOLERANCE

@@ -34,6 +34,16 @@ ELASTIC, PLASTIC, PLASTIC_WITH_GAP = range(3)
 """How the soil unloads, see `boulder_kernels.impact.Control`."""
 
 
+def is_plastic(unloading: int) -> bool:
+    """Whether soil that unloads in this way is plastic: it keeps a memory, and boulders in it come to rest."""
+    return unloading in (PLASTIC, PLASTIC_WITH_GAP)
+
+
+@overload(is_plastic)
+def _is_plastic(unloading: Any) -> Callable[..., bool]:
+    return is_plastic
+
+
 class Memory(NamedTuple):
     """What N soil elements remember, and what is kept of the motion because of it."""
 

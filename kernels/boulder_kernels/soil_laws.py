@@ -4,7 +4,8 @@ A law is one `SoilLaw`. Which one holds follows from the type of the constants o
 of a uniform soil, others carry the record of their soil. Inside kernels the function is chosen when they are compiled,
 so a uniform soil has the code it would have if there were no other.
 
-To add a law: write its record and functions in a module beside `boulder_kernels.layered_soil`, and a line in `LAWS`.
+To add a law: write its record and functions in a module beside `boulder_kernels.layered_soil`, and a line in `LAWS`;
+if it is one by elements, a line in `ELEMENT_LAWS`, too, by which settings choose it.
 """
 
 from __future__ import annotations
@@ -59,8 +60,10 @@ from .outlined_soil import (
     reaction_of_taper,
 )
 from .plastic import (
+    ELASTIC,
     Memory,
     PlasticConstants,
+    empty_memory,
     potential_of_plastic_elements,
     power_of_plastic_elements,
     reaction_of_plastic_elements,
@@ -81,6 +84,17 @@ class SoilLaw(NamedTuple):
     """Works out the record from the layers of a design, and returns what follows from them."""
 
 
+class ElementLaw(NamedTuple):
+    """Which elements a soil consists of where it is computed by elements."""
+
+    record: type = SoilElements
+    """Their record, one of `LAWS`; its fields are arrays of shape (N,)."""
+    gap: bool | None = None
+    """Whether a gap opens between plastic elements and boulder; None for elements without memory."""
+
+
+ELEMENT_LAWS = (ElementLaw(), ElementLaw(gap=False), ElementLaw(gap=True))
+"""By `boulder_kernels.control.Control.unloading`: ELASTIC, PLASTIC and PLASTIC_WITH_GAP."""
 UNIFORM = SoilLaw(uniform_reaction, uniform_potential, uniform_drag_power)
 LAWS: dict[type, SoilLaw] = {
     SoilElements: SoilLaw(reaction_of_elements, potential_of_elements, power_of_elements, fill_elements),
@@ -245,15 +259,16 @@ Constants, LayeredConstants or PlasticConstants
 """
 
 
-def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None) -> Any:
+def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None, unloading: int = ELASTIC) -> Any:
     """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact.
 
-    Beside an outline, shape (P, 4), each of its points may cut a layer in two.
+    Beside an outline, shape (P, 4), each of its points may cut a layer in two; the soil is elastic there.
     """
     if outline is not None:
         return empty_outlined(layers + len(outline) - 2, elements, outline)
     if elements > 0:
-        return SoilElements(*np.empty((4, elements)))
+        record: Any = ELEMENT_LAWS[unloading].record
+        return record(*np.empty((len(record._fields), elements)))
     to, K, inverse_K, P_0, P_1, R = np.empty((6, layers))
     return SoilLayers(to, K, inverse_K, P_0, P_1, R, np.empty(len(SoilSums._fields)))
 
@@ -262,15 +277,19 @@ def profile_of(
     design: Design,
     layers: np.ndarray | None,
     elements: int,
-    memory: Memory | None = None,
     outline: np.ndarray | None = None,
+    unloading: int = ELASTIC,
+    samples: int = 0,
 ) -> SoilProfile | None:
     """Return the soil of a design in layers, by N elements or, where N is 0, exactly; beside an outline if it has one.
 
-    Without layers it is the uniform soil of the design: None where it is elastic, else its only layer.
+    Without layers it is the uniform soil of the design: None where it is elastic, else its only layer. Plastic elements
+    have room for what they remember at some samples of a record.
     """
     if layers is None:
-        if memory is None and outline is None:
+        if unloading == ELASTIC and outline is None:
             return None
         layers = uniform_layers(design)
-    return SoilProfile(layers, empty_soil(len(layers), elements, outline), memory)
+    gap = ELEMENT_LAWS[unloading].gap
+    memory = None if gap is None else empty_memory(elements, gap, samples)
+    return SoilProfile(layers, empty_soil(len(layers), elements, outline, unloading), memory)

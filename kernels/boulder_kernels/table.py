@@ -21,7 +21,16 @@ from .error_estimates import (
 )
 from .impact import Problem, failed, misses, simulate, simulate_last_resort, simulate_motion
 from .lanes import simulate_lanes
-from .layered import LAYERED, PRESSURE, OutlinedTable, filled_layers, lanes_count
+from .layered import (
+    LAYERED,
+    PRESSURE,
+    PRESSURE_SLOPE,
+    LayeredTable,
+    OutlinedTable,
+    filled_layers,
+    lanes_count,
+    uniform_layers,
+)
 from .outcomes import (
     COARSER,
     FINER,
@@ -38,7 +47,7 @@ from .outcomes import (
     write_outcome,
 )
 from .outlined import given_beside, with_outline
-from .plastic import ELASTIC, LAST, PLASTIC_WITH_GAP, SWING, empty_memory, memory_of
+from .plastic import ELASTIC, LAST, SWING, is_plastic, memory_of
 from .second_spring import SecondSpring, SecondSprings
 from .settling import proof_is_possible
 from .soil_laws import SoilProfile, constants_in, empty_soil, profile_of
@@ -163,10 +172,7 @@ def problem_at(
     second = None if springs is None else SecondSpring(springs.k_2[row], springs.s_2[row])
     layers = table.layers[row] if isinstance(table, LAYERED) else None
     outline = table.outlines[row] if isinstance(table, OutlinedTable) else None
-    memory = None
-    if control.unloading != ELASTIC:
-        memory = empty_memory(control.elements, control.unloading == PLASTIC_WITH_GAP, samples)
-    return Problem(design, profile_of(design, layers, control.elements, memory, outline), second)
+    return Problem(design, profile_of(design, layers, control.elements, outline, control.unloading, samples), second)
 
 
 def simulate_impact(problem: Problem, readings: Readings, control: Control, record: Record) -> Impact:
@@ -265,27 +271,32 @@ def simulate_once(
     ndarray, shape (n,)
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
-    if control.unloading != ELASTIC:
+    n = len(table.L)
+    if control.unloading != ELASTIC and not isinstance(table, LAYERED):
+        uniform = np.array([uniform_layers(design_at(table, row)) for row in range(n)])
+        table = LayeredTable(*table, uniform.reshape(n, 1, PRESSURE_SLOPE + 1))
+    if is_plastic(control.unloading):
         outcomes: OutcomeTable = simulate_plastic_rows(table, readings, control, springs)
-        return outcomes, np.full(len(table.L), NONE_NEEDED)
+        return outcomes, np.full(n, NONE_NEEDED)
     designs = np.stack(table[: len(DesignTable._fields)])
     stacked = None if springs is None else np.stack(springs)
     layers: np.ndarray | None = getattr(table, "layers", None)
     outlines: np.ndarray | None = getattr(table, "outlines", None)
     side_by_side = control.side_by_side and springs is None and control.elements == 0 and control.stop_at_limit
     if control.last_resort and layers is None:
-        out = empty_outcomes(designs.shape[1])
+        out = empty_outcomes(n)
         run_last_resort(designs, stacked, readings, control, no_record(), out)
         return outcome_table(out, step_of_solution(control)), out[SECOND]
     given = given_to_lanes(designs, layers, outlines) if side_by_side else None
     if given is not None:
         out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)
-    elif not designs.shape[1]:
+    elif not n:
         out = empty_outcomes(0)
     else:
         soil = None
         if layers is not None:
-            soil = empty_soil(layers.shape[1], control.elements, None if outlines is None else outlines[0])
+            outline = None if outlines is None else outlines[0]
+            soil = empty_soil(layers.shape[1], control.elements, outline, control.unloading)
         out = simulate_rows(designs, layers, outlines, soil, stacked, readings, control)
     return outcome_table(out, step_of_solution(control)), out[SECOND]
 
@@ -386,6 +397,6 @@ def simulate_table(
     fine, _ = simulate_once(table, readings, refined, springs)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     estimate_errors(out, fine, DesignTable(*table[: len(DesignTable._fields)]), safety)
-    if control.unloading != ELASTIC:
+    if is_plastic(control.unloading):
         add_rest_error(out, fine, safety)
     return fine

@@ -12,7 +12,6 @@ import boulder_kernels as bk
 from boulder_kernels.design import ultimate_pressure
 from boulder_kernels.dynamics import State, contact_displacement, spring_compression
 from boulder_kernels.layered import LayeredTable
-from boulder_kernels.plastic import Memory, empty_memory
 from boulder_kernels.soil_laws import constants_in, profile_of
 from boulder_kernels.table import Impact, simulate_impact
 from tests import oracle
@@ -157,14 +156,14 @@ def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def layered_constants(
-    design: bk.Design, layers: np.ndarray, readings: bk.Readings, elements: int, memory: Memory | None = None
+    design: bk.Design, layers: np.ndarray, readings: bk.Readings, elements: int, unloading: int = bk.ELASTIC
 ) -> Any:
     """Constants of one design in layers of soil, by elements or, where there are none, exactly."""
-    return constants_in(design, readings, elements, profile_of(design, layers, elements, memory))
+    return constants_in(design, readings, elements, profile_of(design, layers, elements, None, unloading))
 
 
 def simulate_plastic(design: bk.Design, readings: bk.Readings, how: bk.Control, record: bk.Record) -> Impact:
     """Simulate one impact in plastic soil."""
-    memory = empty_memory(how.elements, how.unloading == bk.PLASTIC_WITH_GAP, len(record.times))
-    problem = bk.Problem(design, profile_of(design, None, how.elements, memory), None)
+    profile = profile_of(design, None, how.elements, unloading=how.unloading, samples=len(record.times))
+    problem = bk.Problem(design, profile, None)
     return simulate_impact(problem, readings, how, record)

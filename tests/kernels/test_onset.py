@@ -15,7 +15,7 @@ from boulder_kernels.lanes import start_again
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
 from boulder_kernels.numerics import field
-from boulder_kernels.plastic import empty_memory
+from boulder_kernels.plastic import PLASTIC
 from boulder_kernels.workspace import (
     CONSTANTS,
     EVENTS,
@@ -104,7 +104,7 @@ def test_the_onset_is_the_same_by_every_law_of_the_soil() -> None:
     assert onset_of(layered_constants(RWG, strong, CORRECTED, 0)) == pytest.approx(known, rel=1e-9)
     for elements in (200, 400):
         in_layers = layered_constants(RWG, layers, CORRECTED, elements)
-        plastic = layered_constants(RWG, layers, CORRECTED, elements, empty_memory(elements, False))
+        plastic = layered_constants(RWG, layers, CORRECTED, elements, PLASTIC)
         for c in (constants_of(RWG, CORRECTED, elements), in_layers, plastic):
             assert onset_of(c) == pytest.approx(known, rel=20.0 / elements**2)
     soft = np.vstack([layers, layers])
