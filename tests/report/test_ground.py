@@ -49,8 +49,13 @@ def test_the_simulator_has_the_soil_of_the_command_line(soil, law, tmp_path, ope
         assert found[name] == pytest.approx(known[name], rel=1e-5, abs=1e-11), name
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("soil", ["all", "elements in all", "plastic", "plastic in all"])
+@pytest.mark.parametrize(
+    "soil",
+    [
+        "all",
+        *(pytest.param(soil, marks=pytest.mark.nightly) for soil in ("elements in all", "plastic", "plastic in all")),
+    ],
+)
 def test_curves_and_energies_are_those_of_the_command_line(soil, tmp_path, opened):
     """With a second spring, whose soil stays the same where it takes over."""
     stages = "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.4 m, stiffness: 9 MN/m}]"
