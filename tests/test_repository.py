@@ -103,6 +103,15 @@ def test_numba_is_admitted_up_to_the_version_that_is_tested() -> None:
     assert bounds()["numba"].partition(",")[2] == f"<{major}.{int(minor) + 1}"
 
 
+@pytest.mark.parametrize("script", sorted(path.name for path in (ROOT / ".ci").iterdir()))
+def test_the_tests_that_a_script_names_are_there(script: str) -> None:
+    """What a script lists in braces is written out as the shell does."""
+    text = (ROOT / ".ci" / script).read_text(encoding="utf-8")
+    for first, listed, last in re.findall(r"(tests/[\w/]*)(?:\{([\w,]+)\})?([\w/]*\.\w+)", text):
+        for name in listed.split(","):
+            assert (ROOT / f"{first}{name}{last}").is_file(), name
+
+
 def test_pre_commit_runs_the_tools_of_the_lock() -> None:
     locked = pins("requirements-dev.lock")
     hooks = {
