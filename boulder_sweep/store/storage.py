@@ -261,8 +261,8 @@ class ObjectStorage(_Storage):
             self._version = number
             if there == content:
                 break  # else: what this run wrote before, and was told it could not
-        (self.path / MANIFEST_NAME).put(content)
-        with suppress(OSError):
+        with suppress(OSError):  # the version is what counts, and is there
+            (self.path / MANIFEST_NAME).put(content)
             (self.path / version_name(number - KEPT)).unlink(missing_ok=True)
 
     def discard_manifest(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import itertools
 import json
@@ -27,7 +28,7 @@ from boulder_sweep.store.failures import (
     StoreError,
     WriteError,
 )
-from boulder_sweep.store.files import is_part_name, version_name
+from boulder_sweep.store.files import MANIFEST_NAME, is_part_name, version_name
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import read_table
 from boulder_sweep.store.storage import KEPT, newest
@@ -116,6 +117,23 @@ def test_the_newest_manifest_is_found_where_copy_and_list_are_behind(out, monkey
     if behind in ("the list", "both"):
         monkeypatch.setattr(RemotePath, "names", lambda self: [version_name(2)])
     assert load(out).rows_done == folders.ROWS
+
+
+def test_a_copy_of_the_manifest_that_cannot_be_written_costs_no_row(out, monkeypatch):
+    """The version is there: to take the parts for not recorded would compute them again."""
+    folder = folders.open_folder(out)
+    put = RemotePath.put
+
+    def denied(self: RemotePath, content: memoryview | bytes, **how: bool) -> None:
+        if self.name == MANIFEST_NAME:
+            raise PermissionError(errno.EACCES, "not yours")
+        put(self, content, **how)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(RemotePath, "put", denied)
+        folders.commit(folder, 0)
+    assert (load(out).rows_done, folder.rows_safe) == (folders.SIZE, folders.SIZE)
+    folder.close("stopped")
 
 
 def test_a_second_run_is_refused_while_the_first_is_alive(out, stopped_clock):
@@ -249,7 +267,12 @@ def test_foreign_files_and_places_without_a_result_are_refused(out):
         folders.open_folder(out / "thesis.tex")
 
 
-def test_a_store_that_cannot_be_written_is_refused_before_anything_is_computed():
+@pytest.mark.parametrize("reads", [True, False])
+def test_a_store_that_cannot_be_written_is_refused_before_anything_is_computed(monkeypatch, reads):
+    def of(self: Trouble, *kinds: str) -> str:
+        return "refused" if "refused" in kinds else "" if reads else kinds[0]
+
+    monkeypatch.setattr(Trouble, "of", of)
     with (
         store(Trouble(0, 1.0, True)),
         pytest.raises(WriteError, match=f"cannot write into {OUT}: (Timeout|Connection)Error: no answer"),
