@@ -73,7 +73,7 @@ class Points:
 
     def __init__(self, dimensions: int, seed: int) -> None:
         seeds = np.random.SeedSequence(seed).spawn(SCRAMBLINGS)
-        self._engines = [qmc.Sobol(dimensions, scramble=True, seed=np.random.default_rng(own)) for own in seeds]
+        self._engines = [qmc.Sobol(dimensions, scramble=True, seed=np.random.default_rng(one)) for one in seeds]
         self._points = np.empty((SCRAMBLINGS, 0, dimensions))
 
     def upto(self, count: int) -> np.ndarray:
@@ -164,8 +164,8 @@ def chance(
         new = points.upto(target)[:, done:target]
         flat = new.reshape(-1, new.shape[2])
         index = np.repeat(open_, len(flat))
-        found = event(index, np.tile(flat, (len(open_), 1))).reshape(len(open_), SCRAMBLINGS, -1)
-        happened[open_] += found.sum(axis=2)
+        occurred = event(index, np.tile(flat, (len(open_), 1))).reshape(len(open_), SCRAMBLINGS, -1)
+        happened[open_] += occurred.sum(axis=2)
         count[open_] = target
         done = target
         low, high = interval(happened[open_], target, sure)
@@ -269,7 +269,7 @@ def subset_simulation(
         open_, edge, inside = open_[going], edge[going], inside[going]
         if not len(open_):
             break
-        x[open_], g[open_] = _moved(distance, open_, rng, x[open_], g[open_], inside, edge)
+        x[open_], g[open_] = _refill_populations(distance, open_, rng, x[open_], g[open_], inside, edge)
     return _combined(probability, confidence)
 
 
@@ -279,7 +279,7 @@ def _distances(distance: Distance, rows: np.ndarray, x: np.ndarray) -> np.ndarra
     return distance(np.repeat(rows, each), x.reshape(-1, x.shape[-1])).reshape(x.shape[:-1])
 
 
-def _moved(
+def _refill_populations(
     distance: Distance,
     rows: np.ndarray,
     rng: np.random.Generator,
@@ -300,9 +300,9 @@ def _moved(
     chain_x, chain_g = [now], [value]
     for _ in range(points // chains - 1):
         tried = KEPT * now + math.sqrt(1.0 - KEPT**2) * rng.standard_normal(now.shape)
-        found = _distances(distance, rows, tried)
-        taken = found <= edge[:, None, None]
-        now, value = np.where(taken[..., None], tried, now), np.where(taken, found, value)
+        tried_g = _distances(distance, rows, tried)
+        taken = tried_g <= edge[:, None, None]
+        now, value = np.where(taken[..., None], tried, now), np.where(taken, tried_g, value)
         chain_x.append(now)
         chain_g.append(value)
     return np.concatenate(chain_x, axis=2), np.concatenate(chain_g, axis=2)

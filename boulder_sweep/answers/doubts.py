@@ -101,23 +101,23 @@ def indices(
     points = both if uniform else ndtri(np.clip(both, SMALLEST, 1.0 - SMALLEST))
     A, B = points[:, :dimensions], points[:, dimensions:]
     mixed = np.repeat(A[None], dimensions, axis=0)
-    for place in range(dimensions):
-        mixed[place, :, place] = B[:, place]
+    for k in range(dimensions):
+        mixed[k, :, k] = B[:, k]
     values = outputs(np.concatenate([A, B, mixed.reshape(-1, dimensions)]))
     f_A, f_B = values[:, :base], values[:, base : 2 * base]
     f_AB = values[:, 2 * base :].reshape(len(values), dimensions, base)
-    found = {name: np.full((len(values), dimensions), np.nan) for name in Indices.__dataclass_fields__}
+    estimates = {name: np.full((len(values), dimensions), np.nan) for name in Indices.__dataclass_fields__}
     ends = [0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence]
     again = rng.integers(0, base, (RESAMPLES, base))
-    for place, (a, b, ab) in enumerate(zip(f_A, f_B, f_AB, strict=True)):
+    for output, (a, b, ab) in enumerate(zip(f_A, f_B, f_AB, strict=True)):
         if np.concatenate([a, b]).var() == 0.0:
             continue
-        found["first"][place], found["total"][place] = estimators(a, b, ab)
+        estimates["first"][output], estimates["total"][output] = estimators(a, b, ab)
         resampled = [estimators(a[rows], b[rows], ab[:, rows]) for rows in again]
         for order, name in enumerate(("first", "total")):
-            low, high = np.quantile([own[order] for own in resampled], ends, axis=0)
-            found[f"{name}_low"][place], found[f"{name}_high"][place] = low, high
-    return Indices(**found)
+            low, high = np.quantile([pair[order] for pair in resampled], ends, axis=0)
+            estimates[f"{name}_low"][output], estimates[f"{name}_high"][output] = low, high
+    return Indices(**estimates)
 
 
 def estimators(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -154,11 +154,11 @@ def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
         Index of the input; -1 where the output does not vary.
     """
     shares = np.empty((len(output), z.shape[1]))
-    for place in range(z.shape[1]):
-        order = np.argsort(z[:, place], kind="stable")
+    for k in range(z.shape[1]):
+        order = np.argsort(z[:, k], kind="stable")
         strata = np.array_split(order, STRATA)
-        means = np.stack([output[:, own].mean(axis=1) for own in strata], axis=1)
-        shares[:, place] = means.var(axis=1)
+        means = np.stack([output[:, stratum].mean(axis=1) for stratum in strata], axis=1)
+        shares[:, k] = means.var(axis=1)
     return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
 
 
@@ -213,22 +213,22 @@ def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = N
     rows = uncertain_rows(sweep, sweep.plan.given_rows(design, design + 1), design, design + 1)
     index = np.zeros(DRAWN, dtype=np.int64)
     margins = np.empty((2 ** len(SWITCHES), 2, DRAWN))
-    for place, own in enumerate(every_reading(sweep)):
+    for reading, variant in enumerate(every_reading(sweep)):
         for law, resistance in enumerate(COMPARED):
-            judges = judges_of(replace(own, model=replace(own.model, resistance=resistance)), compared=True)
-            margins[place, law] = Draws(rows, spread, judges, Pool(jobs)).distance(index, z)
+            judges = judges_of(replace(variant, model=replace(variant.model, resistance=resistance)), compared=True)
+            margins[reading, law] = Draws(rows, spread, judges, Pool(jobs)).distance(index, z)
     return [*parted(margins), Doubt(NUMERICAL, *(2 * [_numerical(sweep, spread, rows, z, judges_of(sweep), margins)]))]
 
 
 def parted(margins: np.ndarray) -> list[Doubt]:
     """Divide the variance of values, shape (readings, laws, samples), among these three."""
     variance = margins.var()
-    found = []
+    parts = []
     for cause, axis in ((INPUTS, 2), (READINGS, 0), (LAW, 1)):
         others = tuple(other for other in range(3) if other != axis)
         alone, total = margins.mean(axis=others).var(), margins.var(axis=axis).mean()
-        found.append(Doubt(cause, *(float(own / variance) if variance > 0.0 else 0.0 for own in (alone, total))))
-    return found
+        parts.append(Doubt(cause, *(float(part / variance) if variance > 0.0 else 0.0 for part in (alone, total))))
+    return parts
 
 
 def _numerical(sweep: Sweep, spread: Spread, rows: Rows, z: np.ndarray, judges: Judges, margins: np.ndarray) -> float:

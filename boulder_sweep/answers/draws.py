@@ -114,12 +114,12 @@ class Draws:
             return self._each(given, self.judges, reserve)
         count = len(self.variants)
         chosen = np.minimum((ndtr(z[:, -1]) * count).astype(np.int64), count - 1)
-        found = np.empty(len(index))
-        for place, judges in enumerate(self.variants):
-            own = np.flatnonzero(chosen == place)
-            if len(own):
-                found[own] = self._each(rows_at(given, own), judges, reserve)
-        return found
+        measures = np.empty(len(index))
+        for k, judges in enumerate(self.variants):
+            rows = np.flatnonzero(chosen == k)
+            if len(rows):
+                measures[rows] = self._each(rows_at(given, rows), judges, reserve)
+        return measures
 
     def _each(self, given: Rows, judges: Judges, reserve: bool) -> np.ndarray:
         def judged_by(evaluation: Evaluation, rows: Rows) -> tuple[Judged, np.ndarray]:
@@ -127,21 +127,21 @@ class Draws:
             judged = evaluation(block)
             return judged, _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)
 
-        judged, found = judged_by(judges.coarse, given)
+        judged, measures = judged_by(judges.coarse, given)
         if judges.coarse is not judges.final:
             near = np.flatnonzero(np.abs(judged["margin"] - judges.least_margin) < NEAR)
             if len(near):
-                found[near] = judged_by(judges.final, rows_at(given, near))[1]
-        return found
+                measures[near] = judged_by(judges.final, rows_at(given, near))[1]
+        return measures
 
 
 def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:
     """Return the distance of designs from failing; see `Draws.distance`."""
     margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
-    found = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
+    distance = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
     # On a limit or undecided: neither counts as passing. An undecided row may have no margin.
-    found = np.where(np.isnan(margin) & (judged.verdict == UNDECIDED), 0.0, found)
-    return _signed(found, judged, judges)
+    distance = np.where(np.isnan(margin) & (judged.verdict == UNDECIDED), 0.0, distance)
+    return _sign_measure(distance, judged, judges)
 
 
 def _reserve_of(judged: Judged, judges: Judges, block: DesignBlock) -> np.ndarray:
@@ -158,10 +158,10 @@ def _reserve_of(judged: Judged, judges: Judges, block: DesignBlock) -> np.ndarra
     beyond = np.sum([np.nan_to_num(np.minimum(part, 0.0), nan=0.0) for part in parts], axis=0)
     # A design that the truck goes over is worse than any that overturns, and one that cannot be computed the worst.
     beyond += np.where(judged.verdict == ERROR, WORST, np.where(judged.reason == NO_CONTACT, -1.0, 0.0))
-    return _signed(np.where(judges.holds(judged), inside, beyond), judged, judges)
+    return _sign_measure(np.where(judges.holds(judged), inside, beyond), judged, judges)
 
 
-def _signed(found: np.ndarray, judged: Judged, judges: Judges) -> np.ndarray:
+def _sign_measure(measure: np.ndarray, judged: Judged, judges: Judges) -> np.ndarray:
     """Return a measure that is positive where designs pass, and negative where they do not."""
     smallest = np.finfo(float).tiny
-    return np.where(judges.holds(judged), np.maximum(found, smallest), np.minimum(found, -smallest))
+    return np.where(judges.holds(judged), np.maximum(measure, smallest), np.minimum(measure, -smallest))

@@ -183,13 +183,13 @@ class Boulders:
             each = count ** len(bounds)
             index = np.repeat(np.arange(n), each)
             flat = {name: values.ravel() for name, values in tried.items()}
-            found = self.least(index, flat)
-            mass = np.where(found.has_holds, self.mass(index, found.holds, flat), np.inf).reshape(n, each)
-            place = mass.argmin(axis=1)
-            better = mass[np.arange(n), place] < best
-            best = np.where(better, mass[np.arange(n), place], best)
+            result = self.least(index, flat)
+            mass = np.where(result.has_holds, self.mass(index, result.holds, flat), np.inf).reshape(n, each)
+            column = mass.argmin(axis=1)
+            better = mass[np.arange(n), column] < best
+            best = np.where(better, mass[np.arange(n), column], best)
             for name in bounds:
-                chosen[name] = np.where(better, tried[name][np.arange(n), place], chosen[name])
+                chosen[name] = np.where(better, tried[name][np.arange(n), column], chosen[name])
         return chosen
 
     def least(self, index: np.ndarray, others: Sides) -> Search:
@@ -202,30 +202,30 @@ class Boulders:
 
     def predicate(self, index: np.ndarray, others: Sides, *, quick: bool) -> Predicate:
         """Return the predicate of a search in rows, given the other sides and the depth of each."""
-        return lambda rows, places: self.codes(index[rows], places, rows_at(others, rows), quick=quick)
+        return lambda rows, positions: self.codes(index[rows], positions, rows_at(others, rows), quick=quick)
 
-    def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
+    def codes(self, index: np.ndarray, positions: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
         """Return the predicate of `search`."""
-        block = self.block(index, places, others)
+        block = self.block(index, positions, others)
         self.simulated += len(block) if quick else 0
         judged = self.judges.coarse(block) if quick else self._final(block)
         return np.where(beyond_reach(block, judged), BEYOND, np.where(self.judges.holds(judged), HOLDS, FAILS))
 
-    def block(self, index: np.ndarray, places: np.ndarray, others: Sides) -> DesignBlock:
+    def block(self, index: np.ndarray, positions: np.ndarray, others: Sides) -> DesignBlock:
         """Return the designs with boulders of these sizes."""
-        sides = self.sides(places, others)
+        sides = self.sides(positions, others)
         share = others.get(SHARE, np.zeros(len(index)))
         return block_at(self.rows, index, **sides, **{DEPTH: self.depth(index, sides[HEIGHT], share)})
 
-    def sides(self, places: np.ndarray, others: Sides) -> Sides:
-        """Return all sides [m] from the lattice place of the one searched for (or of the scale) and the others."""
-        fixed = {side: np.full(len(places), self.asked.bounds[side][0]) for side in SIDES}
+    def sides(self, positions: np.ndarray, others: Sides) -> Sides:
+        """Return all sides [m] from the lattice position of the one searched for (or of the scale) and the others."""
+        fixed = {side: np.full(len(positions), self.asked.bounds[side][0]) for side in SIDES}
         if self.side == SCALE:
-            return {side: _millimetres(values * places / MILLIMETRES) for side, values in fixed.items()}
-        return fixed | {side: others[side] for side in SIDES if side in others} | {self.side: places / MILLIMETRES}
+            return {side: _millimetres(values * positions / MILLIMETRES) for side, values in fixed.items()}
+        return fixed | {side: others[side] for side in SIDES if side in others} | {self.side: positions / MILLIMETRES}
 
     def depth(self, index: np.ndarray, height: np.ndarray, share: np.ndarray) -> np.ndarray:
-        """Return depths [m] from their places between the shallowest (0) and the deepest (1), shape (n,)."""
+        """Return depths [m] from shares between the shallowest (0) and the deepest (1), shape (n,)."""
         bounds = self.asked.bounds
         low, high = (end * (height if RATIO in bounds else 1.0) for end in bounds[RATIO if RATIO in bounds else DEPTH])
         if np.array_equal(low, high):
@@ -237,61 +237,61 @@ class Boulders:
     def _deepest(self, height: np.ndarray, bumper: np.ndarray) -> np.ndarray:
         """Return the greatest depth [m], in whole millimetres, at which the boulder's top overlaps the truck enough."""
         overlap = self.asked.sweep.criterion.min_overlap_m
-        places = np.floor((height - bumper - overlap) * MILLIMETRES + 1e-6)
+        depth_mm = np.floor((height - bumper - overlap) * MILLIMETRES + 1e-6)
         # By the very sums of the verdict, which may fall short by a bit where they are equal in decimals.
-        left = height - places / MILLIMETRES - bumper
-        return (places - ((left < overlap) | (left <= 0.0))) / MILLIMETRES
+        left = height - depth_mm / MILLIMETRES - bumper
+        return (depth_mm - ((left < overlap) | (left <= 0.0))) / MILLIMETRES
 
-    def mass(self, index: np.ndarray, places: np.ndarray, others: Sides) -> np.ndarray:
+    def mass(self, index: np.ndarray, positions: np.ndarray, others: Sides) -> np.ndarray:
         """Mass of boulders [kg]."""
-        sides = self.sides(places, others)
+        sides = self.sides(positions, others)
         solid = np.prod([sides[side] for side in SIDES], axis=0) * self.rows["boulder_density_kg_m3"][index]
         return self.asked.sweep.model.shape.filled * solid
 
     def certified(self, others: Sides) -> _SizedBrackets:
         """Return what the search finds for other sides and depths, one for each row, with the sweep's accuracy."""
         index = np.arange(len(next(iter(self.rows.values()))))
-        found, final = self.least(index, others), self.predicate(index, others, quick=False)
-        found = searched_again(final, found, contradicted(final, found), *self.ends(len(index)), CELLS)
-        return self.found(others, found.shown, found.has_holds, found.fails, found.has_fails)
+        result, final = self.least(index, others), self.predicate(index, others, quick=False)
+        result = searched_again(final, result, contradicted(final, result), *self.ends(len(index)), CELLS)
+        return self.brackets(others, result.shown, result.has_holds, result.fails, result.has_fails)
 
     def bracketed(self, sizes: Sides) -> _SizedBrackets:
         """Return boulders with the last lighter ones that fail, by the side that is searched for."""
-        places = self.places(sizes)
-        index = np.arange(len(places))
+        positions = self.positions(sizes)
+        index = np.arange(len(positions))
         predicate = self.predicate(index, sizes, quick=False)
-        has_holds = predicate(index, places) == HOLDS
-        first = np.where(has_holds, self.first, places)
-        fails, holds, has_fails = last_before(predicate, places, first)
-        return self.found(sizes, holds, has_holds, fails, has_fails)
+        has_holds = predicate(index, positions) == HOLDS
+        first = np.where(has_holds, self.first, positions)
+        fails, holds, has_fails = last_before(predicate, positions, first)
+        return self.brackets(sizes, holds, has_holds, fails, has_fails)
 
-    def found(
-        self, others: Sides, places: np.ndarray, passes: np.ndarray, fails: np.ndarray, has_fails: np.ndarray
+    def brackets(
+        self, others: Sides, positions: np.ndarray, passes: np.ndarray, fails: np.ndarray, has_fails: np.ndarray
     ) -> _SizedBrackets:
-        """Return what was found for all rows, from places of the side and whether boulders of this side pass."""
-        index = np.arange(len(places))
-        sides = self.sides(places, others)
-        at_least = places == self.first
+        """Return the brackets of all rows, from positions of the side and whether boulders of this side pass."""
+        index = np.arange(len(positions))
+        sides = self.sides(positions, others)
+        at_least = positions == self.first
         for side in self.asked.free:
             at_least &= sides[side] <= self.asked.bounds[side][0]
         return _SizedBrackets(
-            self.block(index, places, others),
+            self.block(index, positions, others),
             np.where(passes, np.where(at_least, ALWAYS, FOUND), NEVER).astype(np.int8),
             np.where(has_fails, self.mass(index, fails, others), np.nan),
-            np.where(passes, self.mass(index, places, others), np.nan),
-            others | {self.side: places / MILLIMETRES},
+            np.where(passes, self.mass(index, positions, others), np.nan),
+            others | {self.side: positions / MILLIMETRES},
         )
 
     def lighter(self, sizes: Sides, passing: np.ndarray) -> Sides:
         """Return lighter boulders that pass than those of some rows, tried at random around the lightest so far."""
         sizes = {name: values.copy() for name, values in sizes.items()}
-        mass = self.mass(np.arange(len(passing)), self.places(sizes), sizes)
+        mass = self.mass(np.arange(len(passing)), self.positions(sizes), sizes)
         unlucky = np.where(passing, 0, UNLUCKY)
         draw = 0
         while (rows := np.flatnonzero(unlucky < UNLUCKY)).size:
             index, tried, masses = self.neighbours(rows, sizes, mass, draw)
             # With the sweep's accuracy: the quick evaluation misses some that pass in a narrow stretch.
-            kept = self.codes(index, self.places(tried), tried, quick=False) == HOLDS
+            kept = self.codes(index, self.positions(tried), tried, quick=False) == HOLDS
             index, masses = index[kept], masses[kept]
             tried = rows_at(tried, kept)
             lucky, chosen = _least_of_each(index, masses)
@@ -321,31 +321,31 @@ class Boulders:
                 tried[name] = values
             else:
                 tried[name] = _millimetres(values).ravel()
-        masses = self.mass(index, self.places(tried), tried)
+        masses = self.mass(index, self.positions(tried), tried)
         kept = masses < mass[index]
         return index[kept], rows_at(tried, kept), masses[kept]
 
-    def places(self, sizes: Sides) -> np.ndarray:
-        """Return the places of the side that is searched for."""
+    def positions(self, sizes: Sides) -> np.ndarray:
+        """Return the positions of the side that is searched for."""
         return np.rint(sizes[self.side] * MILLIMETRES).astype(np.int64)
 
 
-def _lightest(rows: Rows, found: Sequence[_SizedBrackets]) -> _SizedBrackets:
+def _lightest(rows: Rows, answers: Sequence[_SizedBrackets]) -> _SizedBrackets:
     """Return the lightest of several answers for each row; rather one with a bracket."""
-    masses = [np.where(np.isnan(own.passes), np.inf, own.passes) + 1e-6 * np.isnan(own.fails) for own in found]
+    masses = [np.where(np.isnan(one.passes), np.inf, one.passes) + 1e-6 * np.isnan(one.fails) for one in answers]
     best, index = np.argmin(masses, axis=0), np.arange(len(masses[0]))
 
     def picked(arrays: Iterable[np.ndarray]) -> np.ndarray:
         return np.stack(list(arrays))[best, index]
 
-    columns = {name: picked(own.block.columns[name].to_numpy() for own in found) for name in (*SIDES, DEPTH)}
-    kind, fails, passes = (picked(getattr(own, name) for own in found) for name in ("kind", "fails", "passes"))
-    sizes = {name: picked(own.sizes[name] for own in found) for name in found[0].sizes}
+    columns = {name: picked(one.block.columns[name].to_numpy() for one in answers) for name in (*SIDES, DEPTH)}
+    kind, fails, passes = (picked(getattr(one, name) for one in answers) for name in ("kind", "fails", "passes"))
+    sizes = {name: picked(one.sizes[name] for one in answers) for name in answers[0].sizes}
     return _SizedBrackets(block_at(rows, index, **columns), kind, fails, passes, sizes)
 
 
 def _least_of_each(index: np.ndarray, masses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows that an index names, and the place of the least mass of each; the first of equal ones."""
+    """Return the rows in `index`, and for each the entry of its least mass; the first of equal ones."""
     order = np.argsort(masses, kind="stable")
     rows, first = np.unique(index[order], return_index=True)
     return rows, order[first]

@@ -84,7 +84,7 @@ class Need(Result):
         """Number of rows that cannot be computed, other than where the boulder has no face left for the truck."""
         rows = zip(*(self.arrow[name].to_pylist() for name in ("verdict", "reason", "found")), strict=True)
         blocked = WORDS[BLOCKED]
-        return sum(v == "error" and not (found == blocked and why in NO_FACE) for v, why, found in rows)
+        return sum(v == "error" and not (kind == blocked and why in NO_FACE) for v, why, kind in rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -228,9 +228,8 @@ def need(
         raise QuestionError("--robust and --probability cannot be used together")
     sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings and not robust else [sweep]
     judges = [judges_of(one, least_margin, compared=drawn and one is not sweep, robust=robust) for one in sweeps]
-    asked = [
-        _question(one, key, between, own, probability, seed, variants) for one, own in zip(sweeps, judges, strict=True)
-    ]
+    pairs = zip(sweeps, judges, strict=True)
+    asked = [_question(one, key, between, judge, probability, seed, variants) for one, judge in pairs]
     asked[0].judges.final.warm_up()
     done = _Progress(progress, asked, local=backend == THREADING)
     pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
@@ -322,17 +321,17 @@ def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: in
     from boulder_sweep.store.schema import word_array
 
     answers = [question.answered(start, stop) for question in asked]
-    own, key, sweep = answers[0], asked[0].key, asked[0].sweep
+    first, key, sweep = answers[0], asked[0].key, asked[0].sweep
     unit = key.field.unit
     what = f"{'largest' if key.most else 'smallest'} value of {key.field.path} that passes"
     next_to_it = f"value next to it of {key.field.path} that does not pass; where none passes, the last one tried"
     columns: list[TableColumn] = [
-        (key.answer, unit, f"{what}; null where none does", own.passes),
-        ("fails_at", unit, next_to_it, own.fails),
-        ("passes_at", unit, "the same as the answer: judged as a run judges it", own.passes),
-        ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(own.kind, WORDS)),
-        ("passes_within", unit, "where it fails again further on: all stretches that pass", own.stretches),
-        *to_build(own.block, sweep),
+        (key.answer, unit, f"{what}; null where none does", first.passes),
+        ("fails_at", unit, next_to_it, first.fails),
+        ("passes_at", unit, "the same as the answer: judged as a run judges it", first.passes),
+        ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(first.kind, WORDS)),
+        ("passes_within", unit, "where it fails again further on: all stretches that pass", first.stretches),
+        *to_build(first.block, sweep),
     ]
     for question, other in zip(asked[1:], answers[1:], strict=True):
         name = question.sweep.model.preset
@@ -340,11 +339,11 @@ def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: in
             (f"{key.answer}_{name}", unit, f"{what} by the readings {name}", other.passes),
             (f"found_{name}", "", f"as found, by the readings {name}", word_array(other.kind, WORDS)),
         ]
-    if own.chances is not None:
+    if first.chances is not None:
         columns += [
-            ("p_pass", "1", "chance of passing at the answer, or at the value tried last", own.chances.estimate),
-            ("p_pass_low", "1", "lower end of the interval of p_pass", own.chances.low),
-            ("p_pass_high", "1", "upper end of the interval of p_pass", own.chances.high),
+            ("p_pass", "1", "chance of passing at the answer, or at the value tried last", first.chances.estimate),
+            ("p_pass_low", "1", "lower end of the interval of p_pass", first.chances.low),
+            ("p_pass_high", "1", "upper end of the interval of p_pass", first.chances.high),
         ]
-    table = rows_table(start, own.block, own.judged, columns, at=1 + len(INPUTS))
+    table = rows_table(start, first.block, first.judged, columns, at=1 + len(INPUTS))
     return table, sum(answer.simulated for answer in answers)

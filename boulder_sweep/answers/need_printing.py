@@ -87,7 +87,7 @@ def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[s
     by_soil = _by_soil(need, rows, units) if len(rows) > MOST_LINES else []
     tables = by_soil or [table_lines(_need_columns(need, units), rows[:MOST_IN_ALL])]
     kept = tables[: max(1, MOST_IN_ALL // len(tables[0]))]
-    lines = [line for place, table in enumerate(kept) for line in ([""] * (place > 0) + table)]
+    lines = [line for k, table in enumerate(kept) for line in ([""] * (k > 0) + table)]
     if len(kept) < len(tables):
         lines.append(f"(the first {len(kept)} of {len(tables)} tables; -o writes all {len(rows):,} rows)")
     elif not by_soil and len(rows) > MOST_IN_ALL:
@@ -125,16 +125,16 @@ def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
     others += [(head_of(name, units), number_of(name, units)) for name in names if BY_NAME[name].section != SOIL]
     others += [] if key.name.startswith("boulder_") else [_mass(units)]
     answer = _answer(key, "", 1.0 if units == "si" else shown_unit(key.field.unit, units).size)
-    found: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
+    answers: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
     for row in rows:
-        own = found.setdefault(tuple(cell(row) for _, cell in others), {})
-        own[tuple(cell(row) for _, cell in soils)] = answer(row)
-    heads = list(dict.fromkeys(soil for own in found.values() for soil in own))
+        by_soil = answers.setdefault(tuple(cell(row) for _, cell in others), {})
+        by_soil[tuple(cell(row) for _, cell in soils)] = answer(row)
+    heads = list(dict.fromkeys(soil for by_soil in answers.values() for soil in by_soil))
     titles = [" ".join(head).strip() for head, _ in soils]
-    edge = [[*head, *texts] for (head, _), texts in zip(others, zip(*found, strict=True), strict=True)]
-    left = table_texts(edge) if edge else ["", "", *[""] * len(found)]
+    edge = [[*head, *texts] for (head, _), texts in zip(others, zip(*answers, strict=True), strict=True)]
+    left = table_texts(edge) if edge else ["", "", *[""] * len(answers)]
     left = [text.rjust(max(len(left[0]), *map(len, titles))) for text in left]
-    columns = [[*soil, "", "", *(own.get(soil, "") for own in found.values())] for soil in heads]
+    columns = [[*soil, "", "", *(by_soil.get(soil, "") for by_soil in answers.values())] for soil in heads]
     each = max(len(text) for column in columns for text in column) + 2
     most = max(1, (WIDTH - len(left[0])) // each)
     word, unit = head_of(key.name, units)
@@ -143,9 +143,9 @@ def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
     for start in range(0, len(columns), most):
         part = columns[start : start + most]
         lines = [title.rjust(len(left[0]))] * (start == 0)
-        for place, edge_text in enumerate([*(text.rjust(len(left[0])) for text in titles), *left]):
-            lines.append((edge_text + "".join(column[place].rjust(each) for column in part)).rstrip())
-            if place == len(titles) + 1:
+        for k, edge_text in enumerate([*(text.rjust(len(left[0])) for text in titles), *left]):
+            lines.append((edge_text + "".join(column[k].rjust(each) for column in part)).rstrip())
+            if k == len(titles) + 1:
                 lines.append("─" * (len(left[0]) + each * len(part)))
         tables.append(lines)
     return tables
@@ -153,14 +153,14 @@ def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
 
 def _legend(need: Need, file: str) -> list[str]:
     """Return what the words of the answers mean, how many rows have each, and what to ask next."""
-    own = need.counts()
-    occurring = {*own, *(word for name in need.others for word in need.arrow[f"found_{name}"].unique().to_pylist())}
+    counts = need.counts()
+    occurring = {*counts, *(word for name in need.others for word in need.arrow[f"found_{name}"].unique().to_pylist())}
     lines = [
-        f"{note} ({counted(own[word], 'row')})" if word in own else note
+        f"{note} ({counted(counts[word], 'row')})" if word in counts else note
         for word, note in NOTES.items()
         if word in occurring
     ]
-    if "never" in own or "blocked_by_overlap" in own:
+    if "never" in counts or "blocked_by_overlap" in counts:
         if need.key.name == BOULDER_MASS.name:
             lines.append(f"next: wider ranges for the sides and the embedment in {file}")
         else:
@@ -173,8 +173,8 @@ def _grades(need: Need) -> list[str]:
     rows = need.arrow.filter(need.arrow["passes_at"].is_valid()).to_pylist()
     grades = [row["robustness"] for row in rows]
     counts = {grade: grades.count(grade) for grade in GRADES if grade in grades}
-    told = ", ".join(f"{count:,} {grade}" for grade, count in counts.items())
-    return [*([f"second opinion: {told}"] if len(need) > MOST_LINES and told else []), *grade_lines(rows)]
+    listed = ", ".join(f"{count:,} {grade}" for grade, count in counts.items())
+    return [*([f"second opinion: {listed}"] if len(need) > MOST_LINES and listed else []), *grade_lines(rows)]
 
 
 def _outside(need: Need) -> list[str]:
@@ -184,7 +184,7 @@ def _outside(need: Need) -> list[str]:
         return []
     count = len(passing)
     flags = flag_counts(Counter(passing["validity"].to_pylist()).items())
-    named = ", ".join(f"{name} {own:,}" for name, own in flags.items() if name)
+    named = ", ".join(f"{name} {flagged:,}" for name, flagged in flags.items() if name)
     inside = f"flags: {flags.get('', 0):,} of {counted(count, 'answer')} inside what the model was tested on"
     return [f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/validity.md)"]
 
@@ -197,22 +197,22 @@ def _edges(need: Need, units: str, file: str) -> list[str]:
     value = {name: passing[name].to_numpy() for name in (*SIDES, DEPTH, "bumper_height_m")}
     bounds = sweep_ranges(need.sweep)
     unit, metre = shown_unit("m", units)
-    found = {}
+    distances = {}
     for name in (*SIDES, DEPTH, RATIO):
         low, high = bounds.get(name, (0.0, 0.0))
         for which, end in (("least", low), ("largest", high)) if low < high else ():
             if name == RATIO:
-                found[f"d/H is the {which}, {end:g}"] = value[DEPTH] - end * value[HEIGHT]
+                distances[f"d/H is the {which}, {end:g}"] = value[DEPTH] - end * value[HEIGHT]
             else:
-                found[f"{HEADS[name][0]} is the {which}, {end / metre:.4g} {unit}"] = value[name] - end
+                distances[f"{HEADS[name][0]} is the {which}, {end / metre:.4g} {unit}"] = value[name] - end
     overlap = value[HEIGHT] - value["bumper_height_m"] - value[DEPTH]
-    found["the depth is the largest that overlaps the bumper enough"] = overlap - need.sweep.criterion.min_overlap_m
-    counts = {words: int((abs(off) < NEAR_M).sum()) for words, off in found.items()}
+    distances["the depth is the largest that overlaps the bumper enough"] = overlap - need.sweep.criterion.min_overlap_m
+    counts = {words: int((abs(off) < NEAR_M).sum()) for words, off in distances.items()}
     ends = {words: count for words, count in counts.items() if count}
     if not ends:
         return ["edges: the lightest boulders lie within the ranges of the file, at no end of one"]
-    told = "; ".join(f"{words} ({count} of {len(passing)})" for words, count in ends.items())
-    return [f"edges: {told}. Wider ranges in {file} may hold a lighter boulder"]
+    listed = "; ".join(f"{words} ({count} of {len(passing)})" for words, count in ends.items())
+    return [f"edges: {listed}. Wider ranges in {file} may hold a lighter boulder"]
 
 
 def _need_columns(need: Need, units: str) -> list[Column]:
@@ -256,13 +256,13 @@ def _margin(row: Row) -> str:
 def _answer(key: Key, suffix: str, size: float) -> Cell:
     """Return a formatter for the answer by some readings."""
     decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
-    name, found = f"{key.answer}{suffix}", f"found{suffix}"
+    name, kind = f"{key.answer}{suffix}", f"found{suffix}"
 
     def cell(row: Row) -> str:
         if row[name] is None:
-            return "blocked" if row[found] == "blocked_by_overlap" else str(row[found])
-        before = {"always": "≥" if key.most else "≤"}.get(row[found], "")
-        return f"{before}{row[name]:.{decimals}f}{'*' if row[found] == 'not_monotone' else ''}"
+            return "blocked" if row[kind] == "blocked_by_overlap" else str(row[kind])
+        before = {"always": "≥" if key.most else "≤"}.get(row[kind], "")
+        return f"{before}{row[name]:.{decimals}f}{'*' if row[kind] == 'not_monotone' else ''}"
 
     return cell
 

@@ -84,13 +84,13 @@ class AnswerFile:
 
     def __init__(self, path: Path, refusal: type[BoulderSweepError], *, histories: bool = False) -> None:
         self.path = path
-        self.table, found, self.judged_by = _read_parquet(path, refusal)
+        self.table, identity, self.judged_by = _read_parquet(path, refusal)
         self._refusal = refusal
         try:
-            self.question: dict[str, Any] = json.loads(found.pop("question", "{}"))
+            self.question: dict[str, Any] = json.loads(identity.pop("question", "{}"))
         except ValueError as problem:
             raise refusal(f"{path} is damaged; write it again ({problem})") from problem
-        self.identity = {key: value for key, value in found.items() if key not in OF_ONE_FILE}
+        self.identity = {key: value for key, value in identity.items() if key not in OF_ONE_FILE}
         names = set(self.table.column_names)
         self.kind = next((kind for kind, marks in MARKS.items() if names >= set(marks)), "")
         if not self.kind and not histories:
@@ -122,11 +122,11 @@ class AnswerFile:
     @property
     def asked(self) -> int:
         """Number of rows that the command wrote: of the designs, or of combinations of the inputs not asked for."""
-        found = self.answers() if self.kind == NEED else None
-        if not isinstance(found, Need):
+        answers = self.answers() if self.kind == NEED else None
+        if not isinstance(answers, Need):
             return int(self.identity["settings"]["n_designs"])
-        name = found.key.name
-        return Open(found.sweep, (*SIDES, DEPTH) if name == BOULDER_MASS else (name,)).count
+        name = answers.key.name
+        return Open(answers.sweep, (*SIDES, DEPTH) if name == BOULDER_MASS else (name,)).count
 
     def answers(self) -> Need | Reserves | Uncertainty:
         """Return the answers as the command had them.
@@ -161,11 +161,11 @@ class AnswerFile:
         """Return probabilities with the indices and samples that lie beside them."""
         from boulder_sweep.answers.uncertainty import Uncertainty
 
-        found = {}
+        tables = {}
         for name in ("indices", "samples"):
             file = self.path.with_suffix(f".{name}.parquet")
-            found[name] = pq.read_table(file) if file.exists() else pa.table({"design_id": pa.array([], pa.int64())})
-        return Uncertainty(sweep, self.table, found["indices"], found["samples"], self.question["seed"])
+            tables[name] = pq.read_table(file) if file.exists() else pa.table({"design_id": pa.array([], pa.int64())})
+        return Uncertainty(sweep, self.table, tables["indices"], tables["samples"], self.question["seed"])
 
 
 def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
@@ -198,20 +198,20 @@ def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[p
         table = pq.read_table(path, page_checksum_verification=True)
         table.validate(full=True)
         kinds = {field.name: field.type for field in table.schema}
-        found = identity_in(table.schema.metadata)
-        if not found.keys() >= _IDENTITY:
+        identity = identity_in(table.schema.metadata)
+        if not identity.keys() >= _IDENTITY:
             raise refusal(f"{path} is neither the folder of a run nor a file that `sweep` wrote")
         odd = [name for name, kind in kinds.items() if name in COLUMN_OF and not _is_of(COLUMN_OF[name].type, kind)]
-        if odd or settings_sha256(found["settings"]) != found["settings_sha256"]:
+        if odd or settings_sha256(identity["settings"]) != identity["settings_sha256"]:
             raise refusal(f"{path} is damaged; write it again")
     except BoulderSweepError:
         raise
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, RecursionError) as problem:
         # Of a damaged file, pyarrow raises almost anything; names and texts that are not Unicode are ValueErrors.
         raise refusal(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
-    if judged := judged_by(found):
+    if judged := judged_by(identity):
         warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=3)
-    return table, found, judged
+    return table, identity, judged
 
 
 def _is_of(type_: str, kind: pa.DataType) -> bool:
@@ -222,7 +222,7 @@ def _is_of(type_: str, kind: pa.DataType) -> bool:
 
 
 def result_of(
-    place: Location, refusal: type[BoulderSweepError], *, histories: bool = False
+    path: Location, refusal: type[BoulderSweepError], *, histories: bool = False
 ) -> FinishedRows | AnswerFile:
     """Return the rows of what a command wrote: a folder, or a file beside none.
 
@@ -233,9 +233,9 @@ def result_of(
     BoulderSweepError
         As of `AnswerFile`.
     """
-    if isinstance(place, RemotePath) or not place.is_file() or (place.resolve().parent / MANIFEST_NAME).exists():
-        return FinishedRows(place)
-    return AnswerFile(place, refusal, histories=histories)
+    if isinstance(path, RemotePath) or not path.is_file() or (path.resolve().parent / MANIFEST_NAME).exists():
+        return FinishedRows(path)
+    return AnswerFile(path, refusal, histories=histories)
 
 
 def answered(table: pa.Table) -> pa.Table:
@@ -249,8 +249,8 @@ def answered(table: pa.Table) -> pa.Table:
         "robustness": pc.if_else(passes, table["robustness"].cast("string"), None),
     }
     for name, column in words.items():
-        place = table.column_names.index(name)
-        table = table.set_column(place, table.field(name), column.dictionary_encode().cast(table.field(name).type))
+        index = table.column_names.index(name)
+        table = table.set_column(index, table.field(name), column.dictionary_encode().cast(table.field(name).type))
     return table
 
 
@@ -295,8 +295,8 @@ def _axis(name: str, labels: Mapping[str, list[str]], varying: Mapping[str, np.n
     """Return an axis: values of one input, or named sets of those that are on no axis of their own."""
     if name not in labels:
         return Axis(name, varying[name])
-    own = {key: values for key, values in varying.items() if key not in order and BY_NAME[key].section == name}
-    return Axis(name, np.arange(float(len(labels[name]))), own, tuple(labels[name]))
+    columns = {key: values for key, values in varying.items() if key not in order and BY_NAME[key].section == name}
+    return Axis(name, np.arange(float(len(labels[name]))), columns, tuple(labels[name]))
 
 
 def _values(name: str, given: Any, table: pa.Table) -> np.ndarray:
@@ -311,5 +311,5 @@ def _values(name: str, given: Any, table: pa.Table) -> np.ndarray:
 def _label(table: pa.Table, name: str) -> Label:
     column = table[name].combine_chunks()
     words = tuple(column.unique().to_pylist())
-    places = {word: place for place, word in enumerate(words)}
-    return Label(np.array([places[word] for word in column.to_pylist()], dtype=np.int32), words)
+    codes = {word: code for code, word in enumerate(words)}
+    return Label(np.array([codes[word] for word in column.to_pylist()], dtype=np.int32), words)

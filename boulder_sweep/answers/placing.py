@@ -67,7 +67,7 @@ class Placing:
         """Return everything as plain data."""
         standings = self.found.to_dict([way.standing for way in self.ways])
         placed = zip(standings.pop("standings"), self.ways, strict=True)
-        ways = [own | {"least_embedment_depth_m": way.depth_m, "answer": way.row} for own, way in placed]
+        ways = [entry | {"least_embedment_depth_m": way.depth_m, "answer": way.row} for entry, way in placed]
         return standings | {"rounded": self.rounded, "cases": self.cases, "ways": ways}
 
     def plot(self, path: str | Path) -> None:
@@ -81,16 +81,16 @@ class Placing:
         draw("scanned_stone", "draw_placing", self, path)
 
 
-def boulder_block(found: ScannedStone, own: Standing) -> str:
+def boulder_block(stone: ScannedStone, standing: Standing) -> str:
     """Return a stone on one of its feet as an entry that replaces the boulder of a settings file."""
-    profile = own.profile
+    profile = standing.profile
     points = zip(*(side.tolist() for side in (profile.height, profile.width, profile.near, profile.far)), strict=True)
     listed = ", ".join(f"{{height: {z!r} m, width: {w!r} m, near: {n!r} m, far: {f!r} m}}" for z, w, n, f in points)
-    return f"boulder={{density: {found.density_kg_m3!r} kg/m^3, profile: [{listed}]}}"
+    return f"boulder={{density: {stone.density_kg_m3!r} kg/m^3, profile: [{listed}]}}"
 
 
 def placed(
-    found: ScannedStone,
+    stone: ScannedStone,
     site: Callable[[str], Sweep],
     standings: tuple[Standing, ...] | None = None,
     *,
@@ -101,7 +101,7 @@ def placed(
 
     Parameters
     ----------
-    found
+    stone
         The stone.
     site
         Gives the settings of the site with a boulder, which it takes as `boulder_block` returns it.
@@ -117,19 +117,19 @@ def placed(
     SettingsError, QuestionError
         The site cannot be asked.
     """
-    asked = found.standings if standings is None else standings
-    flat = [own for own in asked if own.has_foot]
+    asked = stone.standings if standings is None else standings
+    flat = [standing for standing in asked if standing.has_foot]
     ways, cases = [], 0
-    for done, own in enumerate(flat):
+    for done, standing in enumerate(flat):
         if progress is not None:
             progress(done, len(flat))
-        answers = need(site(boulder_block(found, own)), margin=margin)
+        answers = need(site(boulder_block(stone, standing)), margin=margin)
         rows, name = answers.arrow.to_pylist(), answers.key.answer
         cases = len(rows)
         none = next((row for row in rows if row[name] is None), None)
         worst = max(rows, key=lambda row: row[name]) if none is None else none
-        ways.append(Way(own, worst, worst[name]))
+        ways.append(Way(standing, worst, worst[name]))
     if progress is not None:
         progress(len(flat), len(flat))
     ways.sort(key=lambda way: (way.depth_m is None, way.depth_m or 0.0))
-    return Placing(found, tuple(ways), len(asked) - len(flat), cases)
+    return Placing(stone, tuple(ways), len(asked) - len(flat), cases)

@@ -85,7 +85,7 @@ def grade_lines(rows: Iterable[Row]) -> list[str]:
     from boulder_sweep.judge.robustness import meaning_of
 
     occurring = {(row["robustness"], meaning_of(row)) for row in rows if row["robustness"]}
-    ranked = sorted(occurring, key=lambda found: (GRADES.index(found[0]), found[1]))
+    ranked = sorted(occurring, key=lambda pair: (GRADES.index(pair[0]), pair[1]))
     return wrapped(f"{word}: {meaning}" for word, meaning in ranked)
 
 
@@ -104,29 +104,29 @@ def wrapped(texts: Iterable[str]) -> list[str]:
     return [line for text in texts for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
 
 
-def _rows_lines(found: Result, own: Sequence[Column], units: str) -> tuple[list[str], list[Row]]:
+def _rows_lines(result: Result, columns: Sequence[Column], units: str) -> tuple[list[str], list[Row]]:
     """Return designs as lines, and those shown: their varying inputs and these columns, of all or evenly spaced ones.
 
     Columns that do not fit are left out, the least important first.
     """
-    count = len(found)
-    places: Sequence[int] = range(count)
+    count = len(result)
+    indices: Sequence[int] = range(count)
     if count > MOST_LINES:
-        places = [place * (count - 1) // (MOST_LINES - 1) for place in range(MOST_LINES)]
-    rows = rows_of(found.arrow.take(list(places)), units)
-    names = [name for name in HEADS if name in found.sweep.plan.given]
-    lines = table_lines([*leading(found.sweep, found.arrow, names, units), *own], rows)
+        indices = [k * (count - 1) // (MOST_LINES - 1) for k in range(MOST_LINES)]
+    rows = rows_of(result.arrow.take(list(indices)), units)
+    names = [name for name in HEADS if name in result.sweep.plan.given]
+    lines = table_lines([*leading(result.sweep, result.arrow, names, units), *columns], rows)
     if count > MOST_LINES:
         lines.append(f"({MOST_LINES} of {count:,} rows, evenly spaced; -o writes them all)")
     return lines, rows
 
 
-def uncertainty_lines(found: Uncertainty, units: str = "si") -> list[str]:
+def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
     """Return probabilities as lines: varying inputs, verdict at the means, probability, most influential input.
 
     Parameters
     ----------
-    found
+    result
         The probabilities.
     units
         ``si`` or ``us``.
@@ -138,21 +138,21 @@ def uncertainty_lines(found: Uncertainty, units: str = "si") -> list[str]:
     """
     columns: list[Column] = [
         (("at the", "means"), lambda row: str(row["verdict"])),
-        *([GRADE] if found.sweep.model.second_opinion else []),
+        *([GRADE] if result.sweep.model.second_opinion else []),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
-        *([(("P(fail)", ""), _failing)] if "p_fail" in found.arrow.column_names else []),
+        *([(("P(fail)", ""), _failing)] if "p_fail" in result.arrow.column_names else []),
         (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
     ]
-    lines, rows = _rows_lines(found, columns, units)
+    lines, rows = _rows_lines(result, columns, units)
     occurring = {row.get("p_fail_by") for row in rows}
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
-    if found.sweep.model.second_opinion:
+    if result.sweep.model.second_opinion:
         lines += grade_lines(rows)
-    lines += foot_lines(found.sweep.model, units=units)
-    return [*lines, "", *_index_lines(found)] if len(found) == 1 else lines
+    lines += foot_lines(result.sweep.model, units=units)
+    return [*lines, "", *_index_lines(result)] if len(result) == 1 else lines
 
 
 def _failing(row: Row) -> str:
@@ -161,7 +161,7 @@ def _failing(row: Row) -> str:
     return f"{row['p_fail']:.2g} ({row['p_fail_low']:.2g} to {row['p_fail_high']:.2g})"
 
 
-def _index_lines(found: Uncertainty) -> list[str]:
+def _index_lines(result: Uncertainty) -> list[str]:
     """Return the Sobol indices of one design as lines."""
 
     def number(name: str) -> Cell:
@@ -178,24 +178,24 @@ def _index_lines(found: Uncertainty) -> list[str]:
         (("first order", ""), number("first")),
         (("total", ""), number("total")),
     ]
-    return table_lines(columns, found.indices.to_pylist())
+    return table_lines(columns, result.indices.to_pylist())
 
 
-def doubt_lines(found: Sequence[Doubt]) -> list[str]:
+def doubt_lines(doubts: Sequence[Doubt]) -> list[str]:
     """Return the shares of uncertainty as lines."""
     columns: list[Column] = [
         (("uncertainty of the margin", ""), lambda row: str(row["cause"])),
         (("alone", ""), lambda row: _share(row["alone"])),
         (("with", "interactions"), lambda row: _share(row["total"])),
     ]
-    return table_lines(columns, [asdict(own) for own in found])
+    return table_lines(columns, [asdict(doubt) for doubt in doubts])
 
 
 def _share(value: float) -> str:
     return f"{value:.1%}" if value >= 5e-4 else "< 0.05%"
 
 
-def reserve_lines(found: Reserves, units: str = "si") -> list[str]:
+def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     """Return what designs withstand as lines: varying inputs, verdict, each value and its distance from the design.
 
     Parameters are those of `uncertainty_lines`.
@@ -206,16 +206,16 @@ def reserve_lines(found: Reserves, units: str = "si") -> list[str]:
     for reserve, decimals in zip(RESERVES, (2, 0, 2), strict=True):
         field = key_of(reserve.input).field
         size = 1.0 if units == "si" else shown_unit(field.unit, units).size
-        columns.append((head_of(field.name, units), _withstood(reserve, field.name, decimals, size)))
+        columns.append((head_of(field.name, units), _format_withstood(reserve, field.name, decimals, size)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
-    lines, rows = _rows_lines(found, [*columns, *volume_columns(units)], units)
+    lines, rows = _rows_lines(result, [*columns, *volume_columns(units)], units)
     lines += volume_lines(lines[0])
     if any(sign in line for line in lines for sign in "≥≤"):
         lines.append("≥, ≤: passes at the worst value tried")
-    return [*lines, *grade_lines(rows), *foot_lines(found.sweep.model, units=units)]
+    return [*lines, *grade_lines(rows), *foot_lines(result.sweep.model, units=units)]
 
 
-def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:
+def _format_withstood(reserve: Reserve, name: str, decimals: int, size: float) -> Cell:
     """Return a formatter for a value that is withstood and its distance from that of the design.
 
     A design that passes at the worst value tried may withstand more.
@@ -228,7 +228,7 @@ def _withstood(reserve: Reserve, own: str, decimals: int, size: float) -> Cell:
         if value is None:
             return "-"
         before = sign if row["verdict"] == "pass" and sense * value >= end else ""
-        return f"{before}{value:.{decimals}f} ({value / row[own] - 1.0:+.0%})"
+        return f"{before}{value:.{decimals}f} ({value / row[name] - 1.0:+.0%})"
 
     return cell
 
@@ -259,7 +259,7 @@ def table_lines(columns: Sequence[Column], rows: Sequence[Row]) -> list[str]:
         texts.pop()
         widths.pop()
     lines = table_texts(texts)
-    return [line.rstrip() for line in (*lines[:2], "  ".join("─" * own for own in widths), *lines[2:])]
+    return [line.rstrip() for line in (*lines[:2], "  ".join("─" * width for width in widths), *lines[2:])]
 
 
 def table_texts(columns: Sequence[Sequence[str]]) -> list[str]:

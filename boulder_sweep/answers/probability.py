@@ -83,12 +83,12 @@ class Sampling:
         points
             The points.
         """
-        found = np.empty(len(index), dtype=bool)
+        enough = np.empty(len(index), dtype=bool)
         for start, stop in ranges(len(index), AT_ONCE // len(points)):
-            own = np.repeat(np.arange(start, stop), len(points))
-            passes = draws.passes(index[own], np.tile(points, (stop - start, 1)), **rows_at(inputs, own))
-            found[start:stop] = passes.reshape(-1, len(points)).mean(axis=1) >= self.probability
-        return found
+            repeated = np.repeat(np.arange(start, stop), len(points))
+            passes = draws.passes(index[repeated], np.tile(points, (stop - start, 1)), **rows_at(inputs, repeated))
+            enough[start:stop] = passes.reshape(-1, len(points)).mean(axis=1) >= self.probability
+        return enough
 
     def chances(self, draws: Draws, inputs: Rows) -> Sampled:
         """Return the probabilities of passing of all rows with inputs set, from the points and more where needed."""
@@ -150,20 +150,20 @@ class ProbabilityTrial(Trial):
         super().__init__(asked.key, asked.judges, rows)
         self.asked, self.draws = asked, asked.sampling.draws(rows)
 
-    def contradicted(self, found: Search) -> np.ndarray:
+    def contradicted(self, result: Search) -> np.ndarray:
         """Return no rows: the designs drawn near a limit are judged with the accuracy of the sweep anyway."""
         return np.empty(0, dtype=np.int64)
 
-    def chances(self, places: np.ndarray) -> Sampled:
+    def chances(self, positions: np.ndarray) -> Sampled:
         """Return the probabilities of passing at some values, one for each row."""
-        found = self.asked.sampling.chances(self.draws, {self.key.name: self.key.values(places)})
-        self.simulated += int(found.points.sum())
-        return found
+        sampled = self.asked.sampling.chances(self.draws, {self.key.name: self.key.values(positions)})
+        self.simulated += int(sampled.points.sum())
+        return sampled
 
-    def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
-        block, judged = self.judged(index, places, quick=True)
+    def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
+        block, judged = self.judged(index, positions, quick=True)
         sampling = self.asked.sampling
-        often = sampling.often(self.draws, index, {self.key.name: self.key.values(places)}, sampling.points)
+        often = sampling.often(self.draws, index, {self.key.name: self.key.values(positions)}, sampling.points)
         self.simulated += DRAWN * len(index)
         if self.asked.tried is not None:
             self.asked.tried(len(index))
@@ -201,7 +201,7 @@ class LikelyLightestQuestion(LightestQuestion):
         self.sampling = Sampling(spread, judges, probability, seed, variants)
 
     def given(self, start: int, stop: int) -> Rows:
-        """Return the other inputs of some rows, with the places of named sets that have distributions."""
+        """Return the other inputs of some rows, with the indices of named sets that have distributions."""
         return uncertain_rows(self.open.sweep, super().given(start, stop), start, stop)
 
     def trial(self, rows: Rows, side: str, final: Remembered) -> Boulders:
@@ -210,10 +210,10 @@ class LikelyLightestQuestion(LightestQuestion):
 
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``, with the probability of passing of each answer."""
-        found = super().answered(start, stop)
-        sizes = {name: found.block.columns[name].to_numpy() for name in (*SIDES, DEPTH)}
+        answers = super().answered(start, stop)
+        sizes = {name: answers.block.columns[name].to_numpy() for name in (*SIDES, DEPTH)}
         chances = self.sampling.chances(self.sampling.draws(self.given(start, stop)), sizes)
-        return replace(found, chances=chances, simulated=found.simulated + int(chances.points.sum()))
+        return replace(answers, chances=chances, simulated=answers.simulated + int(chances.points.sum()))
 
 
 class LikelyBoulders(Boulders):
@@ -223,9 +223,9 @@ class LikelyBoulders(Boulders):
         super().__init__(asked, rows, side, final)
         self.sampling, self.draws = asked.sampling, asked.sampling.draws(rows)
 
-    def codes(self, index: np.ndarray, places: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
+    def codes(self, index: np.ndarray, positions: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
         """Return the predicate of `search`."""
-        block = self.block(index, places, others)
+        block = self.block(index, positions, others)
         reached = ~beyond_reach(block, self.judges.coarse(block))
         points = self.sampling.few if quick else self.sampling.points
         self.simulated += len(block) + len(points) * int(reached.sum())

@@ -139,27 +139,27 @@ class Question:
         rows = uncertain_rows(self.open.sweep, self.open.rows(start, stop), start, stop)
         first, last = self.lattice(rows)
         trial = self.trial(rows)
-        found = search(trial.coarse, first, last, self.cells)
+        result = search(trial.coarse, first, last, self.cells)
         every = np.arange(stop - start)
-        wrong = trial.contradicted(found)
-        block, judged = trial.judged(every, found.shown)
+        wrong = trial.contradicted(result)
+        block, judged = trial.judged(every, result.shown)
         if len(wrong):
-            found = searched_again(trial.final, found, wrong, first, last, self.cells)
-            judged = with_rows(judged, wrong, trial.judged(wrong, found.shown[wrong])[1])
-            block = trial.block(every, found.shown)
+            result = searched_again(trial.final, result, wrong, first, last, self.cells)
+            judged = with_rows(judged, wrong, trial.judged(wrong, result.shown[wrong])[1])
+            block = trial.block(every, result.shown)
         return Answers(
             replace(block, labels=self.open.labels(start, stop)),
-            self.kinds(rows, found),
-            np.where(found.has_fails, self.key.values(found.fails), np.nan),
-            np.where(found.has_holds, self.key.values(found.holds), np.nan),
+            self.kinds(rows, result),
+            np.where(result.has_fails, self.key.values(result.fails), np.nan),
+            np.where(result.has_holds, self.key.values(result.holds), np.nan),
             self.judges.final.graded(judged, block),
-            [_stretches(self.key, found.changes.get(row), first[row], last[row]) for row in range(stop - start)],
+            [_stretches(self.key, result.changes.get(row), first[row], last[row]) for row in range(stop - start)],
             trial.simulated,
-            trial.chances(found.shown),
+            trial.chances(result.shown),
         )
 
     def lattice(self, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first and the last place that are searched in some rows."""
+        """Return the first and the last position that are searched in some rows."""
         low, high = range_of(self.sweep, self.key, rows, self.between)
         first, last = self.key.ends(low, high)
         return (last, first) if self.key.most else (first, last)
@@ -168,14 +168,14 @@ class Question:
         """Return the object that tries values in some rows."""
         return Trial(self.key, self.judges, rows)
 
-    def kinds(self, rows: Rows, found: Search) -> np.ndarray:
+    def kinds(self, rows: Rows, result: Search) -> np.ndarray:
         """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
 
         Where nothing passes, the design at the end of the range tells by its sizes whether the truck goes over it: not
-        the last place of the lattice, which may lie before it, nor its verdict, which may name another failure.
+        the last position of the lattice, which may lie before it, nor its verdict, which may name another failure.
         """
-        kind = found.kind.copy()
-        none = np.flatnonzero(~found.has_holds)
+        kind = result.kind.copy()
+        none = np.flatnonzero(~result.has_holds)
         if len(none):
             end = range_of(self.sweep, self.key, rows, self.between)[0 if self.key.most else 1]
             last = block_at(rows, none, **{self.key.name: end[none]})
@@ -191,42 +191,42 @@ class Trial:
         self.simulated = 0
         self._final = Remembered(judges.final)
 
-    def coarse(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def coarse(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search, without an error estimate."""
-        return self._codes(index, places, quick=True)
+        return self._codes(index, positions, quick=True)
 
-    def final(self, index: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def final(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search, with the accuracy of the sweep."""
-        return self._codes(index, places, quick=False)
+        return self._codes(index, positions, quick=False)
 
-    def judged(self, index: np.ndarray, places: np.ndarray, *, quick: bool = False) -> tuple[DesignBlock, Judged]:
+    def judged(self, index: np.ndarray, positions: np.ndarray, *, quick: bool = False) -> tuple[DesignBlock, Judged]:
         """Return the designs with these values, and their verdicts."""
-        block, remembered = self.block(index, places), self._final.count
+        block, remembered = self.block(index, positions), self._final.count
         judged = self.judges.coarse(block) if quick else self._final(block)
         self.simulated += len(index) if quick else self._final.count - remembered
         return block, judged
 
-    def block(self, index: np.ndarray, places: np.ndarray) -> DesignBlock:
+    def block(self, index: np.ndarray, positions: np.ndarray) -> DesignBlock:
         """Return the designs with these values."""
-        return block_at(self.rows, index, **{self.key.name: self.key.values(places)})
+        return block_at(self.rows, index, **{self.key.name: self.key.values(positions)})
 
-    def contradicted(self, found: Search) -> np.ndarray:
+    def contradicted(self, result: Search) -> np.ndarray:
         """Return the rows of a quick search that the accuracy of the sweep does not confirm, shape (m,)."""
-        bracketed = np.flatnonzero(found.has_holds & found.has_fails)
+        bracketed = np.flatnonzero(result.has_holds & result.has_fails)
         # Both ends together: what needs finer steps fills the lanes better.
-        index = np.concatenate([np.arange(len(found.shown)), bracketed])
-        holds = self.final(index, np.concatenate([found.shown, found.fails[bracketed]])) == HOLDS
-        wrong = holds[: len(found.shown)] != found.has_holds
-        wrong[bracketed] |= holds[len(found.shown) :]
+        index = np.concatenate([np.arange(len(result.shown)), bracketed])
+        holds = self.final(index, np.concatenate([result.shown, result.fails[bracketed]])) == HOLDS
+        wrong = holds[: len(result.shown)] != result.has_holds
+        wrong[bracketed] |= holds[len(result.shown) :]
         # Rows that are not monotone have several brackets, all of which must be certified.
-        return np.flatnonzero(wrong | (found.kind == NOT_MONOTONE))
+        return np.flatnonzero(wrong | (result.kind == NOT_MONOTONE))
 
-    def chances(self, places: np.ndarray) -> Sampled | None:
+    def chances(self, positions: np.ndarray) -> Sampled | None:
         """Return the probabilities of passing at some values, one for each row; None if none is asked for."""
         return None
 
-    def _codes(self, index: np.ndarray, places: np.ndarray, *, quick: bool) -> np.ndarray:
-        return self.codes(*self.judged(index, places, quick=quick))
+    def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
+        return self.codes(*self.judged(index, positions, quick=quick))
 
     def codes(self, block: DesignBlock, judged: Judged) -> np.ndarray:
         """Return what a search asks of judged designs."""

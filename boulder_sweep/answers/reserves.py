@@ -139,9 +139,9 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
         withstands its own value, and nothing is tried for one that fails beyond `best`.
     """
     trial = Trial(key, judges, rows)
-    own = rows[key.name] / key.tolerance
-    # The nearest lattice place on the better side; a design that passes also passes there.
-    first = (np.floor(own + 1e-9) if worst > best else np.ceil(own - 1e-9)).astype(np.int64)
+    position = rows[key.name] / key.tolerance
+    # The nearest lattice position on the better side; a design that passes also passes there.
+    first = (np.floor(position + 1e-9) if worst > best else np.ceil(position - 1e-9)).astype(np.int64)
     ends = (round(end / key.tolerance) for end in (worst, best))
     last = np.where(passes, *ends)
     # A range never runs backwards: towards the better side for a design that passes, or the worse for one that fails.
@@ -152,18 +152,18 @@ def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: fl
     def change(codes: Predicate) -> Predicate:
         """Search for the change of verdict; for a design that passes, for the first value at which it does not."""
 
-        def changed(index: np.ndarray, places: np.ndarray) -> np.ndarray:
-            return np.where((codes(index, places) == HOLDS) != passes[index], HOLDS, FAILS)
+        def changed(index: np.ndarray, positions: np.ndarray) -> np.ndarray:
+            return np.where((codes(index, positions) == HOLDS) != passes[index], HOLDS, FAILS)
 
         return changed
 
-    found = search(change(trial.coarse), first, last)
-    wrong = contradicted(change(trial.final), found)
-    found = searched_again(change(trial.final), found, wrong, first, last)
-    # `fails` is the last place before the change; for a design that passes, that is the withstood value.
-    at = np.where(passes, np.where(found.has_holds, found.fails, last), found.holds)
-    at = np.where(passes & found.has_holds & ~found.has_fails, first, at)
-    values = np.where(passes | found.has_holds, key.values(at), np.nan)
+    result = search(change(trial.coarse), first, last)
+    wrong = contradicted(change(trial.final), result)
+    result = searched_again(change(trial.final), result, wrong, first, last)
+    # `fails` is the last position before the change; for a design that passes, that is the withstood value.
+    at = np.where(passes, np.where(result.has_holds, result.fails, last), result.holds)
+    at = np.where(passes & result.has_holds & ~result.has_fails, first, at)
+    values = np.where(passes | result.has_holds, key.values(at), np.nan)
     return np.where(backwards, np.where(passes, rows[key.name], np.nan), values)
 
 
@@ -182,9 +182,9 @@ def classes(
     named = np.abs(mass / of_kg - 1.0) <= CLASS_TOLERANCE
     bounds = np.array(list(speeds.values()))
     # 30 mph is 13.41 m/s on the lattice of withstood speeds.
-    place = np.searchsorted(bounds - 0.005, np.nan_to_num(speed), side="right")
+    index = np.searchsorted(bounds - 0.005, np.nan_to_num(speed), side="right")
     words = ("", *speeds)
-    return [words[at] or None if known else None for at, known in zip(place, named, strict=True)]
+    return [words[at] or None if known else None for at, known in zip(index, named, strict=True)]
 
 
 def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
@@ -195,11 +195,11 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     judged, passes = judges.final.graded(judged, block), judges.holds(judged)
     columns: list[TableColumn] = []
     values = {}
-    for own in RESERVES:
-        key = key_of(own.input, most=own.worst > own.best)
-        values[own.column] = withstood(key, judges, rows, passes, own.best, own.worst)
-        meaning = f"{own.meaning} at which the design passes, all else unchanged; simulated"
-        columns.append((own.column, key.field.unit, meaning, values[own.column]))
+    for reserve in RESERVES:
+        key = key_of(reserve.input, most=reserve.worst > reserve.best)
+        values[reserve.column] = withstood(key, judges, rows, passes, reserve.best, reserve.worst)
+        meaning = f"{reserve.meaning} at which the design passes, all else unchanged; simulated"
+        columns.append((reserve.column, key.field.unit, meaning, values[reserve.column]))
     speed, mass = values["withstands_speed_m_s"], rows["vehicle_mass_kg"]
     meaning = "class of ASTM F2656 whose nominal speed is withstood; simulated, which rates no barrier"
     columns.append(("simulated_class", "", meaning, classes(speed, mass)))

@@ -76,7 +76,7 @@ def rows_table(
     columns
         The further columns.
     at
-        Place of the first of them; behind all others by default.
+        Index of the first of them; behind all others by default.
     """
     import pyarrow as pa
 
@@ -93,31 +93,31 @@ def rows_table(
 
     table = part_table(replace(block, start=start, stop=start + len(block)), judged, {})
     first = table.num_columns if at is None else at
-    for place, (name, unit, meaning, values) in enumerate(columns, first):
+    for index, (name, unit, meaning, values) in enumerate(columns, first):
         array = array_of(values)
         field = pa.field(name, array.type, metadata={"unit": unit, "meaning": meaning})
-        table = table.add_column(place, field, array)
+        table = table.add_column(index, field, array)
     return table
 
 
 def to_build(block: DesignBlock, sweep: Sweep) -> list[TableColumn]:
     """Return what the designs of a block take to build as columns."""
     rows = {name: column.to_numpy() for name, column in block.columns.items()}
-    found = quantities(rows, sweep.model.shape, sweep.model.ground)
-    return [(own.name, own.unit, own.meaning, found[own.name]) for own in QUANTITIES if own.name not in block.columns]
+    values = quantities(rows, sweep.model.shape, sweep.model.ground)
+    return [(q.name, q.unit, q.meaning, values[q.name]) for q in QUANTITIES if q.name not in block.columns]
 
 
 def collected(tables: Iterable[pa.Table], count: int, progress: ProgressCallback | None) -> list[pa.Table]:
     """Collect tables of `count` rows in all, and report how many are there, first none."""
-    found, done = [], 0
+    parts, done = [], 0
     if progress is not None:
         progress(0, count)
     for table in tables:
-        found.append(table)
+        parts.append(table)
         done += len(table)
         if progress is not None:
             progress(done, count)
-    return found
+    return parts
 
 
 def joined_tables(
@@ -144,8 +144,8 @@ def joined_tables(
 
     from boulder_sweep.store.schema import PANDAS_ATTRIBUTES
 
-    found = identity(sweep.resolved(), *judges.final.settings(), judges.accuracy.to_dict())
-    metadata = file_metadata(found if question is None else found | {"question": question}, repeat)
+    entries = identity(sweep.resolved(), *judges.final.settings(), judges.accuracy.to_dict())
+    metadata = file_metadata(entries if question is None else entries | {"question": question}, repeat)
     table = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
     attributes = json.dumps(_attributes(table)).encode()
     return table.replace_schema_metadata({PANDAS_ATTRIBUTES: attributes, **metadata})
@@ -153,9 +153,9 @@ def joined_tables(
 
 def _attributes(table: pa.Table) -> dict[str, dict[str, str]]:
     """Return units and meanings of the columns of a table."""
-    own = {field.name: field.metadata or {} for field in table.schema}
+    fields = {field.name: field.metadata or {} for field in table.schema}
     return {
-        f"{entry}s": {name: found.get(entry.encode(), b"").decode() for name, found in own.items()}
+        f"{entry}s": {name: metadata.get(entry.encode(), b"").decode() for name, metadata in fields.items()}
         for entry in ("unit", "meaning")
     }
 

@@ -1,7 +1,7 @@
-"""Find the first lattice place from which a predicate holds, for many rows at once: scan, then bisection.
+"""Find the first lattice position from which a predicate holds, for many rows at once: scan, then bisection.
 
-Each row is scanned at a few places spread over its range; where neighbours differ, the change is bisected down to two
-adjacent lattice places. All rows and changes are bisected together, so that every call of the predicate has many
+Each row is scanned at a few positions spread over its range; where neighbours differ, the change is bisected down to
+two adjacent lattice positions. All rows and changes are bisected together, so that every call of the predicate has many
 designs to simulate.
 """
 
@@ -14,35 +14,35 @@ from dataclasses import dataclass
 import numpy as np
 
 FAILS, HOLDS, BEYOND, FAR = range(4)
-"""Values of the predicate: it fails, it holds, there is nothing to try at this place, or it is far from holding."""
+"""Values of the predicate: it fails, it holds, there is nothing to try at this position, or it is far from holding."""
 FOUND, ALWAYS, NEVER, NOT_MONOTONE, BLOCKED = range(5)
 """Kinds of result, codes of `WORDS`."""
 WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap")
 CELLS = 16
 """Number of cells into which the scan divides a range."""
 STRIDE = 4
-"""Cells that the scan takes as one at first. Nothing is tried between two places that are far from holding."""
+"""Cells that the scan takes as one at first. Nothing is tried between two positions that are far from holding."""
 
 Predicate = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Maps rows and places, shape (m,), to `FAILS`, `HOLDS`, `BEYOND` or `FAR`, shape (m,)."""
+"""Maps rows and positions, shape (m,), to `FAILS`, `HOLDS`, `BEYOND` or `FAR`, shape (m,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Results of n rows. Places are whole numbers; -1 means no such place.
+    """Results of n rows. Positions are whole numbers; -1 means no such position.
 
     Attributes
     ----------
     kind : ndarray of int8, shape (n,)
         Code of `WORDS`.
     fails, holds : ndarray of int64, shape (n,)
-        Adjacent places between which it begins to hold; meaningless where `has_fails`, `has_holds` say so.
+        Adjacent positions between which it begins to hold; meaningless where `has_fails`, `has_holds` say so.
     has_fails, has_holds : ndarray of bool, shape (n,)
-        Whether there is such a place.
+        Whether there is such a position.
     shown : ndarray of int64, shape (n,)
-        The place shown for the row: `holds`, or the last place that could be tried.
+        The position shown for the row: `holds`, or the last position that could be tried.
     changes : dict of int to list of (int, int, bool)
-        For each row that is not monotone: adjacent places where it changes, in search order, and whether it holds
+        For each row that is not monotone: adjacent positions where it changes, in search order, and whether it holds
         beyond.
     """
 
@@ -61,29 +61,29 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     Parameters
     ----------
     predicate
-        Evaluated at rows and places.
+        Evaluated at rows and positions.
     first, last : ndarray of int64, shape (n,)
         Ends of the range of every row, in search order; `last` may be less than `first`.
     cells
         Pieces that a range is cut into. An interval shorter than a cell may be missed, and so may one between two
-        places that are far from holding and at most `STRIDE` cells apart.
+        positions that are far from holding and at most `STRIDE` cells apart.
 
     Returns
     -------
     Search
-        One result for each row: the first place, in search order, from which the predicate holds.
+        One result for each row: the first position, in search order, from which the predicate holds.
     """
     n = len(first)
     share = np.arange(cells + 1) / cells
-    places = first[:, None] + np.rint((last - first)[:, None] * share).astype(np.int64)
+    positions = first[:, None] + np.rint((last - first)[:, None] * share).astype(np.int64)
     rows = np.arange(n)
-    codes = _scanned(predicate, places)
-    _try_last_before_beyond(predicate, places, codes)
+    codes = _scan_positions(predicate, positions)
+    _try_last_before_beyond(predicate, positions, codes)
 
     holds, beyond = codes == HOLDS, codes == BEYOND
     none, at = ~holds.any(axis=1), holds.argmax(axis=1)
     column = np.arange(cells + 1)
-    # From the first place where it holds, it must hold at all further places that can be tried.
+    # From the first position where it holds, it must hold at all further positions that can be tried.
     broken = ((column > at[:, None]) & ~holds & ~beyond).any(axis=1) & ~none
     kind = np.where(none, NEVER, np.where(at == 0, ALWAYS, FOUND)).astype(np.int8)
     ends_beyond = beyond[:, -1] if n else np.zeros(0, dtype=bool)
@@ -91,11 +91,11 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     kind[broken] = NOT_MONOTONE
 
     last_tried = cells - (~beyond[:, ::-1]).argmax(axis=1)
-    shown = places[rows, np.where(none, last_tried, at)]
+    shown = positions[rows, np.where(none, last_tried, at)]
     edge_rows, edge_columns = _edges(codes, kind, at)
-    low, high = places[edge_rows, edge_columns], places[edge_rows, edge_columns + 1]
+    low, high = positions[edge_rows, edge_columns], positions[edge_rows, edge_columns + 1]
     rises = codes[edge_rows, edge_columns + 1] == HOLDS
-    low, high = _bisected(predicate, edge_rows, low, high, rises)
+    low, high = _bisect_changes(predicate, edge_rows, low, high, rises)
 
     fails, held = shown.copy(), shown.copy()
     has_fails = none.copy()
@@ -104,40 +104,40 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     has_fails[edge_rows[begins]] = True
     shown = np.where(none, shown, held)
     changes: dict[int, list[tuple[int, int, bool]]] = {}
-    for place in np.flatnonzero(kind[edge_rows] == NOT_MONOTONE):
-        change = (int(low[place]), int(high[place]), bool(rises[place]))
-        changes.setdefault(int(edge_rows[place]), []).append(change)
+    for k in np.flatnonzero(kind[edge_rows] == NOT_MONOTONE):
+        change = (int(low[k]), int(high[k]), bool(rises[k]))
+        changes.setdefault(int(edge_rows[k]), []).append(change)
     for row in np.flatnonzero(kind == NOT_MONOTONE):
         changes.setdefault(int(row), [])
     return Search(kind, fails, held, has_fails, ~none, shown, changes)
 
 
-def contradicted(predicate: Predicate, found: Search) -> np.ndarray:
+def contradicted(predicate: Predicate, result: Search) -> np.ndarray:
     """Return the rows of a search of which another predicate does not confirm both ends of the bracket, shape (m,)."""
-    failing, holding = np.flatnonzero(found.has_fails), np.flatnonzero(found.has_holds)
+    failing, holding = np.flatnonzero(result.has_fails), np.flatnonzero(result.has_holds)
     ends = np.concatenate([failing, holding])
-    holds = predicate(ends, np.concatenate([found.fails[failing], found.holds[holding]])) == HOLDS
+    holds = predicate(ends, np.concatenate([result.fails[failing], result.holds[holding]])) == HOLDS
     return np.unique(ends[holds != (np.arange(len(ends)) >= len(failing))])
 
 
 def searched_again(
-    predicate: Predicate, found: Search, rows: np.ndarray, first: np.ndarray, last: np.ndarray, cells: int = CELLS
+    predicate: Predicate, result: Search, rows: np.ndarray, first: np.ndarray, last: np.ndarray, cells: int = CELLS
 ) -> Search:
     """Return a search in which some of the rows are searched again, by another predicate; arguments: see `search`."""
     if not len(rows):
-        return found
-    part = search(lambda index, places: predicate(rows[index], places), first[rows], last[rows], cells)
-    return _replaced(found, rows, part)
+        return result
+    part = search(lambda index, positions: predicate(rows[index], positions), first[rows], last[rows], cells)
+    return _replace_rows(result, rows, part)
 
 
-def _replaced(found: Search, rows: np.ndarray, part: Search) -> Search:
+def _replace_rows(result: Search, rows: np.ndarray, part: Search) -> Search:
     """Return a search with some of its rows replaced by those of another."""
     arrays = {}
     for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
-        arrays[name] = getattr(found, name).copy()
+        arrays[name] = getattr(result, name).copy()
         arrays[name][rows] = getattr(part, name)
     again = set(rows.tolist())
-    changes = {row: edges for row, edges in found.changes.items() if row not in again}
+    changes = {row: edges for row, edges in result.changes.items() if row not in again}
     changes |= {int(rows[row]): edges for row, edges in part.changes.items()}
     return Search(**arrays, changes=changes)
 
@@ -145,12 +145,12 @@ def _replaced(found: Search, rows: np.ndarray, part: Search) -> Search:
 def last_before(
     predicate: Predicate, holds: np.ndarray, first: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find where the predicate begins to hold, backwards from places at which it does.
+    """Find where the predicate begins to hold, backwards from positions at which it does.
 
     Parameters
     ----------
     predicate
-        Evaluated at rows and places.
+        Evaluated at rows and positions.
     holds : ndarray of int64, shape (n,)
         Places at which it holds.
     first : ndarray of int64, shape (n,)
@@ -159,36 +159,36 @@ def last_before(
     Returns
     -------
     fails, holds : ndarray of int64, shape (n,)
-        Adjacent places: the next place before at which it does not hold, or nearly the next if it changes often.
+        Adjacent positions: the next position before at which it does not hold, or nearly the next if it changes often.
     has_fails : ndarray of bool, shape (n,)
-        Whether there is such a place; else `holds` is `first`.
+        Whether there is such a position; else `holds` is `first`.
     """
     low, high = holds.copy(), holds.copy()
     open_, stride = holds > first, 1
     while open_.any():
         rows = np.flatnonzero(open_)
-        places = np.maximum(high[rows] - stride, first[rows])
-        held = predicate(rows, places) == HOLDS
-        high[rows[held]], low[rows[~held]] = places[held], places[~held]
-        open_[rows] = held & (places > first[rows])
+        positions = np.maximum(high[rows] - stride, first[rows])
+        held = predicate(rows, positions) == HOLDS
+        high[rows[held]], low[rows[~held]] = positions[held], positions[~held]
+        open_[rows] = held & (positions > first[rows])
         stride *= 2
     has_fails = low < high
     rows = np.flatnonzero(has_fails)
-    low[rows], high[rows] = _bisected(predicate, rows, low[rows], high[rows], np.ones(len(rows), dtype=bool))
+    low[rows], high[rows] = _bisect_changes(predicate, rows, low[rows], high[rows], np.ones(len(rows), dtype=bool))
     return low, high, has_fails
 
 
-def _scanned(predicate: Predicate, places: np.ndarray) -> np.ndarray:
-    """Return `FAILS`, `HOLDS` or `BEYOND` for some places of n rows, shape (n, cells + 1)."""
-    n, cells = places.shape[0], places.shape[1] - 1
+def _scan_positions(predicate: Predicate, positions: np.ndarray) -> np.ndarray:
+    """Return `FAILS`, `HOLDS` or `BEYOND` for some positions of n rows, shape (n, cells + 1)."""
+    n, cells = positions.shape[0], positions.shape[1] - 1
     stride = math.gcd(cells, STRIDE)
-    codes = np.full(places.shape, FAR, dtype=np.int64)
+    codes = np.full(positions.shape, FAR, dtype=np.int64)
     first = np.arange(0, cells + 1, stride)
-    codes[:, first] = predicate(np.repeat(np.arange(n), len(first)), places[:, first].ravel()).reshape(n, len(first))
+    codes[:, first] = predicate(np.repeat(np.arange(n), len(first)), positions[:, first].ravel()).reshape(n, len(first))
     while stride > 1:
         rows, pieces = np.nonzero((codes[:, :-1:stride] != FAR) | (codes[:, stride::stride] != FAR))
         between = pieces * stride + stride // 2
-        codes[rows, between] = predicate(rows, places[rows, between])
+        codes[rows, between] = predicate(rows, positions[rows, between])
         stride //= 2
     return _plain(codes)
 
@@ -198,30 +198,30 @@ def _plain(codes: np.ndarray) -> np.ndarray:
     return np.where(codes == FAR, FAILS, codes)
 
 
-def _try_last_before_beyond(predicate: Predicate, places: np.ndarray, codes: np.ndarray) -> None:
-    """Locate the last place that can be tried in rows that end where nothing can, and in which nothing holds so far.
+def _try_last_before_beyond(predicate: Predicate, positions: np.ndarray, codes: np.ndarray) -> None:
+    """Locate the last position that can be tried in rows that end where nothing can, and in which nothing holds so far.
 
-    The predicate may hold only between the last place scanned and that end; such a place replaces the first one beyond
-    the end in `places` and `codes`.
+    The predicate may hold only between the last position scanned and that end; such a position replaces the first one
+    beyond the end in `positions` and `codes`.
     """
     ends = (codes[:, :-1] == FAILS) & (codes[:, 1:] == BEYOND)
     rows = np.flatnonzero(ends.any(axis=1) & ~(codes == HOLDS).any(axis=1))
     if not len(rows):
         return
     at = ends.shape[1] - 1 - ends[rows, ::-1].argmax(axis=1)
-    low, high = places[rows, at].copy(), places[rows, at + 1].copy()
+    low, high = positions[rows, at].copy(), positions[rows, at + 1].copy()
     low_code = codes[rows, at].copy()
     while (open_ := np.abs(high - low) > 1).any():
         middle = low + (high - low) // 2
-        found = _plain(predicate(rows[open_], middle[open_]))
+        middle_code = _plain(predicate(rows[open_], middle[open_]))
         reached = np.zeros(len(rows), dtype=bool)
-        reached[open_] = found != BEYOND
-        low_code[reached] = found[found != BEYOND]
+        reached[open_] = middle_code != BEYOND
+        low_code[reached] = middle_code[middle_code != BEYOND]
         low = np.where(reached, middle, low)
         high = np.where(open_ & ~reached, middle, high)
-    places[rows, at + 1] = np.where(low_code == HOLDS, low, places[rows, at + 1])
+    positions[rows, at + 1] = np.where(low_code == HOLDS, low, positions[rows, at + 1])
     codes[rows, at + 1] = np.where(low_code == HOLDS, HOLDS, BEYOND)
-    places[rows, at] = np.where(low_code == HOLDS, places[rows, at], low)
+    positions[rows, at] = np.where(low_code == HOLDS, positions[rows, at], low)
 
 
 def _edges(codes: np.ndarray, kind: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -234,10 +234,10 @@ def _edges(codes: np.ndarray, kind: np.ndarray, at: np.ndarray) -> tuple[np.ndar
     return rows, columns
 
 
-def _bisected(
+def _bisect_changes(
     predicate: Predicate, rows: np.ndarray, low: np.ndarray, high: np.ndarray, rises: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bisect changes down to adjacent places; the predicate holds above a rising change and below a falling one."""
+    """Bisect changes down to adjacent positions; the predicate holds above a rising change and below a falling one."""
     low, high = low.copy(), high.copy()
     while (open_ := np.abs(high - low) > 1).any():
         middle = low + (high - low) // 2

@@ -78,18 +78,18 @@ class Spread:
         z
             Independent standard normal numbers, shape (n, number of uncertain inputs).
         """
-        found = dict(given)
-        for place, (name, spread) in enumerate(self.distributions.items()):
-            own = z[:, place]
+        inputs = dict(given)
+        for column, (name, spread) in enumerate(self.distributions.items()):
+            normal = z[:, column]
             if name == PAIR[1] and self.correlation:
                 other = z[:, self.names.index(PAIR[0])]
-                own = self.correlation * other + math.sqrt(1.0 - self.correlation**2) * own
+                normal = self.correlation * other + math.sqrt(1.0 - self.correlation**2) * normal
             moving = self._moving if self._moving is not None and self._moving.name == name else None
-            found[name] = _drawn(spread, given, np.asarray(given[name], dtype=float), own, moving)
-        return found
+            inputs[name] = _draw_values(spread, given, np.asarray(given[name], dtype=float), normal, moving)
+        return inputs
 
 
-def _drawn(
+def _draw_values(
     spread: Distribution | SetDistributions, given: Rows, mean: np.ndarray, z: np.ndarray, moving: Moving | None
 ) -> np.ndarray:
     """Return the values of an input at standard normal numbers; of named sets each from its own distribution."""
@@ -100,12 +100,12 @@ def _drawn(
 
     if not isinstance(spread, SetDistributions):
         return drawn(spread, mean, z)
-    found = mean.copy()
-    for place, own in enumerate(spread.each):
-        rows = given[spread.section] == place
-        if own is not None and rows.any():
-            found[rows] = drawn(own, mean[rows], z[rows])
-    return found
+    values = mean.copy()
+    for code, distribution in enumerate(spread.each):
+        rows = given[spread.section] == code
+        if distribution is not None and rows.any():
+            values[rows] = drawn(distribution, mean[rows], z[rows])
+    return values
 
 
 class Moving:
@@ -121,17 +121,17 @@ class Moving:
     Raises
     ------
     QuestionError
-        It has several means but one pair of ends, so that their places about the mean are not known.
+        It has several means but one pair of ends, so that it is not known where they lie about the mean.
     """
 
     def __init__(self, sweep: Sweep, name: str) -> None:
         self.name = name
         self._admitted = _admitted(name)
         spread = sweep.distributions[name]
-        columns = {own: values for axis in sweep.axes for own, values in axis.columns.items()}
+        columns = {column: values for axis in sweep.axes for column, values in axis.columns.items()}
         means = columns.get(name, np.array([sweep.constants.get(name, np.nan)]))
         if isinstance(spread, SetDistributions):
-            self._each = [(own, mean) for own, mean in zip(spread.each, means, strict=True) if own is not None]
+            self._each = [(one, mean) for one, mean in zip(spread.each, means, strict=True) if one is not None]
             return
         self._each = [(spread, means[0])]
         named = spread.kind not in TRUNCATED or (spread.low, spread.high) != self._admitted[:2]
@@ -156,8 +156,8 @@ class Moving:
         low, high : ndarray, shape (n,)
             Its ends, within the admitted range.
         """
-        own = next(at for one, at in self._each if one is spread)
-        moved = (end + (mean - own) if spread.cov is None else end * (mean / own) for end in (spread.low, spread.high))
+        old = next(at for one, at in self._each if one is spread)
+        moved = (end + (mean - old) if spread.cov is None else end * (mean / old) for end in (spread.low, spread.high))
         low, high = (np.clip(end, *self._admitted[:2]) for end in moved)
         if spread.kind in TRUNCATED:
             low = np.where(spread.low == self._admitted.low, self._admitted.low, low)
@@ -173,17 +173,17 @@ class Moving:
             Smallest mean for which a spread that is a share of the mean makes sense, in the unit of the column.
         """
         first, last = self._admitted.low, self._admitted.high
-        for spread, own in self._each:
+        for spread, mean in self._each:
             if spread.cov is not None or spread.kind == "lognormal":
                 first = max(first, least)
             if spread.kind in TRUNCATED:
                 continue
             if spread.cov is None:
-                first = max(first, self._admitted.low + (own - spread.low))
-                last = min(last, self._admitted.high - (spread.high - own))
+                first = max(first, self._admitted.low + (mean - spread.low))
+                last = min(last, self._admitted.high - (spread.high - mean))
             else:
-                first = max(first, self._admitted.low * own / spread.low if spread.low > 0.0 else 0.0)
-                last = min(last, self._admitted.high * own / spread.high)
+                first = max(first, self._admitted.low * mean / spread.low if spread.low > 0.0 else 0.0)
+                last = min(last, self._admitted.high * mean / spread.high)
         return first, last
 
 
@@ -195,7 +195,7 @@ def moving_of(sweep: Sweep, name: str) -> Moving | None:
     QuestionError
         As of `Moving`; or the embedment is searched as a depth and uncertain as a ratio, or the reverse.
     """
-    other = next((own for own in EMBEDMENT if name in EMBEDMENT and own != name and own in sweep.distributions), None)
+    other = next((one for one in EMBEDMENT if name in EMBEDMENT and one != name and one in sweep.distributions), None)
     if other is not None:
         raise QuestionError(
             f"{BY_NAME[name].path} is asked for, and {BY_NAME[other].path} has a distribution; ask for "

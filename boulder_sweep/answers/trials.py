@@ -80,7 +80,7 @@ class Open:
 
 
 def rows_at(rows: Rows, index: np.ndarray | slice) -> Rows:
-    """Return some of the rows, by their places, a mask or a slice."""
+    """Return some of the rows, by their indices, a mask or a slice."""
     return {name: values[index] for name, values in rows.items()}
 
 
@@ -137,21 +137,21 @@ class Remembered:
 
     def __init__(self, evaluation: Evaluation) -> None:
         self._evaluation, self.count = evaluation, 0
-        self._places: dict[bytes, int] = {}
+        self._indices: dict[bytes, int] = {}
         self._judged: list[Judged] = []
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Return the judged rows of a block."""
         inputs = [column.to_numpy() for column in block.columns.values()]
         keys = [row.tobytes() for row in np.stack(inputs, axis=1)]
-        new = {key: row for row, key in enumerate(keys) if key not in self._places}
+        new = {key: row for row, key in enumerate(keys) if key not in self._indices}
         if new or not self._judged:
-            self._places |= {key: len(self._places) + count for count, key in enumerate(new)}
+            self._indices |= {key: len(self._indices) + count for count, key in enumerate(new)}
             self._judged.append(self._evaluation(some(block, np.fromiter(new.values(), np.int64, len(new)))))
             self._judged = [joined(self._judged)]
             self.count += len(new)
-        places = [self._places[key] for key in keys]
-        return joined([self._judged[0].rows(np.array(places, dtype=np.int64))])
+        indices = [self._indices[key] for key in keys]
+        return joined([self._judged[0].rows(np.array(indices, dtype=np.int64))])
 
 
 def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False, robust: bool = False) -> Judges:
@@ -191,8 +191,8 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
 def every_reading(sweep: Sweep) -> list[Sweep]:
     """Return a sweep with every combination of the five readings."""
     choices = itertools.product(*((PRINTED, corrected) for corrected in SWITCHES.values()))
-    readings = (ReadingChoice(**dict(zip(SWITCHES, own, strict=True))) for own in choices)
-    return [dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=own)) for own in readings]
+    readings = (ReadingChoice(**dict(zip(SWITCHES, choice, strict=True))) for choice in choices)
+    return [dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=one)) for one in readings]
 
 
 def other_readings(sweep: Sweep) -> Sweep:
@@ -202,11 +202,11 @@ def other_readings(sweep: Sweep) -> Sweep:
 
 
 def uncertain_rows(sweep: Sweep, given: Rows, start: int, stop: int) -> Rows:
-    """Return the rows ``[start, stop)`` of a sweep with the places of their named soils and vehicles.
+    """Return the rows ``[start, stop)`` of a sweep with the indices of their named soils and vehicles.
 
     These are needed where named sets have distributions of their own; `boulder_sweep.designs.block_of` ignores them.
     """
-    sets = {own.section for own in sweep.distributions.values() if isinstance(own, SetDistributions)}
+    sets = {spread.section for spread in sweep.distributions.values() if isinstance(spread, SetDistributions)}
     if not sets:
         return given
     labels = sweep.block(start, stop).labels

@@ -177,8 +177,8 @@ def uncertainty(
     names, points = asked.spread.names, Points(len(asked.spread.names), seed)
     with pool(jobs, backend, scheduler) as workers:
         pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
-        tables = (_rows(asked, points, workers, start, stop) for start, stop in pieces)
-        found = collected(tables, sweep.n_designs, progress)
+        parts = (_rows(asked, points, workers, start, stop) for start, stop in pieces)
+        tables = collected(parts, sweep.n_designs, progress)
         few = sweep.n_designs if sweep.n_designs <= MOST_INDEXED else 0
         each = [_sensitivity(asked, points, workers, row) for row in range(few)]
     question = {
@@ -191,8 +191,8 @@ def uncertainty(
     }
     return Uncertainty(
         sweep,
-        joined_tables(found, sweep, asked.judges, "boulder_sweep.uncertainty", question),
-        _index_table(names, [own for own, _ in each]),
+        joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question),
+        _index_table(names, [one for one, _ in each]),
         _sample_table(names, [drawn for _, drawn in each]),
         seed,
     )
@@ -241,26 +241,26 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     first: list[np.ndarray] = []
 
     def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        found = draws.distance(index, z)
+        distance = draws.distance(index, z)
         if not first:
-            first.append(found.reshape(n, -1))
-        return found > 0.0
+            first.append(distance.reshape(n, -1))
+        return distance > 0.0
 
-    found = chance(event, n, points, half_width=asked.half_width, confidence=asked.confidence, most=asked.most)
+    sampled = chance(event, n, points, half_width=asked.half_width, confidence=asked.confidence, most=asked.most)
     z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
     driver = drivers(z, first[0])
-    failing = rare_failing(asked, draws, found) if asked.rare else None
+    failing = rare_failing(asked, draws, sampled) if asked.rare else None
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     judged = asked.judges.final(block)
     if asked.sweep.model.second_opinion:
         judged = asked.judges.final.graded(judged, block)
     driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
     columns: list[TableColumn] = [
-        ("p_pass", "1", "chance that the design passes", found.estimate),
-        ("p_pass_low", "1", "lower end of the interval of p_pass", found.low),
-        ("p_pass_high", "1", "upper end of the interval of p_pass", found.high),
+        ("p_pass", "1", "chance that the design passes", sampled.estimate),
+        ("p_pass_low", "1", "lower end of the interval of p_pass", sampled.low),
+        ("p_pass_high", "1", "upper end of the interval of p_pass", sampled.high),
         ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
-        ("p_pass_designs", "1", "designs drawn for p_pass", found.points),
+        ("p_pass_designs", "1", "designs drawn for p_pass", sampled.points),
     ]
     if failing is not None:
         meaning = "chance that the design does not pass; null where p_fail_by says why"
@@ -278,18 +278,18 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     return rows_table(start, block, judged, columns)
 
 
-def rare_failing(asked: _Asked, draws: Draws, found: Sampled) -> Failing:
-    """Return the probabilities of failing: `found` if enough designs fall on each side, else from subset simulation."""
-    passing = found.estimate * found.points
-    few = np.flatnonzero(np.minimum(passing, found.points - passing) < FEWEST)
-    sign = np.where(found.estimate[few] >= 0.5, 1.0, -1.0)
+def rare_failing(asked: _Asked, draws: Draws, sampled: Sampled) -> Failing:
+    """Return the probabilities of failing: sampled if enough designs fall on each side, else from subset simulation."""
+    passing = sampled.estimate * sampled.points
+    few = np.flatnonzero(np.minimum(passing, sampled.points - passing) < FEWEST)
+    sign = np.where(sampled.estimate[few] >= 0.5, 1.0, -1.0)
 
     def distance(index: np.ndarray, z: np.ndarray) -> np.ndarray:
         return sign[index] * draws.reserve(few[index], z)
 
     small = subset_simulation(distance, len(few), draws.dimensions, seed=asked.seed, confidence=asked.confidence)
     fails = sign > 0.0
-    estimate, low, high = 1.0 - found.estimate, 1.0 - found.high, 1.0 - found.low
+    estimate, low, high = 1.0 - sampled.estimate, 1.0 - sampled.high, 1.0 - sampled.low
     estimate[few] = np.where(fails, small.estimate, 1.0 - small.estimate)
     apart = np.zeros(len(estimate), dtype=bool)
     from_, to = np.where(fails, small.low, 1.0 - small.high), np.where(fails, small.high, 1.0 - small.low)
@@ -299,7 +299,7 @@ def rare_failing(asked: _Asked, draws: Draws, found: Sampled) -> Failing:
     by[few] = np.where(np.isnan(small.estimate), FAILING.index("no_progress"), FAILING.index("subset"))
     by[apart] = FAILING.index("contradicts")
     known = by < FAILING.index("no_progress")
-    estimate, low, high = (np.where(known, own, np.nan) for own in (estimate, low, high))
+    estimate, low, high = (np.where(known, values, np.nan) for values in (estimate, low, high))
     return Failing(estimate, low, high, by)
 
 
@@ -308,8 +308,8 @@ def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tup
     draws = asked.draws(row, row + 1, parallel)
 
     def outputs(z: np.ndarray) -> np.ndarray:
-        found = draws.distance(np.zeros(len(z), dtype=np.int64), z)
-        return np.stack([(found > 0.0).astype(float), found])
+        distance = draws.distance(np.zeros(len(z), dtype=np.int64), z)
+        return np.stack([(distance > 0.0).astype(float), distance])
 
     decided = indices(outputs, len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
     z = points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1)
@@ -318,13 +318,13 @@ def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tup
     return decided, ({name: given[name] for name in asked.spread.names}, draws.distance(index, z))
 
 
-def _index_table(names: Sequence[str], found: Sequence[Indices]) -> pa.Table:
+def _index_table(names: Sequence[str], estimates: Sequence[Indices]) -> pa.Table:
     """Return Sobol indices as a table, one row for each design, output and input."""
     import pyarrow as pa
 
     from boulder_sweep.store.schema import number_array
 
-    rows = [(design, output, name) for design in range(len(found)) for output in OUTPUTS for name in names]
+    rows = [(design, output, name) for design in range(len(estimates)) for output in OUTPUTS for name in names]
     designs, outputs, inputs = (list(column) for column in zip(*rows, strict=True)) if rows else ([], [], [])
     columns = {
         "design_id": pa.array(designs, pa.int64()),
@@ -332,7 +332,7 @@ def _index_table(names: Sequence[str], found: Sequence[Indices]) -> pa.Table:
         "input": pa.array(inputs, pa.string()).dictionary_encode(),
     }
     for field in fields(Indices):
-        values = np.concatenate([*(getattr(own, field.name).ravel() for own in found), np.empty(0)])
+        values = np.concatenate([*(getattr(one, field.name).ravel() for one in estimates), np.empty(0)])
         columns[field.name] = number_array(values, np.isnan(values))
     return pa.table(columns)
 

@@ -122,8 +122,8 @@ class Point:
 
     def to_dict(self) -> dict[str, object]:
         """Return one row of the table of results; None where there is no value."""
-        own = {name: None if value != value else value for name, value in vars(self).items() if name != "method"}
-        return {**self.method._asdict(), **own}
+        values = {name: None if value != value else value for name, value in vars(self).items() if name != "method"}
+        return {**self.method._asdict(), **values}
 
 
 @dataclass(frozen=True)
@@ -158,11 +158,11 @@ class Sample:
             took = time.thread_time() - begun
             spent, best = spent + took, min(best, took)
         ref = type(known)(*(column[rows] for column in known))
-        both = ((own, judge(own, fewer.designs, self.limits)) for own in (out, ref))
+        both = ((outcome, judge(outcome, fewer.designs, self.limits)) for outcome in (out, ref))
         return compared(method, accuracy, 1e6 * best / len(rows), *both)
 
     def rows(self, chosen: np.ndarray) -> Sample:
-        """Return a sample of some of the designs, by their places."""
+        """Return a sample of some of the designs, by their indices."""
         return replace(self, designs=self.designs.rows(chosen))
 
 
@@ -176,7 +176,7 @@ def compared(
     method: Method,
     accuracy: str,
     cpu_us: float,
-    found: tuple[OutcomeTable, Judged],
+    solved: tuple[OutcomeTable, Judged],
     known: tuple[OutcomeTable, Judged],
 ) -> Point:
     """Compare the outcomes of one method with those of a far finer solution.
@@ -185,10 +185,10 @@ def compared(
     ----------
     method, accuracy, cpu_us
         As of `Point`.
-    found, known
+    solved, known
         Outcomes and verdicts of this method and of the finer solution, n designs each.
     """
-    (out, judged), (ref, truth) = found, known
+    (out, judged), (ref, truth) = solved, known
     limit = Status.LIMIT
     both = np.isfinite(out.theta_max) & np.isfinite(ref.theta_max)
     standing = both & (out.status != limit) & (ref.status != limit)

@@ -89,7 +89,7 @@ class Tradeoff:
         """
         fit = [
             point
-            for point in self._own()
+            for point in self._points_of_sweep()
             if (point.method.error_estimate if error_estimate else point.method.is_plain)
             and point.rotation_max_deg <= wanted_deg
             and not point.flips
@@ -105,23 +105,23 @@ class Tradeoff:
         by_words: dict[str, list[str]] = {}
         for target in dict.fromkeys(targets):
             by_words.setdefault(self._advice(target), []).append(f"{target:g}")
-        found = [f"For {' or '.join(values)} deg {advice}." for advice, values in by_words.items()]
+        sentences = [f"For {' or '.join(values)} deg {advice}." for advice, values in by_words.items()]
         best = (self.best(target, error_estimate=True) for target in targets)
         if any(point is not None and not point.accuracy for point in best):
-            found.append(
+            sentences.append(
                 "An accuracy given as a number bounds the estimated errors, which are larger than the true ones."
             )
-        sums = [p for p in self._own() if p.method.soil_elements == max(ELEMENTS)]
-        closed = {p.method.step_ms: p.cpu_us for p in self._own() if p.method.is_plain}
+        sums = [p for p in self._points_of_sweep() if p.method.soil_elements == max(ELEMENTS)]
+        closed = {p.method.step_ms: p.cpu_us for p in self._points_of_sweep() if p.method.is_plain}
         if sums:
             ratio = sums[0].cpu_us / closed[sums[0].method.step_ms]
-            found.append(
+            sentences.append(
                 f"Sums over {max(ELEMENTS)} soil elements cost {ratio:,.0f} times the closed form, which is their "
                 f"limit, and are {min(p.rotation_max_deg for p in sums):.1g} deg off it at most: for comparison only."
             )
-        return found
+        return sentences
 
-    def _own(self) -> Iterator[Point]:
+    def _points_of_sweep(self) -> Iterator[Point]:
         """Yield the points with the readings of the sweep."""
         return (point for point in self.points if point.method.readings == self.own_readings)
 
@@ -142,7 +142,7 @@ class Tradeoff:
     def _none_guarded(self, plain: Point | None) -> str:
         """Say why no method with an error estimate can be named, where `plain` steps suffice or none (None)."""
         if any(method.error_estimate and method.readings == self.own_readings for method in self.left_out):
-            measured = any(point.method.error_estimate for point in self._own())
+            measured = any(point.method.error_estimate for point in self._points_of_sweep())
             which = "accurate enough " if measured else ""
             return f"no method with confirmed errors {which}was measured in the time; allow more --seconds"
         return "no measured step is short enough" if plain is None else "no step with confirmed errors is short enough"
@@ -280,9 +280,9 @@ def _name_of(method: Method, readings: Readings) -> str:
     """Name of the accuracy that a method stands for, or nothing."""
     if method.soil_elements:
         return ""
-    own = Steps(1e-3 * method.step_ms, method.locate_yield)
+    method_steps = Steps(1e-3 * method.step_ms, method.locate_yield)
     for name, steps in (STEPS if readings.restoring_gravity else STEPS_PRINTED).items():
-        if steps == own and method.error_estimate == (name != "fast"):
+        if steps == method_steps and method.error_estimate == (name != "fast"):
             return name
     return ""
 
