@@ -142,7 +142,7 @@ def call(kernel: Any, arguments: tuple[Any, ...]) -> Any:
     types = ",".join([flatten(value, reals, wholes, arrays) for value in arguments])
     native = kernel.natives.get(types)
     if native is None:
-        native = kernel.natives[types] = _found(kernel, types)
+        native = kernel.natives[types] = _load_or_compile(kernel, types)
     if native is UNSUITABLE:
         raise UnsuitableError
     out = (ctypes.c_double * native.numbers)()
@@ -162,14 +162,14 @@ def call(kernel: Any, arguments: tuple[Any, ...]) -> Any:
 UNSUITABLE: Any = object()
 
 
-def _found(kernel: Any, types: str) -> Any:
+def _load_or_compile(kernel: Any, types: str) -> Any:
     """Return a compiled kernel, compiled now if it is not on the disk; `UNSUITABLE` where it cannot be."""
     with _COMPILING:
         name, kept_in = file_name(kernel, types), folder()
-        for place in (_cache.shipped_folder(), kept_in):
-            if place is not None:
+        for location in (_cache.shipped_folder(), kept_in):
+            if location is not None:
                 with contextlib.suppress(UnusableError):
-                    return loaded(place / name)
+                    return loaded(location / name)
         try:
             with announce(name):
                 code, library, kept = kernel.compiler.compiled_ahead(kernel, types)

@@ -47,7 +47,7 @@ def _cache_folder() -> str | None:
     refused = []
     for candidate in candidates:
         try:
-            folder = _own_folder(candidate / f"kernels-{source_hash()[:16]}")
+            folder = _make_private_folder(candidate / f"kernels-{source_hash()[:16]}")
             with tempfile.TemporaryFile(dir=folder):
                 pass
         except OSError as problem:
@@ -64,7 +64,7 @@ def _cache_folder() -> str | None:
     return None
 
 
-def _own_folder(folder: Path) -> Path:
+def _make_private_folder(folder: Path) -> Path:
     """Make a folder with access for this user only, and check that nobody else can put files into it.
 
     Returns
@@ -78,21 +78,21 @@ def _own_folder(folder: Path) -> Path:
         It cannot be made, or others can change it or a folder above it.
     """
     folder = Path(os.path.realpath(folder))
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
-    for place in reversed(missing):
-        if not place.parent.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, f"{place.parent} is not a folder")
-        place.mkdir(mode=0o700, exist_ok=True)
-    for place in (folder, *folder.parents):
-        found = place.lstat()
-        if not stat.S_ISDIR(found.st_mode):
-            raise NotADirectoryError(errno.ENOTDIR, f"{place} is not a folder")
-        if found.st_uid not in (os.getuid(), 0):
-            raise PermissionError(errno.EPERM, f"{place} belongs to another user")
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(missing):
+        if not path.parent.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{path.parent} is not a folder")
+        path.mkdir(mode=0o700, exist_ok=True)
+    for path in (folder, *folder.parents):
+        status = path.lstat()
+        if not stat.S_ISDIR(status.st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, f"{path} is not a folder")
+        if status.st_uid not in (os.getuid(), 0):
+            raise PermissionError(errno.EPERM, f"{path} belongs to another user")
         # Where the sticky bit is set, as for /tmp, others cannot replace what lies in the folder.
-        open_to_others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-        if open_to_others and (place == folder or not found.st_mode & stat.S_ISVTX):
-            raise PermissionError(errno.EPERM, f"other users can write into {place}")
+        open_to_others = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+        if open_to_others and (path == folder or not status.st_mode & stat.S_ISVTX):
+            raise PermissionError(errno.EPERM, f"other users can write into {path}")
     return folder
 
 
@@ -162,8 +162,8 @@ def machine_hash() -> str:
     parts = [platform.machine(), platform.system(), *processor()]
     parts += [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith("NUMBA_")]
     for package in ("numba", "llvmlite"):
-        found = importlib.util.find_spec(package)
-        if found is not None and found.origin is not None:
-            version = Path(found.origin).with_name("_version.py").stat()
+        spec = importlib.util.find_spec(package)
+        if spec is not None and spec.origin is not None:
+            version = Path(spec.origin).with_name("_version.py").stat()
             parts.append(f"{package} {version.st_size} {version.st_mtime_ns}")
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

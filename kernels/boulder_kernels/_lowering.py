@@ -1,4 +1,4 @@
-"""What a place in the workspace, and a design of a table, become in compiled kernels: loads and stores, one a number.
+"""What a record in the workspace, and a design of a table, become in compiled kernels: loads and stores, one a number.
 
 As code to be compiled and inlined wherever it is called this would take a third of the time of all kernels to compile.
 A copy of a lane by a loop would be compiled to vectors gathered and scattered, which take three times as long. Numba is
@@ -27,7 +27,7 @@ from .workspace import (
     SOIL,
     align_stack,
     copy_lane,
-    given_place,
+    given_offset,
     load,
     load_given,
     offsets_of,
@@ -70,7 +70,7 @@ def _lower_align_stack(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @type_callable(field)
 def _type_field(context: Any) -> Callable[..., Any]:
-    return lambda ws, place, lane: _array(ws).dtype
+    return lambda ws, offset, lane: _array(ws).dtype
 
 
 @lower_builtin(field, types.Any, types.Any, types.Any)
@@ -80,7 +80,7 @@ def _lower_field(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @type_callable(put)
 def _type_put(context: Any) -> Callable[..., Any]:
-    return lambda ws, place, lane, value: types.void
+    return lambda ws, offset, lane, value: types.void
 
 
 @lower_builtin(put, types.Any, types.Any, types.Any, types.Any)
@@ -142,39 +142,39 @@ def _soil(ws: Any) -> Any:
 
 @type_callable(load)
 def _type_load(context: Any) -> Callable[..., Any]:
-    def result(ws: Any, place: Any, lane: Any) -> Any:
-        """Return the type of the record, or None where the place is not yet known as a constant."""
-        if not isinstance(place, types.IntegerLiteral):
+    def result(ws: Any, offset: Any, lane: Any) -> Any:
+        """Return the type of the record, or None where the offset is not yet known as a constant."""
+        if not isinstance(offset, types.IntegerLiteral):
             return None
-        kind = _record(ws, RECORDS[place.literal_value])
-        if place.literal_value == CONSTANTS and not isinstance(ws, types.Array):
+        kind = _record(ws, RECORDS[offset.literal_value])
+        if offset.literal_value == CONSTANTS and not isinstance(ws, types.Array):
             return types.NamedTuple([*kind.types, _soil(ws)], LayeredConstants)
         return kind
 
     return result
 
 
-def _load_numbers(context: Any, builder: Any, sig: Any, args: Any, kind: Any, place: int) -> tuple[Any, int]:
-    """Load numbers one after another into records within records; return it and the place behind."""
+def _load_numbers(context: Any, builder: Any, sig: Any, args: Any, kind: Any, offset: int) -> tuple[Any, int]:
+    """Load numbers one after another into records within records; return it and the offset behind."""
     if isinstance(kind, types.Float):
         kinds, values = (sig.args[0], sig.args[-1]), (args[0], args[-1])
-        return builder.load(_pointer(context, builder, kinds, values, place)), place + LANES
+        return builder.load(_pointer(context, builder, kinds, values, offset)), offset + LANES
     fields = []
     for each in kind.types:
-        value, place = _load_numbers(context, builder, sig, args, each, place)
+        value, offset = _load_numbers(context, builder, sig, args, each, offset)
         fields.append(value)
-    return context.make_tuple(builder, kind, fields), place
+    return context.make_tuple(builder, kind, fields), offset
 
 
-def _store_numbers(context: Any, builder: Any, ws: Any, lane: Any, record: Any, place: int) -> int:
-    """Store the numbers of records within records one after another, all as (type, value); return the place behind."""
+def _store_numbers(context: Any, builder: Any, ws: Any, lane: Any, record: Any, offset: int) -> int:
+    """Store the numbers of records within records one after another, all as (type, value); return the offset behind."""
     kind, value = record
     if isinstance(kind, types.Float):
-        builder.store(value, _pointer(context, builder, (ws[0], lane[0]), (ws[1], lane[1]), place))
-        return place + LANES
+        builder.store(value, _pointer(context, builder, (ws[0], lane[0]), (ws[1], lane[1]), offset))
+        return offset + LANES
     for i, each in enumerate(kind.types):
-        place = _store_numbers(context, builder, ws, lane, (each, builder.extract_value(value, i)), place)
-    return place
+        offset = _store_numbers(context, builder, ws, lane, (each, builder.extract_value(value, i)), offset)
+    return offset
 
 
 @lower_builtin(load, types.Any, types.IntegerLiteral, types.Any)
@@ -207,12 +207,12 @@ def _type_load_given(context: Any) -> Callable[..., Any]:
 @lower_builtin(load_given, types.Any, types.Any)
 def _lower_load_given(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     soil: Any = soil_in(sig.args[0])
-    return _load_numbers(context, builder, sig, args, sig.return_type, given_place(soil, len(sig.args[0][1])))[0]
+    return _load_numbers(context, builder, sig, args, sig.return_type, given_offset(soil, len(sig.args[0][1])))[0]
 
 
 @type_callable(store)
 def _type_store(context: Any) -> Callable[..., Any]:
-    return lambda ws, place, lane, record: types.void
+    return lambda ws, offset, lane, record: types.void
 
 
 @lower_builtin(store, types.Any, types.Any, types.Any, types.BaseNamedTuple)
@@ -244,8 +244,8 @@ def _lower_store_given(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     count = len(sig.args[0][1])
     size = soil.given_size(count) // LANES
     for i, number in enumerate(_rows_of(context, builder, sig.args[2:], args[2:], len(Design._fields), size)):
-        place = given_place(soil, count) + i * LANES
-        builder.store(number, _pointer(context, builder, sig.args[:2], args[:2], place))
+        offset = given_offset(soil, count) + i * LANES
+        builder.store(number, _pointer(context, builder, sig.args[:2], args[:2], offset))
     return context.get_dummy_value()
 
 
@@ -260,13 +260,13 @@ def _type_copy_lane(context: Any) -> Callable[..., Any]:
 
 @lower_builtin(copy_lane, types.Any, types.Any, types.Any, types.IntegerLiteral)
 def _lower_copy_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    places = [*range(0, sig.args[3].literal_value, LANES)]
+    offsets = [*range(0, sig.args[3].literal_value, LANES)]
     if not isinstance(sig.args[0], types.Array):
         soil: Any = soil_in(sig.args[0])
-        places += range(SOIL, SOIL + soil.size(len(sig.args[0][1])), LANES)
-    for place in places:
+        offsets += range(SOIL, SOIL + soil.size(len(sig.args[0][1])), LANES)
+    for offset in offsets:
         source, target = (
-            _pointer(context, builder, (sig.args[0], sig.args[i]), (args[0], args[i]), place) for i in (1, 2)
+            _pointer(context, builder, (sig.args[0], sig.args[i]), (args[0], args[i]), offset) for i in (1, 2)
         )
         builder.store(builder.load(source), target)
     return context.get_dummy_value()
@@ -279,12 +279,12 @@ def _rows_of(context: Any, builder: Any, kinds: Any, values: Any, first: int, co
     """Load the numbers of a column of an array from some of its rows."""
     array = context.make_array(kinds[0])(context, builder, values[0])
     columns = builder.extract_value(array.shape, 1)
-    place, numbers = context.cast(builder, values[1], kinds[1], types.intp), []
+    index, numbers = context.cast(builder, values[1], kinds[1], types.intp), []
     if first:
-        place = builder.add(place, builder.mul(columns, context.get_constant(types.intp, first)))
+        index = builder.add(index, builder.mul(columns, context.get_constant(types.intp, first)))
     for _ in range(count):
-        numbers.append(builder.load(builder.gep(array.data, [place], inbounds=True)))
-        place = builder.add(place, columns)
+        numbers.append(builder.load(builder.gep(array.data, [index], inbounds=True)))
+        index = builder.add(index, columns)
     return numbers
 
 

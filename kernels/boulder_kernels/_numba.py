@@ -54,8 +54,8 @@ class KernelCompiler(Compiler):
         """Return the steps, as Numba asks for them."""
         (steps,) = super().define_pipelines()
         kept = [(step, reason) for step, reason in steps.passes if step.__name__ not in NEEDLESS]
-        repeated = [place for place, (step, _) in enumerate(kept) if step.__name__ == REPEATED]
-        steps.passes = [entry for place, entry in enumerate(kept) if place not in repeated[:-1]]
+        repeated = [k for k, (step, _) in enumerate(kept) if step.__name__ == REPEATED]
+        steps.passes = [entry for k, entry in enumerate(kept) if k not in repeated[:-1]]
         steps.finalize()
         return [steps]
 
@@ -170,12 +170,12 @@ def compiled_ahead(kernel: Any, types: str) -> tuple[bytes, bytes | None, dict[s
     outermost = dispatcher_of(kernel.py_func, kernel.options, OutermostCompiler)
     outermost.compile(signature)
     lines: list[str] = []
-    returns = written_out(outermost.overloads[signature].signature.return_type, "found", lines)
+    returns = append_expressions(outermost.overloads[signature].signature.return_type, "result", lines)
     kept = {"returns": returns, "numbers": len(lines), "types": types, "arrays": len(given.arrays)}
     source = f"def {ENTRY}(reals_at, wholes_at, {''.join(f'{name}, ' for name in given.arrays)}out_at):\n"
     source += f" reals = carray(reals_at, ({given.reals},))\n wholes = carray(wholes_at, ({given.wholes},))\n"
-    source += f" out = carray(out_at, ({len(lines)},))\n found = function({given.arguments})\n"
-    source += "".join(f" out[{place}] = {line}\n" for place, line in enumerate(lines))
+    source += f" out = carray(out_at, ({len(lines)},))\n result = function({given.arguments})\n"
+    source += "".join(f" out[{index}] = {line}\n" for index, line in enumerate(lines))
     wrapper = function_of(source, carray=numba.carray, function=outermost, **given.records)
     options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     entry = dispatcher_of(wrapper, options, InsideCompiler)
@@ -252,9 +252,9 @@ def call_of(types: str) -> Call:
         NOTHING: lambda: "None",
     }
 
-    def written(found: re.Match[str]) -> str:
+    def expression_of(match: re.Match[str]) -> str:
         """Return the expression of a number or an array, or the name of a type of records."""
-        kind = found.group()
+        kind = match.group()
         if kind in simple:
             return simple[kind]()
         if ":" in kind:
@@ -266,7 +266,7 @@ def call_of(types: str) -> Call:
         return f"carray({name}, ({''.join(f'{simple[WHOLE]()}, ' for _ in range(int(kind[2:])))}))"
 
     # A comma ends every tuple, because those of one need it.
-    arguments = re.sub(r"[^(),]+", written, types.replace(")", ",)"))
+    arguments = re.sub(r"[^(),]+", expression_of, types.replace(")", ",)"))
     return Call(arguments, next(reals), next(wholes), arrays, records)
 
 
@@ -277,7 +277,7 @@ def examples(call: Call) -> list[Any]:
     return function_of(f"def call():\n return [{call.arguments}]", **numbers, **made, **call.arrays, **call.records)()
 
 
-def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
+def append_expressions(kind: Any, expression: str, lines: list[str]) -> Any:
     """Append the expressions of all numbers of what a kernel returns, and return how they are put together again.
 
     Raises
@@ -295,7 +295,7 @@ def written_out(kind: Any, expression: str, lines: list[str]) -> Any:
     if not isinstance(kind, types.BaseTuple):
         raise UnsuitableError(str(kind))
     name = name_of(kind.instance_class) if isinstance(kind, types.BaseNamedTuple) else ""
-    return [name, [written_out(one, f"{expression}[{place}]", lines) for place, one in enumerate(kind.types)]]
+    return [name, [append_expressions(one, f"{expression}[{i}]", lines) for i, one in enumerate(kind.types)]]
 
 
 def linked(code: bytes) -> bytes | None:

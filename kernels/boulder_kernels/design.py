@@ -15,7 +15,7 @@ from .numerics import direction, half_tangent
 
 
 class Readings(NamedTuple):
-    """Which formula stands at each place where the printed one is wrong; False reads it as printed."""
+    """Which formula is used wherever the printed one is wrong; False reads it as printed."""
 
     inertia_box: bool
     """Eq 16: moment of inertia of a box, m_b/12 (H^2 + L^2), in place of a quarter of it."""
@@ -229,10 +229,10 @@ def boulder_inertia(body: Body, c_x: float, c_y: float, box: bool) -> float:
     Departs from print where ``box``: the first term is that of a box, m_b/12 (H^2 + L^2), or of the boulder that there
     is; printed, it has the half lengths and so a quarter of it.
     """
-    own = body.J
+    J = body.J
     if not box:
-        own *= 0.25
-    return own + body.m_b * ((c_y - body.y) ** 2 + (c_x - body.x) ** 2)
+        J *= 0.25
+    return J + body.m_b * ((c_y - body.y) ** 2 + (c_x - body.x) ** 2)
 
 
 class SoilMass(NamedTuple):

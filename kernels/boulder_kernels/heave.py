@@ -34,7 +34,7 @@ EACH = PIECES // PARTS
 SIDE_ROWS, SIDE_COLUMNS = 8, 4
 """Points of the sides over the depth and over the length."""
 SETS, FOOT, SIDE_A, SIDE_B, SIDE_DEPTH, RATIO, SUMS = (PIECES * n for n in range(7))
-"""Places in the workspace: sets of the strips and where they lie along the foot; points of the sides; middles of the
+"""Offsets in the workspace: sets of the strips and where they lie along the foot; points of the sides; middles of the
 soil elements as shares of the depth; partial sums of five numbers."""
 ROOM = SUMS + 5 * PARTS
 """Numbers in the workspace."""
@@ -138,7 +138,7 @@ def heave_constants(design: Design, c: Constants, form: Form, base: Base) -> Hea
     m_b = boulder_mass(design)
     soil = soil_mass(design, 0)
     a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
-    own = m_b / 12.0 * (design.H * design.H + design.L * design.L)
+    J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
     strip = design.W * design.L / PIECES
     capacity = bearing_capacity_factor(design.phi)
     friction = math.tan(2.0 / 3.0 * design.phi) if form.friction else 0.0
@@ -150,7 +150,7 @@ def heave_constants(design: Design, c: Constants, form: Form, base: Base) -> Hea
         m_b,
         a_b,
         b_b,
-        own + m_b * (a_b * a_b + b_b * b_b),
+        J_box + m_b * (a_b * a_b + b_b * b_b),
         soil.mass,
         c.c_y * soil.mass - soil.first,
         c.c_y * c.c_y * soil.mass - 2.0 * c.c_y * soil.first + soil.second,
@@ -251,9 +251,9 @@ class Strip(NamedTuple):
     total: float
     """With its dashpot: what the base pushes up with [N]."""
     X: float
-    """Place of the strip right of the common centre of mass [m]."""
+    """Position of the strip right of the common centre of mass [m]."""
     Y: float
-    """Place of the strip over the common centre of mass [m]."""
+    """Position of the strip over the common centre of mass [m]."""
 
 
 @inlined

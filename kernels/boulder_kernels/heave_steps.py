@@ -20,7 +20,7 @@ from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sin
 AXES = 4
 """Displacements: x_b, theta_b, y_b, x_v."""
 START, TRIAL, RATES = ROOM, ROOM + 2 * AXES, ROOM + 4 * AXES
-"""Places in the workspace: displacements and velocities at the start of a step and within it; rates of all stages."""
+"""Offsets in the workspace: displacements and velocities at the start of a step and within it; rates of all stages."""
 WORKSPACE = RATES + STAGES * AXES
 """Numbers in the workspace of one impact."""
 LEAST_SINKING = 1e-9

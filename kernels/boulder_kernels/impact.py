@@ -307,5 +307,5 @@ def simulate_last_resort(problem: Problem, readings: Readings, control: Control,
     ratio = STEP_RATIO if control.refined else 1.0
     h = min(control.h, RESOLVED * longest_step(control.theta_limit, stiffest(c, softer))) / ratio
     h_apart = min(control.h, longest_step(control.theta_limit, apart)) / ratio if readings.separation_released else h
-    found = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record, softer)
-    return failed(status) if found.status == Status.STEP_BUDGET.value else found
+    outcome = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record, softer)
+    return failed(status) if outcome.status == Status.STEP_BUDGET.value else outcome

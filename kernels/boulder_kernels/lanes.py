@@ -41,9 +41,9 @@ from .workspace import (
 EMPTY = -1
 """Row of a lane that holds no design."""
 STEPPED = GROUPS * LANES
-"""Places that are stepped: lanes 0 ... STEPPED - 1. Behind them are those of the two groups of events, and behind
+"""Slots that are stepped: 0 ... STEPPED - 1. Behind them are those of the two groups of events, and behind
 those the ones where designs are started."""
-PLACES = STEPPED + 3 * LANES
+SLOTS = STEPPED + 3 * LANES
 BUSY, PENDING, READY, IDLE, SIDE, HANDLED, STARTED = range(7)
 """Among the counts of a `Queue`: lanes with a design; designs in the group of events that is being filled, designs in
 the other one that may return, lanes without a design, which of the groups is being filled, 0 or 1, how many steps have
@@ -54,11 +54,11 @@ class Queue(NamedTuple):
     """Where the designs are: arrays of whole numbers."""
 
     rows: Any
-    """Row of the design at each place or EMPTY, and in the last place the first row not yet started."""
+    """Row of the design in each slot or EMPTY, and behind them the first row not yet started."""
     ready: np.ndarray
-    """Places of designs that may return into a lane."""
+    """Slots of designs that may return into a lane."""
     started: np.ndarray
-    """Places of designs that may enter a lane."""
+    """Slots of designs that may enter a lane."""
     idle: np.ndarray
     """Lanes without a design."""
     waiting: np.ndarray
@@ -68,13 +68,13 @@ class Queue(NamedTuple):
 
 
 @inlined
-def lane_of(place: int) -> int:
-    """Lane of the workspace at a place."""
-    if place < STEPPED:
-        return (place // LANES) * SIZE + place % LANES
-    if place < PLACES - LANES:
-        return EVENTS + ((place - STEPPED) // LANES) * EVENT_SIZE + place % LANES
-    return STARTS + place % LANES
+def lane_of(slot: int) -> int:
+    """Lane of the workspace that a slot stands for."""
+    if slot < STEPPED:
+        return (slot // LANES) * SIZE + slot % LANES
+    if slot < SLOTS - LANES:
+        return EVENTS + ((slot - STEPPED) // LANES) * EVENT_SIZE + slot % LANES
+    return STARTS + slot % LANES
 
 
 @kernel
@@ -92,11 +92,11 @@ def start_more(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, contr
         first = min(q.rows[-1], designs.shape[1] - LANES)
         start_designs(part(ws, STARTS), designs, first, readings, control, control.h)
         for row in range(q.rows[-1], min(first + LANES, out.shape[1])):
-            place = PLACES - LANES + row - first
+            slot = SLOTS - LANES + row - first
             status = int(field(part(ws, STARTS), STATUS_OF_LANE, row - first))
             if status == RUNNING:
-                q.rows[place] = row
-                q.started[q.counts[STARTED]] = place
+                q.rows[slot] = row
+                q.started[q.counts[STARTED]] = slot
                 q.counts[STARTED] += 1
             else:
                 out[STATUS, row] = status
@@ -104,32 +104,32 @@ def start_more(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, contr
 
 
 @inlined
-def let_return(ws: Any, q: Queue, other: int, place: int) -> None:
-    """Move a design from its place in another group into a lane."""
-    copy_lane(ws, lane_of(other), lane_of(place), ATTENTION)
-    q.rows[place] = q.rows[other]
+def let_return(ws: Any, q: Queue, other: int, slot: int) -> None:
+    """Move a design from its slot in another group into a lane."""
+    copy_lane(ws, lane_of(other), lane_of(slot), ATTENTION)
+    q.rows[slot] = q.rows[other]
 
 
 @inlined
 def next_design(
     ws: Any,
     q: Queue,
-    place: int,
+    slot: int,
     designs: np.ndarray,
     readings: Readings,
     control: Control,
     out: np.ndarray,
 ) -> None:
-    """Put the next design that needs integration into the lane at a place; other arguments: see `start_more`."""
+    """Put the next design that needs integration into the lane of a slot; other arguments: see `start_more`."""
     if q.counts[STARTED] == 0:
         start_more(ws, q, designs, readings, control, out)
     if q.counts[STARTED] > 0:
         q.counts[STARTED] -= 1
-        let_return(ws, q, q.started[q.counts[STARTED]], place)
+        let_return(ws, q, q.started[q.counts[STARTED]], slot)
         return
     # An empty lane stands still: its steps have no length, and their results are ignored.
-    lane = lane_of(place)
-    q.rows[place] = EMPTY
+    lane = lane_of(slot)
+    q.rows[slot] = EMPTY
     put(ws, STEP, lane, 0.0)
     put(ws, STEP_FULL, lane, 0.0)
 
@@ -150,7 +150,7 @@ def start_again(
 def hand_over(
     ws: Any,
     q: Queue,
-    place: int,
+    slot: int,
     designs: np.ndarray,
     readings: Readings,
     control: Control,
@@ -159,16 +159,16 @@ def hand_over(
     """Move a design into the group of events, and let another into its lane; arguments: see `start_more`."""
     counts = q.counts
     other = STEPPED + counts[SIDE] * LANES + counts[PENDING]
-    copy_lane(ws, lane_of(place), lane_of(other), SIZE)
-    q.rows[other] = q.rows[place]
+    copy_lane(ws, lane_of(slot), lane_of(other), SIZE)
+    q.rows[other] = q.rows[slot]
     counts[PENDING] += 1
     if counts[READY] > 0:
         counts[READY] -= 1
-        let_return(ws, q, q.ready[counts[READY]], place)
+        let_return(ws, q, q.ready[counts[READY]], slot)
         return
-    next_design(ws, q, place, designs, readings, control, out)
-    if q.rows[place] == EMPTY:
-        q.idle[counts[IDLE]] = place
+    next_design(ws, q, slot, designs, readings, control, out)
+    if q.rows[slot] == EMPTY:
+        q.idle[counts[IDLE]] = slot
         counts[IDLE] += 1
         counts[BUSY] -= 1
 
@@ -219,8 +219,8 @@ def handle(
 def is_empty(q: Queue, group: int) -> bool:
     """Whether all lanes of a group are empty."""
     empty = True
-    for place in range(group * LANES, (group + 1) * LANES):
-        empty &= q.rows[place] == EMPTY
+    for slot in range(group * LANES, (group + 1) * LANES):
+        empty &= q.rows[slot] == EMPTY
     return empty
 
 
@@ -236,19 +236,19 @@ def step_groups(ws: Any, q: Queue) -> int:
         attempt_steps(lanes)
         if take_over_steps(lanes) > 0:
             for lane in range(LANES):
-                place = group * LANES + lane
-                q.waiting[count] = place
-                count += int((field(lanes, ATTENTION, lane) != 0.0) & (q.rows[place] != EMPTY))
+                slot = group * LANES + lane
+                q.waiting[count] = slot
+                count += int((field(lanes, ATTENTION, lane) != 0.0) & (q.rows[slot] != EMPTY))
     return count
 
 
 @kernel
 def begin(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
     """Put the first designs into the lanes of an empty workspace; arguments: see `start_more`."""
-    for place in range(STEPPED):
-        next_design(ws, q, place, designs, readings, control, out)
-        if q.rows[place] == EMPTY:
-            q.idle[q.counts[IDLE]] = place
+    for slot in range(STEPPED):
+        next_design(ws, q, slot, designs, readings, control, out)
+        if q.rows[slot] == EMPTY:
+            q.idle[q.counts[IDLE]] = slot
             q.counts[IDLE] += 1
         else:
             q.counts[BUSY] += 1
@@ -286,7 +286,7 @@ def empty_workspace(soil: type | None = None, parts: int = 0) -> Any:
 def empty_queue() -> Queue:
     """Return the queue before the first design has been started."""
     return Queue(
-        np.zeros(PLACES + 1, np.int64),
+        np.zeros(SLOTS + 1, np.int64),
         np.zeros(LANES, np.int64),
         np.zeros(LANES, np.int64),
         np.zeros(STEPPED, np.int64),

@@ -160,16 +160,16 @@ WIDTH = 32
 """Partial sums: with 8, a vector of the widest registers, the loop would be unrolled and not vectorised."""
 
 
-def field(values: Any, place: int, offset: int) -> float:
-    """Return the number at a place and an offset from it, neither negative, of an array or a record that begins so."""
+def field(values: Any, offset: int, index: int) -> float:
+    """Return the number at an offset and an index from it, neither negative, of an array or a record that begins so."""
     # A number of NumPy's, so that lanes without a design divide by zero here as they do when compiled.
-    number: float = (values[0] if isinstance(values, tuple) else values)[place + offset]
+    number: float = (values[0] if isinstance(values, tuple) else values)[offset + index]
     return number
 
 
-def put(values: Any, place: int, offset: int, value: float) -> None:
-    """Write the number at a place and an offset from it, see `field`."""
-    (values[0] if isinstance(values, tuple) else values)[place + offset] = value
+def put(values: Any, offset: int, index: int, value: float) -> None:
+    """Write the number at an offset and an index from it, see `field`."""
+    (values[0] if isinstance(values, tuple) else values)[offset + index] = value
 
 
 def partial_sums() -> np.ndarray:
@@ -187,7 +187,7 @@ def add(sums: np.ndarray, j: int, one: float, other: float) -> None:
 @inlined
 def total(sums: np.ndarray, first: int) -> float:
     """Return the sum of WIDTH partial sums, one after another."""
-    found = 0.0
+    result = 0.0
     for j in range(WIDTH):
-        found += field(sums, first, j)
-    return found
+        result += field(sums, first, j)
+    return result

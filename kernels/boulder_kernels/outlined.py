@@ -111,11 +111,11 @@ def body_of_outline(design: Design, outline: np.ndarray) -> Body:
                 line += WEIGHTS[g] * (buried - low) * (d - z) * on_piece(outline, i, FAR, z)
     x, z_c, line = x / volume, z_c / volume, line / (0.5 * d * d)
     m_b = design.rho_b * volume
-    own = design.rho_b * (xx + zz) - m_b * (x * x + z_c * z_c)
+    J = design.rho_b * (xx + zz) - m_b * (x * x + z_c * z_c)
     struck = at_height(outline, NEAR, d + design.e)
     foot_near, foot_far = outline[0, NEAR], outline[0, FAR]
     half = 0.5 * (foot_near + foot_far)
-    return Body(m_b, own, struck + x, z_c, struck + line, half, 0.5 * (foot_far - foot_near) - x)
+    return Body(m_b, J, struck + x, z_c, struck + line, half, 0.5 * (foot_far - foot_near) - x)
 
 
 class OutlinedElements(NamedTuple):
@@ -236,7 +236,7 @@ def fill_outlined_elements(design: Design, layers: np.ndarray, soil: OutlinedEle
     return Lumped(SoilMass(mass, first, second), bounds, NO_SUMS)
 
 
-class Place(NamedTuple):
+class Cursor(NamedTuple):
     """How far layers and outline have been cut into pieces: the next layer, and the next piece of the outline."""
 
     layer: int
@@ -244,15 +244,15 @@ class Place(NamedTuple):
 
 
 @exact_inlined
-def place_at_soil_line(design: Design, outline: np.ndarray) -> Place:
+def cursor_at_soil_line(design: Design, outline: np.ndarray) -> Cursor:
     """Return where the uppermost piece lies."""
-    return Place(0, piece_at(outline, min(design.d, outline[-1, HEIGHT])))
+    return Cursor(0, piece_at(outline, min(design.d, outline[-1, HEIGHT])))
 
 
 @exact_inlined
 def next_piece(
-    design: Design, layers: np.ndarray, outline: np.ndarray, low: float, at: Place
-) -> tuple[GivenPiece, Place]:
+    design: Design, layers: np.ndarray, outline: np.ndarray, low: float, at: Cursor
+) -> tuple[GivenPiece, Cursor]:
     """Return the piece that begins at a ratio of the depth, and where the next begins (Eq 145); the last is repeated.
 
     Parameters
@@ -282,7 +282,7 @@ def next_piece(
     )
     m += 1 if m < last and to >= layer_to else 0
     i -= 1 if i > 0 and to >= piece_to else 0
-    return piece, Place(m, i)
+    return piece, Cursor(m, i)
 
 
 @exact_inlined
@@ -322,7 +322,7 @@ def lumped_beside(so_far: Lumped, piece: Piece, given: GivenPiece, design: Desig
 @exact_kernel
 def fill_outlined_pieces(design: Design, layers: np.ndarray, soil: OutlinedPieces) -> Lumped:
     """Cut layers and outline into pieces (Eq 145), and return what follows from them; see `fill_layers`."""
-    so_far, low, at = nothing_lumped(), 0.0, place_at_soil_line(design, soil.outline)
+    so_far, low, at = nothing_lumped(), 0.0, cursor_at_soil_line(design, soil.outline)
     for n in range(soil.to.size):
         given, at = next_piece(design, layers, soil.outline, low, at)
         piece = worked_out(design, low, given)
@@ -352,7 +352,7 @@ def write_given(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, o
         body = body_of_outline(design, outline)
         out[0, row], out[1, row], out[2, row], out[3, row] = body.m_b, body.J, body.x, body.y
         out[4, row], out[5, row], out[6, row] = body.line, body.foot, body.lean
-        low, at = 0.0, place_at_soil_line(design, outline)
+        low, at = 0.0, cursor_at_soil_line(design, outline)
         for n in range((len(out) - body_size) // size):
             p, at = next_piece(design, layers[row], outline, low, at)
             first = body_size + n * size

@@ -195,7 +195,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     Notes
     -----
     Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero, in either in turn.
-    Along x_b it is between the places where the uppermost and the lowest soil are as they were; along y_b between
+    Along x_b it is between the positions where the uppermost and the lowest soil are as they were; along y_b between
     those where all strips carry what they can, which is more than the weight, and where the boulder is out of the soil.
     There may be several: the search starts from both ends along x_b and from the middle.
     """
@@ -207,16 +207,16 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
         bottom = min(bottom, strip_depth(work, j, 0.0, sin, versin, f) - f.q_strip / f.k_strip)
     least = np.inf
     for start in range(3):
-        place = Place(left + 0.5 * start * (right - left), 0.0, np.inf)
+        position = Position(left + 0.5 * start * (right - left), 0.0, np.inf)
         for _ in range(TURNS):
             if f.heave > 0.0:
-                place = eased(place, False, bottom, top, theta, work, f)
-            place = eased(place, True, left, right, theta, work, f)
-        least = min(least, place.energy)
+                position = move_to_least_energy(position, False, bottom, top, theta, work, f)
+            position = move_to_least_energy(position, True, left, right, theta, work, f)
+        least = min(least, position.energy)
     return least
 
 
-class Place(NamedTuple):
+class Position(NamedTuple):
     """Where the boulder stands at some rotation."""
 
     x: float
@@ -228,24 +228,24 @@ class Place(NamedTuple):
 
 
 @kernel
-def eased(
-    place: Place, sideways: bool, low: float, high: float, theta: float, work: np.ndarray, f: HeaveConstants
-) -> Place:
+def move_to_least_energy(
+    position: Position, sideways: bool, low: float, high: float, theta: float, work: np.ndarray, f: HeaveConstants
+) -> Position:
     """Move along x_b, or else along y_b, between two ends that push inwards, to where the energy is least."""
-    x, y, energy = place
+    x, y, energy = position
     weight = f.m_b * G
     # What pushes at the ends is not known; its size only matters to the first chords.
     b = Bracket(low, weight, high, -weight, 0.0)
     for _ in range(ITERATIONS):
         p = potential_energy(x, theta, y, work, f)
         push, at, energy = (p.Q_x, x, p.u) if sideways else (p.Q_y, y, p.u)
-        # No place between the ends costs less by more than this, as the energy is convex.
+        # No position between the ends costs less by more than this, as the energy is convex.
         if abs(push) * (b.high - b.low) <= PLACED * weight * f.L:
             break
         b = narrowed(b, at, push)
         at = next_guess(b)
         x, y = (at, y) if sideways else (x, at)
-    return Place(x, y, energy)
+    return Position(x, y, energy)
 
 
 @kernel

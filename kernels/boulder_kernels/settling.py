@@ -49,7 +49,7 @@ BALANCED_FROM, BALANCED_TO = 0.66, 0.71
 MOVED_FROM = 0.75
 """Fraction of the largest rotation from which on a boulder mostly is where moving takes the least energy."""
 RESTING_PRECISION = 1e-13
-"""Precision of the least energy where a place of rest is looked for, as a fraction of it."""
+"""Precision of the least energy where a position of rest is looked for, as a fraction of it."""
 CAUTION = 1.0 - 1e-6
 """The energy must be below the barrier by the integrator's own error, and more."""
 LEAST_ANGLE = 1e-9

@@ -107,7 +107,7 @@ def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, 
 
 @kernel
 def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> Exchanged:
-    """Powers at a state [W], in the places of the energies they add up to."""
+    """Powers at a state [W], in the fields of the energies they add up to."""
     sin, versin = sine_versine(y.theta_b)
     drag = drag_power(soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), c)
     u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)

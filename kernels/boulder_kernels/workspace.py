@@ -1,11 +1,11 @@
 """The numbers of many lanes in one flat array, field by field.
 
 A loop over lanes is vectorised only where the compiler can see that no store touches a later load. One array with
-constant offsets shows it; separate arrays do not. A field occupies LANES consecutive places, so that neighbouring
+constant offsets shows it; separate arrays do not. A field occupies LANES consecutive entries, so that neighbouring
 lanes are neighbours in memory. Several groups of lanes follow each other; a lane is known by the start of its group
 plus its number in it. The functions below are the only ones that know where a field lies.
 
-What works on one lane takes the workspace from that lane on, as whose lane 0 it is known there: places are then
+What works on one lane takes the workspace from that lane on, as whose lane 0 it is known there: offsets are then
 constants, and no index need be checked for being negative, as one that counts from the end.
 """
 
@@ -96,12 +96,12 @@ def _size(record: Any) -> int:
     return LANES * sum(name not in KNOWN for name in record._fields)
 
 
-def _place(name: str) -> int:
+def _offset_of(name: str) -> int:
     names = list(_ALL)
     return sum(_size(_ALL[before]) for before in names[: names.index(name)])
 
 
-SIZE = _place("boulder")
+SIZE = _offset_of("boulder")
 """Numbers of one group."""
 EVENTS = GROUPS * SIZE
 """Where the first of the two groups of those that need more begins: its lanes are EVENTS ... EVENTS + LANES - 1."""
@@ -111,56 +111,56 @@ STARTS = EVENTS + 2 * EVENT_SIZE
 """Where the group of designs that are being started begins, and behind it that of those that are started again."""
 WHOLE = STARTS + 2 * EVENT_SIZE
 """Numbers of all groups."""
-CONSTANTS = _place("constants")
-SWITCHES = _place("switches")
-FACTORS = _place("factors")
-STATE = _place("state")
+CONSTANTS = _offset_of("constants")
+SWITCHES = _offset_of("switches")
+FACTORS = _offset_of("factors")
+STATE = _offset_of("state")
 """State at the start of the step."""
-START = _place("start")
+START = _offset_of("start")
 """Acceleration there."""
-END_STATE = _place("end_state")
+END_STATE = _offset_of("end_state")
 """State at the end of the step."""
-END = _place("end")
+END = _offset_of("end")
 """Acceleration there."""
-COMPRESSION = _place("compression")
+COMPRESSION = _offset_of("compression")
 """Compression of the vehicle's spring at the start of the step."""
-MAXIMA = _place("maxima")
+MAXIMA = _offset_of("maxima")
 """Largest values so far."""
-MODES = _place("modes")
-STEP = _place("step")
+MODES = _offset_of("modes")
+STEP = _offset_of("step")
 """Length of the next step [s]."""
-STEP_FULL = _place("step_full")
+STEP_FULL = _offset_of("step_full")
 """Length of a step that nothing shortens [s]."""
-TIME = _place("time")
+TIME = _offset_of("time")
 """Start of the next step [s]."""
-BARRIER = _place("barrier")
+BARRIER = _offset_of("barrier")
 """Energy below which the motion has settled [J], see `boulder_kernels.settling`."""
-HORIZON = _place("horizon")
+HORIZON = _offset_of("horizon")
 """Time at which the simulation ends, unless there is a reason to go on [s]."""
-ATTENTION = _place("attention")
+ATTENTION = _offset_of("attention")
 """1.0 where a step cannot simply be accepted."""
-ATTEMPTS_LEFT = _place("attempts_left")
-ERROR = _place("error")
+ATTEMPTS_LEFT = _offset_of("attempts_left")
+ERROR = _offset_of("error")
 """Sum of the errors of the steps so far [m/s], see `boulder_kernels.error_estimates`."""
-ROTATION_CHANGES = _place("rotation_changes")
+ROTATION_CHANGES = _offset_of("rotation_changes")
 """How often the mode of rotation has changed."""
-STEP_ERROR = _place("step_error")
+STEP_ERROR = _offset_of("step_error")
 """Error of the step [m/s]."""
-BOULDER, ROTATION, TRUCK = _place("boulder"), _place("rotation"), _place("truck")
+BOULDER, ROTATION, TRUCK = _offset_of("boulder"), _offset_of("rotation"), _offset_of("truck")
 """The motion within the step."""
-WEIGHTS = _place("weights")
+WEIGHTS = _offset_of("weights")
 """Factors of the gaps in the search for the first event."""
-END_GAPS = _place("end_gaps")
-BRACKET = _place("bracket")
-TAU = _place("tau")
-OPEN = _place("open")
+END_GAPS = _offset_of("end_gaps")
+BRACKET = _offset_of("bracket")
+TAU = _offset_of("tau")
+OPEN = _offset_of("open")
 """1.0 while the search goes on."""
-EVENT = _place("event")
-MOMENT = _place("moment")
+EVENT = _offset_of("event")
+MOMENT = _offset_of("moment")
 """Net moment where the step is cut [N m]."""
-STATUS_OF_LANE = _place("status")
-DESIGN = _place("design")
-RECORDS = {_place(name): record for name, record in _ALL.items()}
+STATUS_OF_LANE = _offset_of("status")
+DESIGN = _offset_of("design")
+RECORDS = {_offset_of(name): record for name, record in _ALL.items()}
 
 
 SOIL = WHOLE
@@ -231,7 +231,7 @@ def soil_in(ws: Any) -> LaneSoil | None:
     return SOILS.get(getattr(ws, "instance_class", type(ws)))
 
 
-def given_place(soil: LaneSoil, count: int) -> int:
+def given_offset(soil: LaneSoil, count: int) -> int:
     """Return where what is given of the soil of a design that is being started lies, from its lane on."""
     return SOIL + soil.size(count)
 
@@ -247,37 +247,37 @@ def part(ws: Any, start: int) -> Any:
 
 
 def offsets_of(record: Any) -> dict[str, int]:
-    """Where the fields that are kept of a record lie, from its place on."""
+    """Offsets of the fields that are kept of a record, from its beginning on."""
     kept = (name for name in record._fields if name not in KNOWN)
     return {name: i * LANES for i, name in enumerate(kept)}
 
 
-def load(ws: Any, place: int, lane: int) -> Any:
-    """Return the record at a place, one of the constants above, for one lane."""
-    record = RECORDS[place]
+def load(ws: Any, offset: int, lane: int) -> Any:
+    """Return the record at an offset, one of the constants above, for one lane."""
+    record = RECORDS[offset]
     offsets = offsets_of(record)
     numbers = [
-        kind(field(ws, place + offsets[name], lane)) if name in offsets else KNOWN[name]
+        kind(field(ws, offset + offsets[name], lane)) if name in offsets else KNOWN[name]
         for name, kind in get_type_hints(record).items()
     ]
     soil = soil_in(ws)
-    if place == CONSTANTS and soil is not None:
+    if offset == CONSTANTS and soil is not None:
         return LayeredConstants(*numbers, soil.record(*_load_parts(ws, lane, SOIL, soil.whole, soil.part)))
     return record(*numbers)
 
 
-def _load_parts(ws: Any, lane: int, place: int, whole: Any, part: Any) -> tuple[Any, tuple[Any, ...]]:
+def _load_parts(ws: Any, lane: int, offset: int, whole: Any, part: Any) -> tuple[Any, tuple[Any, ...]]:
     """Return a record of one kind and, behind it, as many of another as the soil has parts."""
     count, width = len(whole._fields), len(part._fields)
-    numbers = [field(ws, place + i * LANES, lane) for i in range(count + width * len(ws.parts))]
+    numbers = [field(ws, offset + i * LANES, lane) for i in range(count + width * len(ws.parts))]
     parts = tuple(part(*numbers[first : first + width]) for first in range(count, len(numbers), width))
     return whole(*numbers[:count]), parts
 
 
-def store(ws: Any, place: int, lane: int, record: Any) -> None:
-    """Write a record at a place, one of the constants above, for one lane."""
-    for name, offset in offsets_of(RECORDS[place]).items():
-        put(ws, place + offset, lane, getattr(record, name))
+def store(ws: Any, offset: int, lane: int, record: Any) -> None:
+    """Write a record at an offset, one of the constants above, for one lane."""
+    for name, within in offsets_of(RECORDS[offset]).items():
+        put(ws, offset + within, lane, getattr(record, name))
     if isinstance(record, LayeredConstants):
         whole, parts = record.soil
         for i, number in enumerate([*whole, *itertools.chain(*parts)]):
@@ -289,13 +289,13 @@ def store_given(ws: Any, lane: int, designs: np.ndarray, row: int) -> None:
     soil = soil_in(ws)
     if soil is not None:
         for i, number in enumerate(designs[len(Design._fields) :, row]):
-            put(ws, given_place(soil, len(ws.parts)) + i * LANES, lane, number)
+            put(ws, given_offset(soil, len(ws.parts)) + i * LANES, lane, number)
 
 
 def load_given(ws: Any, lane: int) -> Any:
     """Return what is given of the soil of a design that is being started: the parts, or another record and they."""
     soil: Any = soil_in(ws)
-    whole, parts = _load_parts(ws, lane, given_place(soil, len(ws.parts)), soil.given_whole, soil.given_part)
+    whole, parts = _load_parts(ws, lane, given_offset(soil, len(ws.parts)), soil.given_whole, soil.given_part)
     return (whole, parts) if len(whole) else parts
 
 
@@ -325,7 +325,7 @@ def align_stack() -> None:
 
 
 def copy_lane(ws: Any, lane: int, other: int, end: int) -> None:
-    """Copy the numbers of one lane to another, up to before a place, and its soil where it is not uniform."""
+    """Copy the numbers of one lane to another, up to before an offset, and its soil where it is not uniform."""
     numbers, soil = ws, soil_in(ws)
     if soil is not None:
         numbers, behind = ws.numbers, SOIL + soil.size(len(ws.parts))

@@ -41,7 +41,7 @@ MUTATIONS = (
     Mutation((13,), _DESIGN, "(c_y * c_y + l_n * l_n) * soil.mass", "(c_y * c_y - l_n * l_n) * soil.mass"),
     Mutation((14,), _DESIGN, "l_n = body.line - c_x", "l_n = c_x"),
     Mutation((15,), _DESIGN, "return design.rho_b * design.L", "return 1.01 * design.rho_b * design.L"),
-    Mutation((16,), _DESIGN, "own *= 0.25", "own *= 0.5"),
+    Mutation((16,), _DESIGN, "J *= 0.25", "J *= 0.5"),
     Mutation((17,), _DYNAMICS, "-s.k_truck * u,", "s.k_truck * u,"),
     Mutation((19, 20), _SOIL, "F_n = -(", "F_n = +("),
     Mutation((20,), _SOIL, "-F_n * (k.lever_d * ratio + k.q)", "-F_n * (k.lever_d * ratio - k.q)"),

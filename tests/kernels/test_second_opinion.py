@@ -20,10 +20,10 @@ from boulder_kernels.second_opinion import (
     HeaveControl,
     HeaveOutcome,
     HeaveRecord,
-    Place,
-    eased,
+    Position,
     energy_at,
     least_energy,
+    move_to_least_energy,
     no_heave_record,
     potential_energy,
     second_opinions,
@@ -309,14 +309,14 @@ def test_eased_is_where_a_step_either_way_costs_more() -> None:
             at_top = f.c.l_n * (1.0 - np.cos(theta)) - f.c.z_0 * np.sin(theta)
             across = sorted((at_top, at_top + design.d * np.sin(theta)))
             for sideways, (low, high) in ((True, across), (False, (-1.0, 2.0))):
-                start = Place(rng.uniform(*across), rng.uniform(-0.5, 0.5), np.inf)
-                found = eased(start, sideways, low, high, theta, work, f)
-                assert (found.y == start.y) if sideways else (found.x == start.x)
+                start = Position(rng.uniform(*across), rng.uniform(-0.5, 0.5), np.inf)
+                least = move_to_least_energy(start, sideways, low, high, theta, work, f)
+                assert (least.y == start.y) if sideways else (least.x == start.x)
                 ends = np.linspace(low, high, 2001)
-                tried = [(s, found.y) if sideways else (found.x, s) for s in ends]
+                tried = [(s, least.y) if sideways else (least.x, s) for s in ends]
                 values = [potential_energy(x, theta, y, work, f).u for x, y in tried]
-                assert found.energy == potential_energy(found.x, theta, found.y, work, f).u
-                assert found.energy <= min(values) + enough
+                assert least.energy == potential_energy(least.x, theta, least.y, work, f).u
+                assert least.energy <= min(values) + enough
 
 
 def test_the_proof_counts_all_energy_and_waits_for_the_truck() -> None:
