@@ -123,7 +123,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     row = read_row(folder, design_id)
     values = row.to_pylist()[0]
     inputs = {name: values[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in values}
-    own: dict[str, Any] = {
+    common: dict[str, Any] = {
         "design_id": design_id,
         "inputs": inputs,
         "stored": {name: value for name, value in values.items() if isinstance(BY_NAME.get(name), OutcomeColumn)},
@@ -136,7 +136,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     except (LookupError, TypeError, ValueError) as unfamiliar:
         why = f"its settings are not those of this version: {type(unfamiliar).__name__}: {unfamiliar}"
-        return Explanation(name=folder.name, recomputed={}, changed=(), trajectory=None, unfamiliar=why, **own)
+        return Explanation(name=folder.name, recomputed={}, changed=(), trajectory=None, unfamiliar=why, **common)
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
     laws = sweep.model.second_opinion if can_be_asked(sweep) else ()
@@ -148,7 +148,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         recomputed={spec.name: again[spec.name] for spec in evaluation.columns if spec.name in manifest.columns},
         changed=tuple(differences(there, identity(*stated))),
         trajectory=simulate(sweep) if computable else None,
-        **own,
+        **common,
     )
 
 

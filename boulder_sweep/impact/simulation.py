@@ -213,8 +213,8 @@ def _as_decided(judged: Judged, decided: Judged) -> Judged:
     Unless the boulder overturns the maxima are the same, and so are their errors.
     """
     errors = () if decided.reason[0] == OVERTURNS else _ERRORS
-    own = (*_DECIDED, *errors, *(spec.name for spec in AT_REST if spec.name in decided.columns))
-    columns = judged.columns | {name: decided[name] for name in own}
+    names = (*_DECIDED, *errors, *(spec.name for spec in AT_REST if spec.name in decided.columns))
+    columns = judged.columns | {name: decided[name] for name in names}
     return Judged(columns, judged.words | {name: decided.words[name] for name in _DECIDED if name in decided.words})
 
 

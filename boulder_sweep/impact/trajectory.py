@@ -221,25 +221,25 @@ class Trajectory:
             for, at most, as a share of the energy at first touch: a check of this very simulation. The readings and
             the representation of the soil close it.
         """
-        found: dict[str, Any] = {"name": self.name, "design_id": self.design_id}
+        result: dict[str, Any] = {"name": self.name, "design_id": self.design_id}
         for name, value in self.judged.row(0).items():
-            found[name] = value
+            result[name] = value
             if name in _PEAK_TIMES:
                 key, field = _PEAK_TIMES[name]
-                found[key] = _plain(getattr(self.motion.outcome.maxima, field))
+                result[key] = _plain(getattr(self.motion.outcome.maxima, field))
         model = self.settings["model"]
-        found["energy_residual"] = _plain(self.energy().largest_residual)
-        return found | {"preset": model["preset"], "readings": model["readings"], "soil": model["soil"]}
+        result["energy_residual"] = _plain(self.energy().largest_residual)
+        return result | {"preset": model["preset"], "readings": model["readings"], "soil": model["soil"]}
 
     def columns(self, *, energy: bool = False) -> dict[str, np.ndarray]:
         """Return the time history by the names of its columns, with the energy ledger where asked for."""
-        found = {spec.name: getattr(self, spec.name) for spec in HISTORY}
+        columns = {spec.name: getattr(self, spec.name) for spec in HISTORY}
         if energy:
             ledger = self.energy()
             spent = () if self.motion.second is None else (SPENT,)
             for spec in (*ENERGY, *spent):
-                found[spec.name] = getattr(ledger, spec.name.removeprefix("energy_"))
-        return found
+                columns[spec.name] = getattr(ledger, spec.name.removeprefix("energy_"))
+        return columns
 
     def to_arrow(self, *, energy: bool = False) -> pa.Table:
         """Return the time history as an Arrow table.
@@ -258,9 +258,9 @@ class Trajectory:
             array = pa.array(values)
             arrays.append(array.dictionary_encode() if spec.type == "dictionary" else array)
             fields.append(pa.field(name, types[spec.type], metadata={"unit": spec.unit, "meaning": spec.meaning}))
-        found = identity(self.settings, self.settings["model"]["readings"], self.motion.control._asdict())
+        run_identity = identity(self.settings, self.settings["model"]["readings"], self.motion.control._asdict())
         repeat = f"boulder_sweep.simulate({self.name!r}, {self.design_id})"
-        return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=file_metadata(found, repeat)))
+        return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=file_metadata(run_identity, repeat)))
 
     def to_parquet(self, path: str | Path, *, energy: bool = False) -> None:
         """Write the time history to a Parquet file.

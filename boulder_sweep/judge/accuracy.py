@@ -93,7 +93,7 @@ class Accuracy:
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data, for the metadata of the table."""
         reported_s = finer_step(self.steps.step_s) if self.error_estimate else self.steps.step_s
-        found: dict[str, Any] = {
+        data: dict[str, Any] = {
             "asked": self.asked,
             "step_s": self.steps.step_s if self.paired else reported_s,
             "reported_step_s": reported_s,
@@ -103,10 +103,10 @@ class Accuracy:
             else "guarded by the error of one solution, neither confirmed nor refined",
         }
         if self.achieved_deg is not None:
-            found["pilot_designs"] = self.pilot_designs
-            found["estimated_error_p99_9_deg"] = self.achieved_deg
-            found["met"] = self.met
-        return found
+            data["pilot_designs"] = self.pilot_designs
+            data["estimated_error_p99_9_deg"] = self.achieved_deg
+            data["met"] = self.met
+        return data
 
 
 def steps_of(sweep: Sweep) -> dict[str, Steps]:
@@ -158,11 +158,11 @@ def accuracy_of(sweep: Sweep) -> Accuracy:
     if isinstance(solver.accuracy, float):
         return pilot(sweep, solver.accuracy)
     name = str(solver.accuracy)
-    found = Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
+    accuracy = Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
     model = sweep.model
     layered = is_layered(model.resistance, model.ground, model.shape)
-    paired = is_paired(readings_of(sweep), control_of(sweep, found), layered=layered)
-    return replace(found, paired=found.error_estimate and paired)
+    paired = is_paired(readings_of(sweep), control_of(sweep, accuracy), layered=layered)
+    return replace(accuracy, paired=accuracy.error_estimate and paired)
 
 
 @lru_cache(maxsize=8)
@@ -183,15 +183,15 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     """
     designs = sampled_designs(sweep, pilot_size(sweep.model.elements))
     readings = readings_of(sweep)
-    found: list[tuple[float, int]] = []
+    tried: list[tuple[float, int]] = []
     for rung, steps in enumerate(LADDER):
         control = control_of(sweep, Accuracy("", steps, error_estimate=True, paired=True))
         # Rounded, so that a processor that differs in the last bits finds the same.
         achieved = float(f"{estimated_error_deg(designs, readings, control):.3g}")
-        found.append((achieved, rung))
+        tried.append((achieved, rung))
         if achieved <= wanted_deg:
             break
-    achieved, rung = min(found)
+    achieved, rung = min(tried)
     return Accuracy(
         asked=f"{wanted_deg:g} deg",
         steps=LADDER[rung],

@@ -108,10 +108,10 @@ class Evaluation:
             return joined([refused])
         both = joined([self.judged(self.designs(block, computable)), refused])
         # In `both` the refused rows follow the others; restore the order of the block.
-        place = np.empty(len(codes), dtype=np.int64)
-        place[computable] = np.arange(computable.sum())
-        place[~computable] = np.arange(computable.sum(), len(codes))
-        return both.rows(place)
+        order = np.empty(len(codes), dtype=np.int64)
+        order[computable] = np.arange(computable.sum())
+        order[~computable] = np.arange(computable.sum(), len(codes))
+        return both.rows(order)
 
     def designs(self, block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
         """Return the designs of a block, or some of them, as the kernels take them."""
@@ -151,7 +151,7 @@ class Evaluation:
         judged = rows.judged
         if rows.unconfirmed.any():
             doubted = np.flatnonzero(rows.unconfirmed)
-            judged = self._doubted(judged, doubted, designs, rows.outcomes)
+            judged = self._judge_doubted(judged, doubted, designs, rows.outcomes)
         judged = joined([judged])
         if self.least_margin > 0.0:
             judged = self._margins_proved(judged, designs)
@@ -201,11 +201,11 @@ class Evaluation:
         outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
         return judge(outcomes, designs, self.limits, self.only), outcomes
 
-    def _doubted(self, judged: Judged, places: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> Judged:
+    def _judge_doubted(self, judged: Judged, rows: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> Judged:
         """Judge late rows, on which no two solutions agree, as of unknown error."""
-        unknown = np.full(len(places), np.inf)
-        doubted = some_rows(outcomes, places)._replace(theta_error=unknown, x_error=unknown)
-        return with_rows(judged, places, judge(doubted, designs.rows(places), self.limits, self.only))
+        unknown = np.full(len(rows), np.inf)
+        doubted = some_rows(outcomes, rows)._replace(theta_error=unknown, x_error=unknown)
+        return with_rows(judged, rows, judge(doubted, designs.rows(rows), self.limits, self.only))
 
     @property
     def columns(self) -> tuple[OutcomeColumn, ...]:

@@ -110,8 +110,8 @@ def firmness_of(sweep: Sweep) -> Firmness:
     given, ground = plain(plain_designs(sweep, count).table), sweep.model.ground
     least = math.radians(LEAST_ANGLE_DEG)
     table = designs.table
-    found = verdicts(table, readings)
-    passes = found.verdict == PASS
+    judged = verdicts(table, readings)
+    passes = judged.verdict == PASS
     variants = {
         "reading": (table, other),
         "friction_angle": (by(law, -math.radians(ANGLE_DEG)), readings),
@@ -122,7 +122,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
     if passes.any():
         for name, (variant, read) in variants.items():
             lost[name] = float((verdicts(variant, read).verdict[passes] != PASS).mean())
-    words = Counter(found.words["validity"][code] for code in found["validity"][passes].tolist())
+    words = Counter(judged.words["validity"][code] for code in judged["validity"][passes].tolist())
     return Firmness(
         designs=designs.size,
         lost=lost,

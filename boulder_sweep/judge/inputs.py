@@ -64,7 +64,7 @@ class Designs(NamedTuple):
         return len(self.bed_offset)
 
     def rows(self, chosen: np.ndarray | slice) -> Designs:
-        """Return some of the designs, chosen by a mask, by their places or by a slice."""
+        """Return some of the designs, chosen by a mask, by their indices or by a slice."""
         table = type(self.table)(*(np.ascontiguousarray(column[chosen]) for column in self.table))
         springs = self.springs
         if springs is not None:
@@ -172,29 +172,29 @@ def sampled_rows(sweep: Sweep, count: int) -> np.ndarray:
     lengths = sweep.plan.lengths
     if sweep.n_designs <= count:
         return np.arange(sweep.n_designs)
-    places = _corners(lengths, min(count, MOST_CORNERS))
-    spread = _spread(lengths, count - len(places))
-    rows = np.concatenate([np.array(places, dtype=np.int64).reshape(-1, len(lengths)), spread]) @ np.array(
+    corners = _corners(lengths, min(count, MOST_CORNERS))
+    spread = _spread(lengths, count - len(corners))
+    rows = np.concatenate([np.array(corners, dtype=np.int64).reshape(-1, len(lengths)), spread]) @ np.array(
         sweep.plan.strides, dtype=np.int64
     )
     return np.unique(rows)
 
 
 def _corners(lengths: tuple[int, ...], most: int) -> list[tuple[int, ...]]:
-    """Places of the corners; if there are too many, both ends and their neighbours along one axis."""
+    """Indices of the corners; if there are too many, both ends and their neighbours along one axis."""
     ends = [(0, length - 1) if length > 1 else (0,) for length in lengths]
     if math.prod(len(pair) for pair in ends) <= most:
         return list(product(*ends))
     first, last = tuple(pair[0] for pair in ends), tuple(pair[-1] for pair in ends)
-    found = [first, last]
+    corners = [first, last]
     for axis in range(len(ends)):
-        found.append((*first[:axis], last[axis], *first[axis + 1 :]))
-        found.append((*last[:axis], first[axis], *last[axis + 1 :]))
-    return found[:most]
+        corners.append((*first[:axis], last[axis], *first[axis + 1 :]))
+        corners.append((*last[:axis], first[axis], *last[axis + 1 :]))
+    return corners[:most]
 
 
 def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:
-    """Places along Roberts' sequence, whose steps are powers of the root of x^(k+1) = x + 1, shape (count, k)."""
+    """Indices along Roberts' sequence, whose steps are powers of the root of x^(k+1) = x + 1, shape (count, k)."""
     k = len(lengths)
     root = 2.0
     for _ in range(60):

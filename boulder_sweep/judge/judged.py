@@ -55,7 +55,7 @@ class Judged:
         return self.words["reason"]
 
     def rows(self, chosen: np.ndarray | slice) -> Judged:
-        """Return some rows, chosen by a mask, by their places or by a slice."""
+        """Return some rows, chosen by a mask, by their indices or by a slice."""
         return Judged({name: values[chosen] for name, values in self.columns.items()}, self.words)
 
     def only(self, names: Sequence[str]) -> Judged:
@@ -63,16 +63,16 @@ class Judged:
         words = {name: self.words[name] for name in names if name in self.words}
         return Judged({name: self.columns[name] for name in names}, words)
 
-    def row(self, place: int) -> dict[str, Any]:
+    def row(self, index: int) -> dict[str, Any]:
         """Return one row as plain data by the names of the columns: words, numbers, None for no value."""
-        found: dict[str, Any] = {}
+        result: dict[str, Any] = {}
         for name, values in self.columns.items():
-            value = values[place]
+            value = values[index]
             if name in self.words:
-                found[name] = self.words[name][int(value)] if value >= 0 else None
+                result[name] = self.words[name][int(value)] if value >= 0 else None
             else:
-                found[name] = float(value) if math.isfinite(value) else None
-        return found
+                result[name] = float(value) if math.isfinite(value) else None
+        return result
 
 
 def not_computed(
@@ -124,15 +124,15 @@ def joined(pieces: list[Judged]) -> Judged:
         parts = [piece[spec.name] for piece in pieces]
         if spec.type == "dictionary":
             words[spec.name] = _words_in_use(spec, pieces)
-            parts = [_translated(piece, spec.name, words[spec.name]) for piece in pieces]
+            parts = [_translate_codes(piece, spec.name, words[spec.name]) for piece in pieces]
         columns[spec.name] = parts[0] if len(parts) == 1 else np.concatenate(parts)
     return Judged(columns, words)
 
 
-def with_rows(judged: Judged, places: np.ndarray, rows: Judged) -> Judged:
-    """Return judged rows with those at some places replaced."""
+def with_rows(judged: Judged, indices: np.ndarray, rows: Judged) -> Judged:
+    """Return judged rows with those at some indices replaced."""
     order = np.arange(len(judged))
-    order[places] = len(judged) + np.arange(len(rows))
+    order[indices] = len(judged) + np.arange(len(rows))
     return joined([judged, rows]).rows(order)
 
 
@@ -140,18 +140,18 @@ def _words_in_use(spec: OutcomeColumn, pieces: list[Judged]) -> tuple[str, ...]:
     """Words of a column: those of the register, then what else some row has, sorted."""
     used = set()
     for piece in pieces:
-        own = piece.words[spec.name]
-        if own != spec.words:
+        piece_words = piece.words[spec.name]
+        if piece_words != spec.words:
             counts = np.bincount(piece[spec.name] + 1, minlength=1)[1:]
-            used |= {own[code] for code in np.flatnonzero(counts)}
+            used |= {piece_words[code] for code in np.flatnonzero(counts)}
     return (*spec.words, *sorted(used - set(spec.words)))
 
 
-def _translated(piece: Judged, name: str, words: tuple[str, ...]) -> np.ndarray:
-    """Codes of a column of a piece as indices into other words; words that no row uses need no place."""
-    own, codes = piece.words[name], piece[name]
-    if own == words[: len(own)]:
+def _translate_codes(piece: Judged, name: str, words: tuple[str, ...]) -> np.ndarray:
+    """Codes of a column of a piece as indices into other words; words that no row uses need no code."""
+    piece_words, codes = piece.words[name], piece[name]
+    if piece_words == words[: len(piece_words)]:
         return codes
-    place = {word: code for code, word in enumerate(words)}
+    code_of = {word: code for code, word in enumerate(words)}
     # Code -1 takes the last entry, which stands for no word.
-    return np.array([*(place.get(word, 0) for word in own), -1], dtype=codes.dtype)[codes]
+    return np.array([*(code_of.get(word, 0) for word in piece_words), -1], dtype=codes.dtype)[codes]

@@ -70,10 +70,10 @@ def at_values(sweep: Sweep, at: str | None = None) -> Sweep:
 
 def _share(at: str) -> float:
     """Read ``p5`` as 0.05."""
-    found = re.fullmatch(r"p(\d{1,2}(?:\.\d+)?)", at)
-    if found is None or not 0.0 < float(found[1]) <= 50.0:
+    match = re.fullmatch(r"p(\d{1,2}(?:\.\d+)?)", at)
+    if match is None or not 0.0 < float(match[1]) <= 50.0:
         raise QuestionError(f"'{at[:40]}' is not mean, p5 or another quantile from above p0 to p50")
-    return float(found[1]) / 100.0
+    return float(match[1]) / 100.0
 
 
 def _normal(share: float, side: str) -> float:
@@ -121,7 +121,7 @@ def _with_quantiles(sweep: Sweep, normals: dict[str, float], taken_at: dict[str,
             return values_of(spread, means, np.full(len(means), normals[name]))
         z = np.array([normals[name]])
         each = zip(spread.each, means[:, None], strict=True)
-        return np.concatenate([mean if own is None else values_of(own, mean, z) for own, mean in each])
+        return np.concatenate([mean if one is None else values_of(one, mean, z) for one, mean in each])
 
     constants = {name: float(at(name, np.array([value]))[0]) for name, value in sweep.constants.items()}
     axes = []

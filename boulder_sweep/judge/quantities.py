@@ -51,8 +51,8 @@ def quantities(rows: Mapping[str, Any], shape: Shape, ground: Ground) -> dict[st
     for layer in ground.layers:
         slope = np.where(layer.from_m < d, np.maximum(slope, wedge_slope(np.asarray(layer.friction_angle_deg))), slope)
     excavated = W * d * (L + d * slope)
-    found = (mass, H - d, excavated, excavated - box * buried_share(shape, d / H))
-    return {spec.name: value for spec, value in zip(QUANTITIES, np.broadcast_arrays(*found), strict=True)}
+    values = (mass, H - d, excavated, excavated - box * buried_share(shape, d / H))
+    return {spec.name: value for spec, value in zip(QUANTITIES, np.broadcast_arrays(*values), strict=True)}
 
 
 def quantities_by(rows: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, np.ndarray]:

@@ -40,7 +40,7 @@ AGREEING = 2
 (`benchmarks.late`): one step missed that a moment for an instant exceeds what holds the boulder, and one estimate was
 so large that everything agreed with it."""
 EVENT_TOLERANCE = 1e-5
-"""Finer solutions locate events to this fraction of a step. Boulders that rock amplify what the place of the first kink
+"""Finer solutions locate events to this fraction of a step. Boulders that rock amplify what the time of the first kink
 was off by, whatever the step: located as in other solutions, late ones need steps 10 times as short to agree."""
 SAME_ANGLE, SAME_WAY = 1e-6, 1e-4
 """Solutions of a late row agree if what they reach differs by no more than the error estimated for the coarser, or by

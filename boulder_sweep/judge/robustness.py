@@ -116,13 +116,13 @@ def grades_without_asking(facts: Any) -> np.ndarray:
     facts
         What is known of n rows (`boulder_sweep.judge.verdict.Facts`).
     """
-    found = np.full(len(facts.verdict), OPEN, dtype=np.int32)
+    grades = np.full(len(facts.verdict), OPEN, dtype=np.int32)
     limits, outcomes = facts.limits, facts.outcomes
     if limits.studied and limits.rotation >= math.radians(FREE_LIMIT_DEG) * (1.0 - ROUNDING):
         near = facts.rows["passing"] & (outcomes.theta_max + outcomes.theta_error <= math.radians(FREE_ROTATION_DEG))
         rows = np.flatnonzero(near)
-        found[rows[is_free(some_rows(facts.designs.table, rows))]] = ROBUST
-    return found
+        grades[rows[is_free(some_rows(facts.designs.table, rows))]] = ROBUST
+    return grades
 
 
 def is_free(table: DesignTable) -> np.ndarray:
@@ -152,13 +152,13 @@ def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: flo
     """
     table = with_law(designs.table, law, present)
     control = HeaveControl(limits.rotation, longest_s)
-    found = np.empty(designs.size, dtype=bool)
+    passes = np.empty(designs.size, dtype=bool)
     for at in range(0, designs.size, AT_ONCE):
         some = np.arange(at, min(at + AT_ONCE, designs.size))
         outcome = second_opinions(some_rows(table, some), control)
         penetration = outcome.x_v_max - designs.bed_offset[some] - table.L[some]
-        found[some] = (outcome.status == Status.BELOW_LIMIT.value) & (penetration <= limits.penetration)
-    return found
+        passes[some] = (outcome.status == Status.BELOW_LIMIT.value) & (penetration <= limits.penetration)
+    return passes
 
 
 def with_second_opinions(

@@ -161,8 +161,8 @@ def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray)
 def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return the column ``validity`` of n rows: codes, and the words they stand for."""
     bits = np.zeros(len(facts.verdict), dtype=np.uint16)
-    for place, flag in enumerate(FLAGS):
-        bits |= flag.raised(facts).astype(np.uint16) << place
+    for bit, flag in enumerate(FLAGS):
+        bits |= flag.raised(facts).astype(np.uint16) << bit
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))
@@ -179,8 +179,8 @@ def meanings(word: str) -> list[str]:
 
 def flag_counts(counts: Iterable[tuple[str, int]]) -> dict[str, int]:
     """Return how many rows have each flag, and under ``""`` how many have none, from counts of the column's words."""
-    found = dict.fromkeys(["", *BY_FLAG], 0)
+    totals = dict.fromkeys(["", *BY_FLAG], 0)
     for word, count in counts:
         for name in word.split(SEPARATOR):
-            found[name] = found.get(name, 0) + count
-    return {name: count for name, count in found.items() if count or not name}
+            totals[name] = totals.get(name, 0) + count
+    return {name: count for name, count in totals.items() if count or not name}

@@ -256,6 +256,6 @@ def _error_reasons(status: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
         rows[NOT_FINITE] = not_finite
     named = tuple(sorted(rows))
     reason = np.zeros(status.shape, dtype=np.int32)
-    for place, text in enumerate(named):
-        reason[rows[text]] = len(REASONS) + place
+    for k, text in enumerate(named):
+        reason[rows[text]] = len(REASONS) + k
     return reason, (*REASONS, *named)
