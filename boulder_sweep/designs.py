@@ -59,7 +59,7 @@ class Reasons:
     Attributes
     ----------
     codes : ndarray of int8, shape (n,)
-        0 where the row can be computed, otherwise a place in `texts`.
+        0 where the row can be computed, otherwise an index into `texts`.
     texts : tuple of str
         The reasons; the first one is empty.
     """
@@ -97,9 +97,9 @@ class Label:
     words: tuple[str, ...]
     axis: int = 0
 
-    def at(self, places: np.ndarray) -> Label:
-        """Return the label of some places along its axis, with no more words than these need."""
-        used, codes = np.unique(self.codes[places], return_inverse=True)
+    def at(self, indices: np.ndarray) -> Label:
+        """Return the label at some indices along its axis, with no more words than these need."""
+        used, codes = np.unique(self.codes[indices], return_inverse=True)
         return Label(codes.astype(np.int32), tuple(self.words[code] for code in used))
 
 
@@ -152,7 +152,7 @@ class Source:
         self.axes = axes
 
         self.dictionary: tuple[np.ndarray | None, np.ndarray] = None, self.values
-        """Places in the dictionary for every value (None: its own place), and the dictionary."""
+        """Indices into the dictionary for every value (None: its own index), and the dictionary."""
 
     def to_numpy(self) -> np.ndarray:
         """Return the values."""
@@ -208,7 +208,7 @@ def impact_height_of_face(
 def refusal(
     height: np.ndarray, embedment: np.ndarray, bumper: np.ndarray, hood: np.ndarray, impact: np.ndarray
 ) -> np.ndarray:
-    """Return for every row the place in `REASONS` of why it cannot be computed, int8.
+    """Return for every row the index in `REASONS` of why it cannot be computed, int8.
 
     An impact height given by the user must lie on the boulder; where the bumper passes over the boulder
     there is no impact and its height does not matter.
@@ -242,7 +242,7 @@ def refusal_of_mass(codes: np.ndarray, mass: np.ndarray, density: np.ndarray, *s
 def _completed(
     given: Mapping[str, Known], zero: Known, combine: Callable[..., Known]
 ) -> tuple[dict[str, Known], Known]:
-    """Return every input column of designs by name, and for every row the place in `REASONS`.
+    """Return every input column of designs by name, and for every row the index in `REASONS`.
 
     Parameters
     ----------
@@ -311,8 +311,8 @@ class DesignPlan:
             return Derived(function, inputs)
         grids = []
         for source in sources:
-            own = tuple(self.lengths[axis] if axis in source.axes else 1 for axis in axes)
-            grids.append(np.broadcast_to(source.values.reshape(own), shape))
+            lengths = tuple(self.lengths[axis] if axis in source.axes else 1 for axis in axes)
+            grids.append(np.broadcast_to(source.values.reshape(lengths), shape))
         return Source(function(*grids).reshape(-1), axes)
 
     def block(self, start: int, stop: int) -> DesignBlock:
@@ -339,7 +339,7 @@ class DesignPlan:
     def _block(self, rows: _Rows) -> DesignBlock:
         """Return the designs of some rows."""
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
-        labels = {name: label.at(rows.place((label.axis,))) for name, label in self.labels.items()}
+        labels = {name: label.at(rows.index((label.axis,))) for name, label in self.labels.items()}
         reasons = Reasons(rows.values(self.refusals), REASONS)
         return DesignBlock(rows.start, rows.stop, columns, reasons, labels, rows.numbers)
 
@@ -381,34 +381,34 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
 
 
 def some(block: DesignBlock, rows: np.ndarray) -> DesignBlock:
-    """Return some rows of a block by their places, without labels, numbered from 0."""
+    """Return some rows of a block by their indices, without labels, numbered from 0."""
     columns = {name: Column(None, column.to_numpy()[rows]) for name, column in block.columns.items()}
     return DesignBlock(0, len(rows), columns, Reasons(np.asarray(block.reasons.codes)[rows], block.reasons.texts))
 
 
 class _Rows:
-    """Places of a range of rows on the axes; of 32 bits where they fit, which divide several times as fast."""
+    """Indices of a range of rows along the axes; of 32 bits where they fit, which divide several times as fast."""
 
     def __init__(self, plan: DesignPlan, start: int, stop: int, numbers: np.ndarray | None = None) -> None:
         self.plan = plan
         self.start, self.stop, self.numbers = start, stop, numbers
         self.count = stop - start if numbers is None else len(numbers)
         self.digits: dict[int, np.ndarray] = {}
-        self.places: dict[tuple[int, ...], np.ndarray] = {}
+        self.indices: dict[tuple[int, ...], np.ndarray] = {}
 
-    def place(self, axes: tuple[int, ...]) -> np.ndarray:
-        """Return the place of every row among the combinations of some axes, int32 or int64."""
-        if axes not in self.places:
+    def index(self, axes: tuple[int, ...]) -> np.ndarray:
+        """Return the index of every row among the combinations of some axes, int32 or int64."""
+        if axes not in self.indices:
             combinations = math.prod(self.plan.lengths[axis] for axis in axes)
-            place = np.zeros(self.count, dtype=_whole_numbers(combinations))
+            index = np.zeros(self.count, dtype=_whole_numbers(combinations))
             for axis in axes:
-                place *= self.plan.lengths[axis]
-                place += self.digit(axis)
-            self.places[axes] = place
-        return self.places[axes]
+                index *= self.plan.lengths[axis]
+                index += self.digit(axis)
+            self.indices[axes] = index
+        return self.indices[axes]
 
     def digit(self, axis: int) -> np.ndarray:
-        """Return the place of every row on one axis, int32 or int64."""
+        """Return the index of every row along one axis, int32 or int64."""
         if axis not in self.digits:
             stride, length = self.plan.strides[axis], self.plan.lengths[axis]
             if self.numbers is not None:
@@ -418,8 +418,8 @@ class _Rows:
             largest = max(beyond, length, stride) + self.count
             # The number of a design may need 64 bits; how far it is from the first of the block hardly ever does.
             within: np.ndarray = np.arange(beyond, beyond + self.count, dtype=_whole_numbers(largest))
-            place = within // stride + first % length
-            self.digits[axis] = place - place // length * length  # several times as fast as a remainder
+            index = within // stride + first % length
+            self.digits[axis] = index - index // length * length  # several times as fast as a remainder
         return self.digits[axis]
 
     def column(self, quantity: Quantity) -> Column:
@@ -427,14 +427,14 @@ class _Rows:
         if isinstance(quantity, Source):
             lookup, dictionary = quantity.dictionary
             if len(dictionary) <= MAX_DICTIONARY:
-                place = self.place(quantity.axes)
-                return Column(place.astype(np.int32, copy=False) if lookup is None else lookup[place], dictionary)
+                index = self.index(quantity.axes)
+                return Column(index.astype(np.int32, copy=False) if lookup is None else lookup[index], dictionary)
         return Column(None, np.ascontiguousarray(self.values(quantity)))
 
     def values(self, quantity: Quantity) -> np.ndarray:
         """Return one value per row."""
         if isinstance(quantity, Source):
-            return quantity.values[self.place(quantity.axes)]
+            return quantity.values[self.index(quantity.axes)]
         return quantity.function(*(self.values(value) for value in quantity.inputs))
 
 

@@ -158,7 +158,7 @@ def angle_by_relative_density(ratio: float) -> float:
         Outside `RELATIVE_DENSITIES`.
     """
     RELATIVE_DENSITIES.check(ratio, "the relative density")
-    ends = [LOOSEST, *((own.relative_density, own.friction_angle_deg) for own in STATES)]
+    ends = [LOOSEST, *((state.relative_density, state.friction_angle_deg) for state in STATES)]
     return float(np.interp(ratio, *np.transpose(ends)))
 
 
@@ -167,7 +167,7 @@ def densities(angle_deg: float) -> tuple[float, float]:
 
     Beyond the table the density of dense sand counts, which is less than that of very dense one.
     """
-    state = next((own for own in STATES if angle_deg <= own.friction_angle_deg), STATES[-1])
+    state = next((state for state in STATES if angle_deg <= state.friction_angle_deg), STATES[-1])
     return state.lightest_pcf * PCF, state.heaviest_pcf * PCF
 
 

@@ -101,7 +101,7 @@ class RemotePath:
         return Path(self.name).suffix
 
     def with_suffix(self, suffix: str) -> RemotePath:
-        """Return the place whose name has another ending."""
+        """Return the location whose name has another ending."""
         return self.parent / Path(self.name).with_suffix(suffix).name
 
     @property
@@ -110,7 +110,7 @@ class RemotePath:
         return RemotePath(self._filesystem, self._path.rpartition("/")[0], self._url.rpartition("/")[0])
 
     def resolve(self) -> RemotePath:
-        """Return the same place: URLs are absolute."""
+        """Return the same location: URLs are absolute."""
         return self
 
     def exists(self) -> bool:
@@ -136,9 +136,9 @@ class RemotePath:
         OSError
             There is no such file, or the store does not answer.
         """
-        found = self._request(self._filesystem.info, self._path)
-        kind = stat.S_IFDIR if found.get("type") == "directory" else stat.S_IFREG
-        return RemoteStat(int(found.get("size") or 0), kind)
+        info = self._request(self._filesystem.info, self._path)
+        kind = stat.S_IFDIR if info.get("type") == "directory" else stat.S_IFREG
+        return RemoteStat(int(info.get("size") or 0), kind)
 
     def read_bytes(self, most: int = _PART_BYTES) -> bytes:
         """Return the content of a file, of about as many bytes at most."""
@@ -152,10 +152,10 @@ class RemotePath:
     def names(self) -> list[str]:
         """Return the names in a folder, those of folders with a slash at the end; none if there is no folder."""
         try:
-            found = self._request(self._filesystem.ls, self._path, times=_LIST_TIMES, detail=True)
+            entries = self._request(self._filesystem.ls, self._path, times=_LIST_TIMES, detail=True)
         except FileNotFoundError:
             return []
-        here = ((entry["name"].rstrip("/").rpartition("/")[2], entry["type"]) for entry in found)
+        here = ((entry["name"].rstrip("/").rpartition("/")[2], entry["type"]) for entry in entries)
         return sorted(f"{name}/" if kind == "directory" else name for name, kind in here if name)
 
     def put(self, content: memoryview | bytes, *, only_new: bool = False) -> None:
@@ -249,7 +249,7 @@ def harmless(problem: BaseException) -> str:
     for name, value in os.environ.items():
         if len(value) >= _SHORTEST_SECRET and _SECRET_NAME.search(name):
             text = text.replace(value, "***")
-    return _SECRET_IN_URL.sub(lambda found: "://" if found[1] else "?***", text)
+    return _SECRET_IN_URL.sub(lambda match: "://" if match[1] else "?***", text)
 
 
 def is_url(text: str) -> bool:
@@ -269,10 +269,10 @@ def location_of(text: str | Path | RemotePath) -> Location:
         return text
     if not isinstance(text, str) or not is_url(text):
         return Path(text)
-    found = _URL.fullmatch(text.strip())
-    if found is None:
+    match = _URL.fullmatch(text.strip())
+    if match is None:
         raise LocationError(f"{text.partition('://')[0]}:// is not the beginning of a URL")
-    scheme, host, path, rest = found[1].lower(), found[2], found[3], found[4]
+    scheme, host, path, rest = match[1].lower(), match[2], match[3], match[4]
     shown = f"{scheme}://{host.rpartition('@')[2]}{path}"
     if "@" in host or rest:
         what = "a user name or password" if "@" in host else "a query or fragment"
@@ -288,16 +288,16 @@ def location_of(text: str | Path | RemotePath) -> Location:
     return RemotePath(filesystem, filesystem._strip_protocol(shown), shown)
 
 
-def source_of(place: Location) -> Any:
+def source_of(location: Location) -> Any:
     """Return what libraries can read a file from: its path, or its content opened."""
-    return place if isinstance(place, Path) else place.open("rb")
+    return location if isinstance(location, Path) else location.open("rb")
 
 
-def beside(place: Location, suffix: str) -> Path:
+def beside(location: Location, suffix: str) -> Path:
     """Return the path of a file made from a result: beside it, or in the current directory for a URL."""
-    if isinstance(place, RemotePath):
-        return Path(f"{place.name.removesuffix('.sweep')}{suffix}")
-    return Path(f"{str(place if place.name else place.resolve()).removesuffix('.sweep')}{suffix}")
+    if isinstance(location, RemotePath):
+        return Path(f"{location.name.removesuffix('.sweep')}{suffix}")
+    return Path(f"{str(location if location.name else location.resolve()).removesuffix('.sweep')}{suffix}")
 
 
 def _filesystem(scheme: str, shown: str) -> Any:

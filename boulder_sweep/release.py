@@ -63,9 +63,9 @@ def compile_for(level: str, recorded: Path, target: Path) -> None:
     """Compile recorded kernels for a target in another process, and put the libraries into a folder."""
     name, features = TARGETS.get(level, (level, ""))
     linker = f"{sys.executable} -m ziglang cc -target {platform.machine()}-linux-gnu.{GLIBC}"
-    own = {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": features, "CC": linker}
+    variables = {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": features, "CC": linker}
     command = [sys.executable, "-m", "boulder_sweep.release", str(recorded), str(target)]
-    subprocess.run(command, env=os.environ | own, check=True)
+    subprocess.run(command, env=os.environ | variables, check=True)
 
 
 def compile_recorded(recorded: Path, target: Path) -> None:

@@ -22,9 +22,9 @@ SLICES = 16
 
 def coefficients(table: DesignTable, law: str) -> np.ndarray:
     """Return the coefficient K of a law of the resistance [-] for n designs, SI, shape (n,)."""
-    found = np.empty(table.d.size)
-    kernels.write_coefficients(table, RESISTANCES.index(law), found)
-    return found
+    values = np.empty(table.d.size)
+    kernels.write_coefficients(table, RESISTANCES.index(law), values)
+    return values
 
 
 def with_law(table: DesignTable, law: str, present: str = RESISTANCES[0]) -> DesignTable:

@@ -219,7 +219,7 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         overlay, scored, draw = overlaid
         written = [] if out is None else [draw(Path(out))]
         content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
-        content["scores"] = [own.to_dict() for own in scored]
+        content["scores"] = [score.to_dict() for score in scored]
         content["files"] += written
         from boulder_sweep.crash_tests.score import deviation_table, score_table
         from boulder_sweep.crash_tests.tables import WIDTH
@@ -228,7 +228,7 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         if max(map(len, tables[0].split("\n"))) > WIDTH:  # too many signals for one: a table for each
             signals = dict.fromkeys(d.signal for rows in overlay.values() for d in rows)
             by_signal = ({p: [d for d in rows if d.signal == name] for p, rows in overlay.items()} for name in signals)
-            tables = [deviation_table(own).text() for own in by_signal]
+            tables = [deviation_table(part).text() for part in by_signal]
         text = [validation.text(), "", f"{measured} against {case}:", "\n\n".join(tables)]
         text += ["", "scores, up to the limit of the rotation:", score_table(scored).text()]
         text += ["safe: the model moves more, or reaches the limit earlier, than the test did"]

@@ -93,26 +93,26 @@ def stone(
         refuse_unwritable(None, plot)
     from boulder_sweep.stones.weighing import scanned
 
-    found = scanned(rock, metres=metres, mass_kg=mass_kg)
-    for caution in found.cautions:
+    scan = scanned(rock, metres=metres, mass_kg=mass_kg)
+    for caution in scan.cautions:
         say(f"caution: {caution}")
-    chosen = None if up is None or facing is None else (found.stone.standing(up, facing),)
+    chosen = None if up is None or facing is None else (scan.stone.standing(up, facing),)
     if site is not None:
-        result = _place(found, site, chosen, margin, at, overrides, quiet)
-        text = [*stone_lines(found), "", *placing_lines(result, rock, unit, site)]
+        result = _find_placing(scan, site, chosen, margin, at, overrides, quiet)
+        text = [*stone_lines(scan), "", *placing_lines(result, rock, unit, site)]
         show(*([json.dumps(result.to_dict())] if as_json else text))
     elif as_json:
-        show(json.dumps(found.to_dict(chosen)))
+        show(json.dumps(scan.to_dict(chosen)))
     else:
-        ways = standing_lines(found) if chosen is None else settings_lines(found, *chosen)
-        show(*stone_lines(found), "", *ways)
+        ways = standing_lines(scan) if chosen is None else settings_lines(scan, *chosen)
+        show(*stone_lines(scan), "", *ways)
     if plot is not None:
-        (found if site is None else result).plot(plot)
+        (scan if site is None else result).plot(plot)
     return 0
 
 
-def _place(
-    found: ScannedStone,
+def _find_placing(
+    scan: ScannedStone,
     site: str,
     standings: tuple[Standing, ...] | None,
     margin: str,
@@ -131,10 +131,10 @@ def _place(
         said, silent = True, quiet or said
         return take_values(load_sweep(site, (*overrides, block), silent), at, silent)
 
-    if not any(own.has_foot for own in standings or found.standings):
+    if not any(standing.has_foot for standing in standings or scan.standings):
         raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")
     with working(quiet, "placing", "ways") as progress:
-        return placed(found, with_boulder, standings, margin=margin, progress=progress)
+        return placed(scan, with_boulder, standings, margin=margin, progress=progress)
 
 
 def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]:
@@ -193,44 +193,44 @@ def _beside(rock: str, site: str) -> str:
     return name if re.fullmatch(r"[\w./+][\w./+-]*", name) else json.dumps(name, ensure_ascii=False)
 
 
-def stone_lines(found: ScannedStone) -> list[str]:
+def stone_lines(scan: ScannedStone) -> list[str]:
     """Return what the stone is."""
-    own = found.stone
-    density = f"{found.density_kg_m3:,.0f} kg/m³"
+    shape = scan.stone
+    density = f"{scan.density_kg_m3:,.0f} kg/m³"
     mass = {
-        "mass": f"{found.mass_kg / 1e3:.2f} t as given, {density}",
-        "density": f"{found.mass_kg / 1e3:.2f} t, at {density} as given",
-        "assumed": f"{found.mass_kg / 1e3:.2f} t, if its density is {density}; weigh it and give --mass",
+        "mass": f"{scan.mass_kg / 1e3:.2f} t as given, {density}",
+        "density": f"{scan.mass_kg / 1e3:.2f} t, at {density} as given",
+        "assumed": f"{scan.mass_kg / 1e3:.2f} t, if its density is {density}; weigh it and give --mass",
     }
-    a, b, c = (f"{side:.2f}" for side in own.sides_m)
-    moments = own.axes @ own.solid.inertia @ own.axes.T * found.density_kg_m3 / 1e3
+    a, b, c = (f"{side:.2f}" for side in shape.sides_m)
+    moments = shape.axes @ shape.solid.inertia @ shape.axes.T * scan.density_kg_m3 / 1e3
     turning = ", ".join(f"{moments[k, k]:.2f}" for k in range(3))
     return [
-        f"{found.file}: {counted(len(own.solid.faces), 'face')}{'' if own.solid.repairs else ', closed as it is'}",
-        *(f"  repaired    {words}" for words in own.solid.repairs),
-        f"  volume      {own.solid.volume:.3f} m³",
-        f"  mass        {mass[found.density_from]}",
+        f"{scan.file}: {counted(len(shape.solid.faces), 'face')}{'' if shape.solid.repairs else ', closed as it is'}",
+        *(f"  repaired    {words}" for words in shape.solid.repairs),
+        f"  volume      {shape.solid.volume:.3f} m³",
+        f"  mass        {mass[scan.density_from]}",
         f"  sides       a {a}, b {b}, c {c} m: the smallest box around it",
-        f"  solidity    {own.solidity:.2f} of that box, {own.hull_share:.2f} of the convex hull",
+        f"  solidity    {shape.solidity:.2f} of that box, {shape.hull_share:.2f} of the convex hull",
         f"  inertia     {turning} t·m² about a, b, c",
     ]
 
 
-def standing_lines(found: ScannedStone) -> list[str]:
+def standing_lines(scan: ScannedStone) -> list[str]:
     """Return how it can stand: a line for each end up and each pair of opposite faces to the road."""
     columns: list[tuple[tuple[str, str], Callable[[Standing], str]]] = [
-        (("up", ""), lambda own: own.up),
-        (("facing", ""), lambda own: f"±{own.facing}"),
-        (("height", "m"), lambda own: f"{own.profile.height[-1]:.2f}"),
-        (("length", "m"), lambda own: f"{own.profile.length.max():.2f}"),
-        (("width", "m"), lambda own: f"{own.profile.width.max():.2f}"),
+        (("up", ""), lambda standing: standing.up),
+        (("facing", ""), lambda standing: f"±{standing.facing}"),
+        (("height", "m"), lambda standing: f"{standing.profile.height[-1]:.2f}"),
+        (("length", "m"), lambda standing: f"{standing.profile.length.max():.2f}"),
+        (("width", "m"), lambda standing: f"{standing.profile.width.max():.2f}"),
         (("foot", "m"), foot_text),
-        (("cut", "m"), lambda own: f"{own.cut_m:.2f}"),
-        (("cut", "of mass"), lambda own: f"{own.cut_share:.1%}"),
-        (("rests", "uncut"), lambda own: f"{own.rests:.0%}"),
-        (("fit", "m"), lambda own: f"{own.profile.error:.3f}"),
+        (("cut", "m"), lambda standing: f"{standing.cut_m:.2f}"),
+        (("cut", "of mass"), lambda standing: f"{standing.cut_share:.1%}"),
+        (("rests", "uncut"), lambda standing: f"{standing.rests:.0%}"),
+        (("fit", "m"), lambda standing: f"{standing.profile.error:.3f}"),
     ]
-    return [*_table(columns, [own for own in found.standings if not own.facing.startswith("-")]), *_legend(found)]
+    return [*_table(columns, [one for one in scan.standings if not one.facing.startswith("-")]), *_legend(scan)]
 
 
 def _table(columns: Iterable[tuple[tuple[str, str], Callable[[T], str]]], ways: Iterable[T]) -> list[str]:
@@ -243,28 +243,28 @@ def _table(columns: Iterable[tuple[tuple[str, str], Callable[[T], str]]], ways: 
     return table_lines([(head, cell(text)) for head, text in columns], [{"way": way} for way in ways])
 
 
-def settings_lines(found: ScannedStone, own: Standing) -> list[str]:
+def settings_lines(scan: ScannedStone, standing: Standing) -> list[str]:
     """Return one way to stand as a block of settings."""
-    profile = own.profile
+    profile = standing.profile
     points = zip(profile.height, profile.width, profile.near, profile.far, strict=True)
-    cut = f", {own.cut_m:.2f} m cut off for a foot" if own.cut_m else ""
+    cut = f", {standing.cut_m:.2f} m cut off for a foot" if standing.cut_m else ""
     return [
-        f"# {found.file}: {own.up} up, {own.facing} to the vehicle{cut}",
+        f"# {scan.file}: {standing.up} up, {standing.facing} to the vehicle{cut}",
         "boulder:",
-        f"  mass: {found.density_kg_m3 * own.volume / 1e3:.3f} t",
-        *([f"  density: {found.density_kg_m3:.0f} kg/m^3"] if found.density_from != "assumed" else []),
+        f"  mass: {scan.density_kg_m3 * standing.volume / 1e3:.3f} t",
+        *([f"  density: {scan.density_kg_m3:.0f} kg/m^3"] if scan.density_from != "assumed" else []),
         "  profile:",
         *(f"    - {{height: {z:.3f} m, width: {w:.3f} m, near: {n:.3f} m, far: {f:.3f} m}}" for z, w, n, f in points),
-        *([] if own.has_foot else ["  foot: rounded"]),
+        *([] if standing.has_foot else ["  foot: rounded"]),
     ]
 
 
-def foot_text(own: Standing) -> str:
+def foot_text(standing: Standing) -> str:
     """Return length and width of a foot, or that there is none."""
-    return f"{own.profile.length[0]:.2f} × {own.profile.width[0]:.2f}" if own.has_foot else "rounded"
+    return f"{standing.profile.length[0]:.2f} × {standing.profile.width[0]:.2f}" if standing.has_foot else "rounded"
 
 
-def _legend(found: ScannedStone) -> list[str]:
+def _legend(scan: ScannedStone) -> list[str]:
     """Return what the columns mean, as far as they say something."""
     lines = [
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
@@ -272,6 +272,6 @@ def _legend(found: ScannedStone) -> list[str]:
         "rests: section of the uncut stone just above the ground over its largest one",
         "fit: error of the profile, root mean square over the volume",
     ]
-    if any(not own.has_foot for own in found.standings):
+    if any(not standing.has_foot for standing in scan.standings):
         lines.append("rounded: no cut of a quarter of the height makes a foot; bed it in concrete")
     return lines

@@ -229,9 +229,9 @@ def forms_of(sweep: Sweep, trajectories: Mapping[str, Trajectory], horizon_s: fl
     """
     forms = [_of_trajectory(f"paper's law, {preset.replace('_', ' ')}", t) for preset, t in trajectories.items()]
     model = sweep.model
-    own = [words for words, plain in zip((model.resistance, model.unloading), _PLAIN, strict=True) if words != plain]
-    if own or model.preset not in PRESETS:
-        words = ", ".join([model.preset.replace("_", " "), *(name.replace("_", " ") for name in own)])
+    other = [words for words, plain in zip((model.resistance, model.unloading), _PLAIN, strict=True) if words != plain]
+    if other or model.preset not in PRESETS:
+        words = ", ".join([model.preset.replace("_", " "), *(name.replace("_", " ") for name in other)])
         forms.append(_of_trajectory(f"the file's model: {words}", simulate(sweep, horizon_s=horizon_s)))
     if can_be_asked(sweep):
         forms += [_of_opinion(sweep, law, horizon_s or sweep.solver.horizon_s) for law in model.second_opinion]
@@ -274,7 +274,7 @@ def _of_opinion(sweep: Sweep, law: str, horizon_s: float) -> Form:
         "vehicle_displacement": x_v,
         "vehicle_acceleration": np.gradient(v_v, times[kept]),
     }
-    status, reached_at = (float(np.asarray(own)[0]) for own in (decided.status, decided.t_limit))
+    status, reached_at = (float(np.asarray(array)[0]) for array in (decided.status, decided.t_limit))
     when = reached_at if status == Status.LIMIT.value else math.nan
     return Form(f"second opinion, {law.replace('_', ' ')}", times[kept], signals, when)
 
@@ -292,13 +292,13 @@ def scores(forms: Sequence[Form], measured: TimeHistory, limit_deg: float) -> li
         Limit of the rotation [deg].
     """
     when = time_of_limit(measured, limit_deg)
-    found = []
+    rows = []
     if ROTATION.name in measured.signals:
-        found += [_of_time(form, when) for form in forms]
+        rows += [_of_time(form, when) for form in forms]
     for name in measured.signals:
         for form in forms:
-            found += _of_signal(form, measured, name, when)
-    return found
+            rows += _of_signal(form, measured, name, when)
+    return rows
 
 
 def time_of_limit(measured: TimeHistory, limit_deg: float) -> float:
@@ -339,7 +339,7 @@ def _of_signal(form: Form, measured: TimeHistory, name: str, when: float) -> lis
     simulated = np.interp(times, form.time_s, form.signals[name])
     # Between the samples of a camera the simulation may move further: its own samples up to the last of them count.
     whole = form.signals[name][form.time_s <= times[-1]]
-    peaks = [float(np.abs(own).max()) for own in (data, whole)]
+    peaks = [float(np.abs(curve).max()) for curve in (data, whole)]
     difference = peaks[1] - peaks[0]
     side = "" if difference == 0.0 or name == "vehicle_acceleration" else "safe" if difference > 0.0 else "unsafe"
     share = difference / peaks[0] if peaks[0] > 0.0 else None
@@ -351,16 +351,16 @@ def _of_signal(form: Form, measured: TimeHistory, name: str, when: float) -> lis
     ]
 
 
-def score_table(found: Sequence[Score]) -> Table:
+def score_table(scored: Sequence[Score]) -> Table:
     """Return scores as a table."""
     table = Table(("what", "model", "test", "model's", "error", "side"))
-    for own in found:
-        digits = {"deg": 2, "s": 4, "m/s^2": 1}.get(own.unit, 3)
-        unit = "°" if own.unit == "deg" else f" {own.unit}"
-        curve = own.quantity.startswith("curve")
+    for score in scored:
+        digits = {"deg": 2, "s": 4, "m/s^2": 1}.get(score.unit, 3)
+        unit = "°" if score.unit == "deg" else f" {score.unit}"
+        curve = score.quantity.startswith("curve")
         measured, simulated = (
-            "never" if value is None else number(value, digits) + unit for value in (own.measured, own.simulated)
+            "never" if value is None else number(value, digits) + unit for value in (score.measured, score.simulated)
         )
-        error = "-" if own.error is None else f"{own.error:.1%} RMS" if curve else f"{own.error:+.1%}"
-        table.add(own.quantity, own.form, "-" if curve else measured, simulated, error, own.side or "-")
+        error = "-" if score.error is None else f"{score.error:.1%} RMS" if curve else f"{score.error:+.1%}"
+        table.add(score.quantity, score.form, "-" if curve else measured, simulated, error, score.side or "-")
     return table

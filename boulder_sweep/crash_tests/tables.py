@@ -62,7 +62,7 @@ def _widths(lines: Sequence[Sequence[str]], width: int) -> list[int] | None:
     widths = [max(map(len, column)) for column in columns]
     least = [max(len(word) for cell in column for word in [*cell.split(), ""]) for column in columns]
     while sum(widths) + 2 * (len(widths) - 1) > width:
-        spare = [own - word for own, word in zip(widths, least, strict=True)]
+        spare = [full - word for full, word in zip(widths, least, strict=True)]
         if not any(spare):
             return None
         widths[max(range(len(widths)), key=lambda k: (spare[k] > 0, widths[k]))] -= 1

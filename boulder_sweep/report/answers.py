@@ -78,9 +78,9 @@ def answer_of(rows: Rows) -> Answer:
     sentences += _flagged(rows, n)
     if n == 0:
         none = "No design passes at the means." if uncertain else "No design passes."
-        return Answer((*sentences, (none,)), tuple(own for _, own in uncertain if own))
+        return Answer((*sentences, (none,)), tuple(design for _, design in uncertain if design))
     withstood = _withstood(rows, passing)
-    found = [_least(rows, withstood, what) for what in ("mass", "depth")]
+    least = [_least(rows, withstood, what) for what in ("mass", "depth")]
     if withstood.kinds != _varied(rows):
         sentences.append(
             (
@@ -88,10 +88,10 @@ def answer_of(rows: Rows) -> Answer:
                 "the least ones below pass only under the conditions named with them.",
             )
         )
-    for sentence, _ in found:
+    for sentence, _ in least:
         sentences.append(sentence)
-    named = {own.number: own for _, own in uncertain if own}
-    for _, one in found:
+    named = {design.number: design for _, design in uncertain if design}
+    for _, one in least:
         known = named.get(one.number)
         named[one.number] = (
             one if known is None else Named(f"{known.title}, {one.title[0].lower()}{one.title[1:]}", one.number)
@@ -131,8 +131,8 @@ def _grades(rows: Rows, n: int) -> Sentence:
         reason = MEANINGS["open"].capitalize() if asked else "No second opinion was asked for"
         return (f"{reason}; whether a pass stands under another form of the model is open.",)
     parts = ((robust, f"robust ({IN_WORDS})"), (sensitive, f"sensitive ({SENSITIVE_IN_WORDS})"), (left, "open"))
-    told = listed(tuple(f"{count:,} {verb(count, 'are', 'is')} {words}" for count, words in parts if count))
-    return (f"Of the {n:,} that {verb(n, 'pass', 'passes')}, {told}.",)
+    by_grade = listed(tuple(f"{count:,} {verb(count, 'are', 'is')} {words}" for count, words in parts if count))
+    return (f"Of the {n:,} that {verb(n, 'pass', 'passes')}, {by_grade}.",)
 
 
 def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
@@ -197,8 +197,8 @@ def _sizes(rows: Rows, number: int) -> Sentence:
 
 def _to_build(rows: Rows, number: int) -> Sentence:
     """Say what a design takes to build beside its mass, as a sentence that follows another."""
-    found = rows.to_build(number)
-    above, excavated, backfilled = (Quantity(found[own.name], own.unit) for own in TO_BUILD)
+    quantities = rows.to_build(number)
+    above, excavated, backfilled = (Quantity(quantities[spec.name], spec.unit) for spec in TO_BUILD)
     return (
         " It stands ",
         above,

@@ -80,8 +80,8 @@ def key_words(need: Need) -> str:
 def need_sentences(rows: Rows, need: Need) -> tuple[list[Sentence], list[Named]]:
     """Return the question with how many rows have an answer, why others have none, and the governing answer."""
     answers = need.arrow[need.key.answer].to_numpy()
-    found, total = ~np.isnan(answers), len(answers)
-    n = int(found.sum())
+    has_answer, total = ~np.isnan(answers), len(answers)
+    n = int(has_answer.sum())
     sentences: list[Sentence] = []
     if total > 1:
         asked = f"The {key_words(need)} that passes{_terms(need, rows)}"
@@ -114,10 +114,10 @@ def _governing(rows: Rows, need: Need, answers: np.ndarray) -> tuple[Sentence, N
     varying = [name for name in rows.varying() if name not in open_]
     kinds = tuple(kind for kind in CONDITIONS if kind in {condition_of(name) for name in varying})
     boulders = rows.boulders([*open_, *(name for name in varying if condition_of(name))])
-    found = ~np.isnan(answers)
-    held = np.bincount(boulders, weights=found)
+    has_answer = ~np.isnan(answers)
+    held = np.bincount(boulders, weights=has_answer)
     whole = held == np.bincount(boulders)
-    candidates = found & (held == held.max())[boulders]
+    candidates = has_answer & (held == held.max())[boulders]
     mass = need.arrow[BOULDER_MASS].to_numpy()
     if need.key.name != BOULDER_MASS:  # which differs from soil to soil
         lightest = int(np.argmin(np.where(candidates, mass, np.inf)))
@@ -179,7 +179,7 @@ def answers_table(rows: Rows) -> Table | None:
         varying = {DEPTH if name == RATIO else name for name in rows.varying()}
         inputs = [name for name in INPUT_COLUMNS if name in varying and name not in open_]
         columns += [(label_of(name), name, BY_NAME[name].unit) for name in inputs]
-    columns += _own_columns(file.kind, answers)
+    columns += _answer_columns(file.kind, answers)
     kept = table.slice(0, MOST_LINES).to_pylist()
     more = len(table) > MOST_LINES
     left = f"the first {MOST_LINES:,} of {len(table):,} answers; `sweep export` writes them all" if more else ""
@@ -187,7 +187,7 @@ def answers_table(rows: Rows) -> Table | None:
     return Table(tuple(head for head, _, _ in columns), lines, left)
 
 
-def _own_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
+def _answer_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
     """Return head, column and unit of what a command answers."""
     if kind == NEED:
         key = answers.key
@@ -198,7 +198,7 @@ def _own_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
         chance = "p_pass" in answers.arrow.column_names
         columns += [("P(pass)", "p_pass", "%")] if chance else [("margin", "margin", "%")]
         return [*columns, ("second opinion", "robustness", "")]
-    own = {
+    columns_of = {
         CAPACITY: [
             ("verdict", "verdict", ""),
             ("second opinion", "robustness", ""),
@@ -215,7 +215,7 @@ def _own_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
             ("decided by", "p_pass_driver", ""),
         ],
     }
-    return own[kind]
+    return columns_of[kind]
 
 
 def _cell(row: dict[str, Any], name: str, unit: str, searched: set[str]) -> str | Quantity:

@@ -145,23 +145,23 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     StoreError
         There is no result in a folder, or it is damaged.
     """
-    places = [location_of(folder) for folder in (before, after)]
-    one, other = (result_of(place, ReportError) for place in places)
+    locations = [location_of(folder) for folder in (before, after)]
+    one, other = (result_of(location, ReportError) for location in locations)
     asked = [_asked(result) for result in (one, other)]
     if asked[0][:2] != asked[1][:2]:
         said = [
-            f"{name} is of `sweep {own.command}` ({', '.join(own.answers) or 'verdicts'})"
-            for name, own in zip((before, after), asked, strict=True)
+            f"{name} is of `sweep {question.command}` ({', '.join(question.answers) or 'verdicts'})"
+            for name, question in zip((before, after), asked, strict=True)
         ]
         raise ReportError(f"{' and '.join(said)}: compare two results of one command and question")
     answers, searched = asked[0].answers, {*asked[0].searched, *asked[1].searched}
-    tables = [_table(place, result, answers) for place, result in zip(places, (one, other), strict=True)]
+    tables = [_table(location, result, answers) for location, result in zip(locations, (one, other), strict=True)]
     follow = _following(one.identity["settings"]["inputs"], other.identity["settings"]["inputs"])
     names = [name for name in (*INPUT_COLUMNS, RATIO) if name not in (*follow, *searched)]
     differ = [name for name in names if not set(tables[0][_key(name)]) & set(tables[1][_key(name)])]
     as_many = _values_in_order(tables, differ)
     same = [name for name in names if name not in differ]
-    shared = [_key(name) for name in same] + ["place"]
+    shared = [_key(name) for name in same] + ["rank"]
     for table in tables:
         table["nth"] = table.groupby(shared).cumcount()  # repeated designs
     matched = tables[0].merge(tables[1].drop(columns=same), on=[*shared, "nth"], suffixes=("_before", "_after"))
@@ -172,7 +172,7 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
             matched = matched.rename(columns={f"{name}_before": name}).drop(columns=f"{name}_after")
     passing = [table[table.verdict == "pass"] for table in tables]
     return Comparison(
-        matched=matched.drop(columns=[name for name in matched if name.startswith("key_")] + ["place", "nth"]),
+        matched=matched.drop(columns=[name for name in matched if name.startswith("key_")] + ["rank", "nth"]),
         differ=tuple(differ),
         varying=tuple(name for name in names if any(len(set(table[_key(name)])) > 1 for table in tables)),
         only_before=len(tables[0]) - len(matched),
@@ -214,13 +214,13 @@ def _asked(result: FinishedRows | AnswerFile) -> Asked:
     return Asked(result.kind, {name: unit.decode() for name, unit in units.items()}, ())
 
 
-def _table(place: Location, result: FinishedRows | AnswerFile, answers: Iterable[str]) -> pd.DataFrame:
+def _table(location: Location, result: FinishedRows | AnswerFile, answers: Iterable[str]) -> pd.DataFrame:
     """Read a result with the keys for matching."""
     columns = ["design_id", *INPUT_COLUMNS, *OUTCOMES, "solidity", *answers]
     if isinstance(result, AnswerFile):
         table = (answered(result.table) if result.kind == NEED else result.table).select(columns).to_pandas()
     else:
-        table = read(place, columns)
+        table = read(location, columns)
     for name in ("verdict", "reason"):
         table[name] = table[name].astype(str)
     table["mass_kg"] = table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")
@@ -238,17 +238,17 @@ def _key(name: str) -> str:
 
 def _following(*inputs: Mapping[str, Any]) -> list[str]:
     """Return the columns that follow from others in both results, by what their settings give."""
-    found = ["embedment_depth_m" if all(RATIO in own for own in inputs) else RATIO]
-    if all(own.get("impact_height_m") == IMPACT_HEIGHT_RULE for own in inputs):
-        found.append("impact_height_m")
-    return found
+    columns = ["embedment_depth_m" if all(RATIO in given for given in inputs) else RATIO]
+    if all(given.get("impact_height_m") == IMPACT_HEIGHT_RULE for given in inputs):
+        columns.append("impact_height_m")
+    return columns
 
 
 def _values_in_order(tables: Sequence[pd.DataFrame], differ: Sequence[str]) -> bool:
-    """Number the values of the inputs that differ, in order, as the column ``place``; whether both have as many."""
+    """Number the values of the inputs that differ, in order, as the column ``rank``; whether both have as many."""
     for table in tables:
-        table["place"] = table.groupby(list(differ)).ngroup() if differ else 0
-    counts = [[table[name].nunique() for name in (*differ, "place")] for table in tables]
+        table["rank"] = table.groupby(list(differ)).ngroup() if differ else 0
+    counts = [[table[name].nunique() for name in (*differ, "rank")] for table in tables]
     return counts[0] == counts[1]
 
 

@@ -154,13 +154,13 @@ class Thinned:
 
     Attributes
     ----------
-    places : tuple of ndarray
+    indices : tuple of ndarray
         Indices kept along each axis; for a list, the rows.
     words : str
         What is left out; empty if nothing is.
     """
 
-    places: tuple[np.ndarray, ...]
+    indices: tuple[np.ndarray, ...]
     words: str
 
 
@@ -175,7 +175,7 @@ def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_PO
     while np.prod(lengths, dtype=float) > most_cells:
         longest = int(np.argmax(lengths))
         lengths[longest] = -(-lengths[longest] // 2)
-    places = tuple(
+    indices = tuple(
         np.round(np.linspace(0, whole - 1, kept)).astype(np.int64)
         for whole, kept in zip(rows.shape, lengths, strict=True)
     )
@@ -184,18 +184,18 @@ def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_PO
         for name, whole, kept in zip(rows.axes, rows.shape, lengths, strict=True)
         if kept < whole
     ]
-    return Thinned(places, f"{', '.join(left)}, spread evenly" if left else "")
+    return Thinned(indices, f"{', '.join(left)}, spread evenly" if left else "")
 
 
 def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
     """Return the data of the map: codes of the designs kept, values along the axes or of the list."""
-    codes = rows.codes.reshape(rows.shape)[np.ix_(*kept.places)].ravel()
+    codes = rows.codes.reshape(rows.shape)[np.ix_(*kept.indices)].ravel()
     if rows.axes:
-        lines = zip(rows.axes.items(), kept.places, strict=True)
-        values = {name: along[places].tolist() for (name, along), places in lines}
+        lines = zip(rows.axes.items(), kept.indices, strict=True)
+        values = {name: along[indices].tolist() for (name, along), indices in lines}
     else:
         listed = {name: column for name, column in rows.inputs.items() if column.shape == rows.codes.shape}
-        values = {name: column[kept.places[0]].tolist() for name, column in listed.items()}
+        values = {name: column[kept.indices[0]].tolist() for name, column in listed.items()}
     return {
         **map_of(rows),
         "names": rows.names,
@@ -207,8 +207,8 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
         "labels": {name: label_of(name) for name in values},
         "units": {name: "" if name in rows.sets else BY_NAME[name].unit for name in values},
         "sets": {
-            axis: {"names": own.names, "inputs": {name: along.tolist() for name, along in own.inputs.items()}}
-            for axis, own in rows.sets.items()
+            axis: {"names": named.names, "inputs": {name: along.tolist() for name, along in named.inputs.items()}}
+            for axis, named in rows.sets.items()
         },
         "codes": _packed(codes.tobytes()),
     }
@@ -225,12 +225,12 @@ def map_of(rows: Rows) -> dict[str, Any]:
 
 
 def held_at(rows: Rows, kept: Thinned, number: int) -> dict[str, int]:
-    """Return the place of a design along each axis of the map; the nearest one kept where its own is left out."""
+    """Return the index of a design along each axis of the map; the nearest one kept where its own is left out."""
     if not rows.axes:
         return {}
-    own = np.unravel_index(number, rows.shape)
-    lines = zip(rows.axes.items(), kept.places, own, strict=True)
-    return {name: int(np.abs(along[places] - along[here]).argmin()) for (name, along), places, here in lines}
+    index = np.unravel_index(number, rows.shape)
+    lines = zip(rows.axes.items(), kept.indices, index, strict=True)
+    return {name: int(np.abs(along[indices] - along[here]).argmin()) for (name, along), indices, here in lines}
 
 
 def reading_words(settings: Mapping[str, Any]) -> str:

@@ -138,8 +138,8 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
         if isinstance(value, Mapping):
             lines += [f"{indent}{name}:", *setting_lines(value, f"{indent}  ")]
         elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-            for place, one in enumerate(value, 1):
-                lines += [f"{indent}{name} {place}:", *setting_lines(one, f"{indent}  ")]
+            for number, one in enumerate(value, 1):
+                lines += [f"{indent}{name} {number}:", *setting_lines(one, f"{indent}  ")]
         else:
             values = value if isinstance(value, list) else [value]
             shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in values)
@@ -157,10 +157,10 @@ def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Tabl
             table = table.append_column(JUDGED_BY.stored, pa.array([finished.judged_by] * len(table)))
         table = _with_quantities(table, finished.identity["settings"])
         columns = [JUDGED_BY if field.name == JUDGED_BY.stored else _shown(field, units) for field in table.schema]
-        for place, column in enumerate(columns):
+        for index, column in enumerate(columns):
             if column.size != 1.0:
-                values = pc.divide(table.column(place), column.size)
-                table = table.set_column(place, column.name, values)
+                values = pc.divide(table.column(index), column.size)
+                table = table.set_column(index, column.name, values)
         yield columns, table.rename_columns([column.name for column in columns])
 
 
@@ -171,11 +171,11 @@ def _with_quantities(table: pa.Table, settings: Mapping[str, Any]) -> pa.Table:
     if not set(table.column_names) >= {*NEEDED}:
         return table  # a time history
     names = (*NEEDED, *({BOULDER_MASS} & set(table.column_names)))
-    found = quantities_by({name: table.column(name).to_numpy() for name in names}, settings)
+    quantities = quantities_by({name: table.column(name).to_numpy() for name in names}, settings)
     for spec in QUANTITIES:
         if spec.name not in table.column_names:
             field = pa.field(spec.name, pa.float64(), metadata={"unit": spec.unit, "meaning": spec.meaning})
-            table = table.append_column(field, pa.array(found[spec.name], from_pandas=True))
+            table = table.append_column(field, pa.array(quantities[spec.name], from_pandas=True))
     return table
 
 
@@ -272,14 +272,14 @@ def _sheet(target: BinaryIO, finished: Result, units: str) -> int:
 
 def _set_widths(sheet: Any, widths: Iterable[float]) -> None:
     """Set the widths of the columns of a sheet, in characters; before its first row."""
-    for place, width in enumerate(widths, 1):
-        sheet.column_dimensions[_letter(place)].width = width
+    for column, width in enumerate(widths, 1):
+        sheet.column_dimensions[_letter(column)].width = width
 
 
-def _letter(place: int) -> str:
+def _letter(column: int) -> str:
     from openpyxl.utils import get_column_letter
 
-    return str(get_column_letter(place))
+    return str(get_column_letter(column))
 
 
 def _longest(column: pa.ChunkedArray) -> int:

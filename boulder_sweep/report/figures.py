@@ -243,7 +243,7 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
     )
     tops = [0.0, *(layer.from_m for layer in ground.layers)]
-    own = [
+    soils = [
         (
             inputs["friction_angle_deg"],
             inputs["soil_density_kg_m3"],
@@ -261,10 +261,10 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0) + bool(ground.layers)) * LINE * len(tops) - 0.3)
     strata = []
     written = 0.0
-    for place, (top, constants) in enumerate(zip(tops, own, strict=True)):
+    for k, (top, constants) in enumerate(zip(tops, soils, strict=True)):
         if -top <= bottom:
             break
-        under = min(tops[place + 1] if place + 1 < len(tops) else -bottom, -bottom)
+        under = min(tops[k + 1] if k + 1 < len(tops) else -bottom, -bottom)
         units = (("φ′", "deg"), ("ρ", "kg/m^3"), ("k", "MN/m^3"), ("c", "kPa"))
         named = (
             *((("from", top, "m"),) if ground.layers else ()),

@@ -95,16 +95,16 @@ def assembled(
         kept = thinned(rows)
         table = {**table_data(rows, kept), "held": held_at(rows, kept, chosen[0]["number"])}
     mapped = table is not None and table["mapped"]
-    panels = ["live", *(f"chosen{place}" for place in range(len(chosen)))]
+    panels = ["live", *(f"chosen{k}" for k in range(len(chosen)))]
     document = Document()
     curved = [plot for panel in panels for plot in curves(panel, parts_of(control))]
     for plot in [*curved, *map(verdict_map, ["live", "sweep"] if mapped else ["live"])]:
         document.add_root(plot)
     docs, items = standalone_docs_json_and_render_items(list(document.roots))
-    places = {plot.id: f"figure-{plot.name}" for plot in document.roots}
+    elements = {plot.id: f"figure-{plot.name}" for plot in document.roots}
     data = page_data(settings=settings, control=control, readings=readings, start=start, chosen=chosen, units=units)
     data["rows"] = table
-    data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": places} for item in items]}
+    data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": elements} for item in items]}
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(

@@ -130,15 +130,15 @@ class Rows:
 
     def having(self, verdict: str) -> np.ndarray:
         """Whether rows have a verdict, in the shape of the grid."""
-        places = [place for place, name in enumerate(self.names) if name.partition(":")[0] == verdict]
-        return np.isin(self.codes, places).reshape(self.shape)
+        codes = [code for code, name in enumerate(self.names) if name.partition(":")[0] == verdict]
+        return np.isin(self.codes, codes).reshape(self.shape)
 
     def counts(self) -> dict[str, int]:
         """Return the number of rows of each name."""
-        found: Counter[str] = Counter()
+        counts: Counter[str] = Counter()
         for name, n in zip(self.names, np.bincount(self.codes, minlength=len(self.names)).tolist(), strict=True):
-            found[name] += n
-        return dict(+found)
+            counts[name] += n
+        return dict(+counts)
 
     @cached_property
     def need(self) -> Need | None:
@@ -164,8 +164,8 @@ class Rows:
         """Return what one design takes to build, by the names of `boulder_sweep.judge.quantities.QUANTITIES`."""
         columns = self.inputs | {DEPTH: self.depth()}
         names = (*NEEDED, *({BOULDER_MASS} & set(columns)))
-        own = {name: np.broadcast_to(columns[name], self.shape).flat[number] for name in names}
-        return {name: float(value) for name, value in quantities_by(own, self.settings).items()}
+        design = {name: np.broadcast_to(columns[name], self.shape).flat[number] for name in names}
+        return {name: float(value) for name, value in quantities_by(design, self.settings).items()}
 
     def varying(self) -> tuple[str, ...]:
         """Axes of more than one value; of a list, the columns of more than one value."""
@@ -203,12 +203,12 @@ class Rows:
         if not over:
             return holds
         if self.axes:
-            places = tuple(list(self.axes).index(name) for name in over)
-            return np.broadcast_to(holds.all(axis=places, keepdims=True), self.shape)
+            along = tuple(list(self.axes).index(name) for name in over)
+            return np.broadcast_to(holds.all(axis=along, keepdims=True), self.shape)
         boulders = self.boulders(over)
-        found = np.ones(boulders.max() + 1, bool)
-        np.logical_and.at(found, boulders, holds)
-        return found[boulders]
+        held = np.ones(boulders.max() + 1, bool)
+        np.logical_and.at(held, boulders, holds)
+        return held[boulders]
 
     def siblings(self, number: int, kinds: Sequence[str]) -> np.ndarray:
         """Return the rows, in ascending order, that differ from one in nothing but some conditions."""
@@ -218,8 +218,8 @@ class Rows:
             return np.flatnonzero(boulders == boulders[number])
         here = np.unravel_index(number, self.shape)
         lines = [
-            np.arange(length) if name in over else here[place : place + 1]
-            for place, (name, length) in enumerate(zip(self.axes, self.shape, strict=True))
+            np.arange(length) if name in over else here[k : k + 1]
+            for k, (name, length) in enumerate(zip(self.axes, self.shape, strict=True))
         ]
         return np.sort(np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), self.shape).ravel())
 
@@ -231,20 +231,20 @@ class Rows:
                 # Columns that follow from others may differ in their last digits.
                 values = np.unique(self.inputs[name])
                 apart = np.diff(values, prepend=values[:1]) > 1e-12 * np.abs(values)
-                places = np.cumsum(apart)[np.searchsorted(values, self.inputs[name])]
+                ranks = np.cumsum(apart)[np.searchsorted(values, self.inputs[name])]
                 # Rows that are not computed yet have no inputs: they are no rows of a known boulder.
-                places = np.where(np.isnan(self.inputs[name]), places.max() + 1, places)
-                boulders = np.unique(boulders * (places.max() + 1) + places, return_inverse=True)[1]
+                ranks = np.where(np.isnan(self.inputs[name]), ranks.max() + 1, ranks)
+                boulders = np.unique(boulders * (ranks.max() + 1) + ranks, return_inverse=True)[1]
         return boulders
 
     def margins(self, numbers: np.ndarray) -> np.ndarray:
         """Return the margin of some rows, given in ascending order; NaN for none."""
-        found = np.full(len(numbers), np.nan)
+        margins = np.full(len(numbers), np.nan)
         for table in self.finished.tables(["design_id", "margin"], verify=False):
             ids = table.column("design_id").to_numpy()
             here = np.flatnonzero((numbers >= ids.min(initial=0)) & (numbers <= ids.max(initial=-1)))
-            found[here] = table.column("margin").to_numpy()[np.searchsorted(ids, numbers[here])]
-        return found
+            margins[here] = table.column("margin").to_numpy()[np.searchsorted(ids, numbers[here])]
+        return margins
 
     def row(self, number: int) -> dict[str, Any]:
         """Return one row of the table, None for null.
@@ -254,8 +254,8 @@ class Rows:
         IndexError
             The table does not have this row (yet).
         """
-        found = self.finished.row(number) if isinstance(self.finished, AnswerFile) else read_row(self.folder, number)
-        row: dict[str, Any] = found.to_pylist()[0]
+        table = self.finished.row(number) if isinstance(self.finished, AnswerFile) else read_row(self.folder, number)
+        row: dict[str, Any] = table.to_pylist()[0]
         if BOULDER_MASS in row and BOULDER_MASS not in self.settings["inputs"]:
             del row[BOULDER_MASS]  # answers tell it whether it was given or not
         return row
@@ -306,7 +306,7 @@ def read_rows(folder: Location) -> Rows:
     # Very long axes and the columns of a list are only in the table.
     names_of, long = (given, list | dict) if order == "table" else (order, dict)
     wanted = [name for name in names_of if isinstance(given.get(name), long)]
-    stored = list(dict.fromkeys(own for name in wanted for own in _stored(name)))
+    stored = list(dict.fromkeys(column for name in wanted for column in _stored(name)))
     codes = np.full(finished.rows, 255, np.uint8)
     columns = {name: np.full(finished.rows, np.nan) for name in stored}
     names: list[tuple[str, str]] = []
@@ -329,12 +329,12 @@ def read_rows(folder: Location) -> Rows:
         inputs |= {name: _column(columns, name) for name in wanted}
     else:
         axes = dict(_axes(settings, sets, columns))
-    for place, (axis, values) in enumerate(axes.items()):
+    for index, (axis, values) in enumerate(axes.items()):
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
-            inputs[name] = along.reshape([-1 if k == place else 1 for k in range(len(axes))])
-    told = flag_counts(flags.items()) if flags else {}
+            inputs[name] = along.reshape([-1 if k == index else 1 for k in range(len(axes))])
+    by_flag = flag_counts(flags.items()) if flags else {}
     words, robustness = zip(*names, (NOT_YET, ""), strict=True)
-    return Rows(folder, finished, words, codes, told, dict(grades), axes, sets, inputs, robustness)
+    return Rows(folder, finished, words, codes, by_flag, dict(grades), axes, sets, inputs, robustness)
 
 
 def _check_whole(file: AnswerFile, path: Location) -> None:
@@ -349,21 +349,21 @@ def _check_whole(file: AnswerFile, path: Location) -> None:
 
 def _inputs_of(table: pa.Table, given: dict[str, Any]) -> dict[str, Any]:
     """Return the inputs of answers as those of a list of designs; what follows from others is left out."""
-    found: dict[str, Any] = {}
+    inputs: dict[str, Any] = {}
     for name in (name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in table.column_names):
         optional = name in OPTIONAL_COLUMNS and name not in given
         if not (optional or isinstance(given.get(name), str)):
             values = table[name].unique().to_pylist()
-            found[name] = values if len(values) > 1 else values[0]
-    return found
+            inputs[name] = values if len(values) > 1 else values[0]
+    return inputs
 
 
 def _sets(settings: dict[str, Any]) -> Iterator[tuple[str, NamedSets]]:
     """Yield the axes that are named sets, each with the inputs that it gives."""
     given, order = settings["inputs"], settings["order"]
     for axis, names in settings.get("labels", {}).items():
-        own = {name: value for name, value in given.items() if isinstance(value, list) and name not in order}
-        inputs = {name: np.array(value) for name, value in own.items() if BY_NAME[name].section == axis}
+        listed = {name: value for name, value in given.items() if isinstance(value, list) and name not in order}
+        inputs = {name: np.array(value) for name, value in listed.items() if BY_NAME[name].section == axis}
         yield axis, NamedSets(tuple(names), inputs)
 
 
@@ -383,13 +383,13 @@ def _axes(
     given = settings["inputs"]
     counted_by = [(given | settings.get("labels", {}))[name] for name in settings["order"]]
     lengths = [int(axis["count"]) if isinstance(axis, dict) else len(axis) for axis in counted_by]
-    for place, (name, length) in enumerate(zip(settings["order"], lengths, strict=True)):
+    for k, (name, length) in enumerate(zip(settings["order"], lengths, strict=True)):
         if name in sets:
             yield name, np.arange(length)
         elif isinstance(given[name], list):
             yield name, np.array(given[name])
         else:
-            step = int(np.prod(lengths[place + 1 :], dtype=np.int64))
+            step = int(np.prod(lengths[k + 1 :], dtype=np.int64))
             yield name, _column(columns, name)[: step * length : step]
 
 
@@ -412,12 +412,12 @@ def _codes(table: Any, names: list[tuple[str, str]], *, asked: bool) -> np.ndarr
     reasons = pc.coalesce(grades.cast("string"), reasons.cast("string")).dictionary_encode()
     whys = reasons.dictionary.to_pylist()
     pairs = verdicts.indices.to_numpy().astype(np.int64) * max(len(whys), 1) + reasons.indices.to_numpy()
-    place = np.zeros(int(pairs.max(initial=0)) + 1, np.uint8)
+    codes = np.zeros(int(pairs.max(initial=0)) + 1, np.uint8)
     for pair in np.unique(pairs):
         verdict, why = verdicts.dictionary[int(pair) // len(whys)].as_py(), whys[int(pair) % len(whys)]
         grade = why if verdict == "pass" else ""
         name = f"{verdict}: {why}" if why and (asked or not grade) else verdict
         if (name, grade) not in names:
             names.append((name, grade))
-        place[pair] = names.index((name, grade))
-    return place[pairs]
+        codes[pair] = names.index((name, grade))
+    return codes[pairs]

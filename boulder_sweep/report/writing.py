@@ -267,9 +267,9 @@ def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
 def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tuple[str, str]]:
     """Return the origin of the results, and how to reproduce them."""
     used = identity["versions"]
-    found = [(f"version of {name}", used[name]) for name in PACKAGES if name in used]
-    found += [(f"hash of the {what}", identity[f"{what}_sha256"]) for what in ("settings", "kernels")]
-    return [*found, *((name, printable(text)) for name, text in (("table", out), ("command", command)) if text)]
+    facts = [(f"version of {name}", used[name]) for name in PACKAGES if name in used]
+    facts += [(f"hash of the {what}", identity[f"{what}_sha256"]) for what in ("settings", "kernels")]
+    return [*facts, *((name, printable(text)) for name, text in (("table", out), ("command", command)) if text)]
 
 
 def _written(page: Path, text: str) -> Path:
@@ -300,10 +300,10 @@ def browser() -> str:
     if named:
         return named
     folders = [Path.home() / folder for folder in PLAYWRIGHT_FOLDERS]
-    found = [path for folder in folders for pattern in PLAYWRIGHT for path in sorted(folder.glob(pattern))]
-    if not found:
+    executables = [path for folder in folders for pattern in PLAYWRIGHT for path in sorted(folder.glob(pattern))]
+    if not executables:
         raise ReportError(f"a PDF is printed by Chromium, which was not found: {HELP}")
-    return str(found[-1])
+    return str(executables[-1])
 
 
 def printed(html: str) -> bytes:

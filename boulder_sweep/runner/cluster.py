@@ -89,8 +89,8 @@ class Cluster:
             raise BackendError(f"no Dask scheduler answers at {scheduler}: {one_line(problem)}") from problem
         try:
             _wait_for_a_worker(client, scheduler)
-            found, self.silent = answers(client, fingerprint, CONNECT_S)
-            check_fingerprints(found)
+            fingerprints, self.silent = answers(client, fingerprint, CONNECT_S)
+            check_fingerprints(fingerprints)
         except TimeoutError as silence:
             client.close(timeout=2)
             raise ClusterLostError(f"the connection to the Dask scheduler at {scheduler} was lost") from silence
@@ -115,11 +115,11 @@ class Cluster:
 
     def tasks_of(self, workers: Collection[str]) -> set[str]:
         """Return the keys of the tasks that workers have, and of the results that they hold; raises as `threads`."""
-        found: set[str] = set()
+        tasks: set[str] = set()
         for question in (self.client.scheduler.processing, self.client.scheduler.has_what):
             for worker, keys in self._asked(question).items():
-                found.update(keys if worker in workers else ())
-        return found
+                tasks.update(keys if worker in workers else ())
+        return tasks
 
     def _asked(self, question: Callable[[], Any]) -> Any:
         """Ask the scheduler."""
@@ -171,9 +171,9 @@ def no_worker_text(address: str | None) -> str:
 
 def _silenced_loggers() -> dict[str, int]:
     """Silence the loggers of Dask, whose messages the notes of a run replace; return their levels."""
-    own = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
     levels = {}
-    for name in (*own, "tornado.application", "asyncio"):
+    for name in (*names, "tornado.application", "asyncio"):
         logger = logging.getLogger(name)
         levels[name] = logger.level
         logger.setLevel(logging.CRITICAL + 1)
@@ -225,12 +225,12 @@ def fingerprint() -> Fingerprint:
     return versions(), kernels_sha256(), rules_sha256()
 
 
-def check_fingerprints(found: Mapping[str, Any]) -> None:
+def check_fingerprints(fingerprints: Mapping[str, Any]) -> None:
     """Refuse workers whose rows could differ from those of this machine; one that leaves meanwhile does not matter.
 
     Parameters
     ----------
-    found
+    fingerprints
         What every worker has answered to `fingerprint`, or the exception.
 
     Raises
@@ -239,7 +239,7 @@ def check_fingerprints(found: Mapping[str, Any]) -> None:
         Names them.
     """
     here, different = fingerprint(), []
-    for address, there in found.items():
+    for address, there in fingerprints.items():
         if isinstance(there, Exception):
             if not isinstance(there, OSError):
                 raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")

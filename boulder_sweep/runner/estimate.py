@@ -38,7 +38,7 @@ _SHARE = 0.05
 _SAMPLE_ROWS = (1536, 8192)
 """Rows of the largest sample: fewer take more time and more bytes per row than the whole table."""
 _STRETCHES = 24
-"""Places all over the table from which a sample takes consecutive rows, equally many from each."""
+"""Positions all over the table from which a sample takes consecutive rows, equally many from each."""
 _GROWTH = 8
 """Each sample has up to so many times the rows of the one before, as far as their time allows."""
 _BYTES_IN_PROGRESS = 400
@@ -103,18 +103,18 @@ class Estimate:
     @property
     def objections(self) -> list[str]:
         """List what does not fit, with numbers; empty if everything fits."""
-        found = []
+        objections = []
         if self.disk_free_bytes is not None and self.disk_bytes > self.disk_free_bytes:
-            found.append(
+            objections.append(
                 f"the table of {self.rows:,} rows needs about {size_text(self.disk_bytes)} of disk, "
                 f"and {size_text(self.disk_free_bytes)} are free"
             )
         if self.memory_free_bytes is not None and self.memory_bytes > self.memory_free_bytes:
-            found.append(
+            objections.append(
                 f"{self.jobs} workers need about {size_text(self.memory_bytes)} of memory, "
                 f"and {size_text(self.memory_free_bytes)} are available"
             )
-        return found
+        return objections
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -178,12 +178,12 @@ def _larger_sample(size: int, seconds_per_row: float, rows: int) -> int:
 
 
 def _spread_rows(rows: int, count: int) -> np.ndarray:
-    """Return numbers of about so many rows, ascending, int64: short stretches from places all over a table."""
+    """Return numbers of about so many rows, ascending, int64: short stretches from all over a table."""
     if count >= rows:
         return np.arange(rows, dtype=np.int64)
     stretch = -(-count // _STRETCHES)
-    places = (0.5 + _GOLDEN * np.arange(-(-count // stretch))) % 1.0
-    starts = (places * (rows - stretch)).astype(np.int64)
+    positions = (0.5 + _GOLDEN * np.arange(-(-count // stretch))) % 1.0
+    starts = (positions * (rows - stretch)).astype(np.int64)
     return np.unique(starts[:, np.newaxis] + np.arange(stretch))
 
 
@@ -273,8 +273,8 @@ def _share_in_contact(sweep: Sweep) -> float:
     """Share of some rows all over a table in which the truck meets the boulder."""
     count = min(sweep.n_designs, _MOST_LOOKED_AT)
     met = 0
-    for place in range(count):
-        row = place * sweep.n_designs // count
+    for k in range(count):
+        row = k * sweep.n_designs // count
         columns = sweep.block(row, row + 1).columns
         height, depth, bumper = (
             columns[name].to_numpy()[0] for name in ("boulder_height_m", "embedment_depth_m", "bumper_height_m")
@@ -312,10 +312,10 @@ def _disk_free(out: Location) -> int | None:
     """Free space on the disk where a folder is, or would be created; None for an object store."""
     if isinstance(out, RemotePath):
         return None
-    place = out
-    while not place.exists() and place != place.parent:
-        place = place.parent
-    return shutil.disk_usage(place).free
+    folder = out
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return shutil.disk_usage(folder).free
 
 
 def peak_memory() -> int:
@@ -324,14 +324,14 @@ def peak_memory() -> int:
     Linux reports it in ``/proc``; the value of `getrusage` includes the process that started this one, such as a
     notebook with large tables.
     """
-    peak = _own_memory("VmHWM")
+    peak = _process_memory("VmHWM")
     if peak is None:
         most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return most if sys.platform == "darwin" else most * 1024
     return peak
 
 
-def _own_memory(which: str) -> int | None:
+def _process_memory(which: str) -> int | None:
     """Return an entry of Linux on the memory of this process [bytes]; None on other systems."""
     try:
         return int(Path("/proc/self/status").read_text().split(f"{which}:")[1].split()[0]) * 1024
@@ -346,7 +346,7 @@ def _memory_free() -> int | None:
         free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
     except (OSError, StopIteration, ValueError):
         return None
-    free += _own_memory("VmRSS") or 0
+    free += _process_memory("VmRSS") or 0
     for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         try:
             free = min(free, int(Path(name).read_text()))

@@ -194,19 +194,19 @@ def unfold_scan(boulder: Mapping, folder: Path) -> Scan:
 
     try:
         metres = float(factor(words.get("unit", "m"), "m"))
-        found = scanned(folder / words["file"], metres=metres, mass_kg=mass_kg)
-        standing = found.stone.standing(words["up"], words["facing"])
+        scan = scanned(folder / words["file"], metres=metres, mass_kg=mass_kg)
+        standing = scan.stone.standing(words["up"], words["facing"])
     except (ScanError, UnitError) as error:
         raise wrong(entry.value.position, str(error)) from None
-    profile, place = standing.profile, entry.position
+    profile, position = standing.profile, entry.position
     if mass_kg is not None:
-        boulder.entries["density"] = Entry("density", place, Scalar(place, f"{found.density_kg_m3!r} kg/m^3"))
+        boulder.entries["density"] = Entry("density", position, Scalar(position, f"{scan.density_kg_m3!r} kg/m^3"))
     points: list[Node] = []
     for values in zip(profile.height, profile.width, profile.near, profile.far, strict=True):
         texts = (f"{float(value)!r} m" for value in values)
-        points.append(block_of(place, dict(zip(("height", "width", "near", "far"), texts, strict=True))))
-    boulder.entries["profile"] = Entry("profile", place, Sequence(place, points))
-    return Scan(words["file"], found.sha256, standing.up, standing.facing, standing.cut_m)
+        points.append(block_of(position, dict(zip(("height", "width", "near", "far"), texts, strict=True))))
+    boulder.entries["profile"] = Entry("profile", position, Sequence(position, points))
+    return Scan(words["file"], scan.sha256, standing.up, standing.facing, standing.cut_m)
 
 
 def _read_scan_words(node: Node) -> dict[str, str]:

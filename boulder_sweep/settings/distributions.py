@@ -98,7 +98,7 @@ class SetDistributions:
     Attributes
     ----------
     section : str
-        ``soil`` or ``vehicle``; under this name a row carries the place of its set.
+        ``soil`` or ``vehicle``; under this name a row carries the index of its set.
     each : tuple of Distribution or None
         In the order of the sets; None where a set gives a value.
     """
@@ -109,15 +109,15 @@ class SetDistributions:
     @property
     def position(self) -> Position:
         """Where the first of them stands in the file."""
-        return next(own.position for own in self.each if own is not None)
+        return next(spread.position for spread in self.each if spread is not None)
 
     def words(self, unit: str) -> str:
         """Return kind and spread of each in words; `unit` is that of the column."""
-        return "; ".join("certain" if own is None else own.words(unit) for own in self.each)
+        return "; ".join("certain" if spread is None else spread.words(unit) for spread in self.each)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what is given as plain data."""
-        return {"sets": [None if own is None else own.to_dict() for own in self.each]}
+        return {"sets": [None if spread is None else spread.to_dict() for spread in self.each]}
 
 
 @dataclass(frozen=True, eq=False)

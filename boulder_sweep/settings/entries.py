@@ -297,6 +297,6 @@ def _one_of_set(node: Node, field: fields.Field) -> Input:
 
 def _axis_of_sets(section: str, leaves: list[Input], position: Position) -> Input:
     """Return the values that the named sets give for an input, as an axis."""
-    each = tuple(own if isinstance(own := leaf.distribution, Distribution) else None for leaf in leaves)
+    each = tuple(one if isinstance(one := leaf.distribution, Distribution) else None for leaf in leaves)
     spread = SetDistributions(section, each) if any(each) else None
     return Input(np.concatenate([leaf.values for leaf in leaves]), True, position, spread)

@@ -188,21 +188,21 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
 
 
 def _read_value(text: str, name: str, position: Position, problems: ProblemList) -> Node | None:
-    found = ProblemList()
+    inner = ProblemList()
     try:
-        value = parse_node(text, position.file, found)
+        value = parse_node(text, position.file, inner)
     except SettingsError:
-        value = None  # its problems are in `found`
-    for problem in found.problems:
+        value = None  # its problems are in `inner`
+    for problem in inner.problems:
         problems.add(position, name, problem.message)
     if value is None:
-        return None if found else Scalar(position, "")
+        return None if inner else Scalar(position, "")
     _move(value, position)
     return value
 
 
 def _move(node: Node, position: Position) -> None:
-    """Give a whole tree the place of its option: a line number within an option means nothing."""
+    """Give a whole tree the position of its option: a line number within an option means nothing."""
     node.position = position
     if isinstance(node, Scalar):
         return
@@ -260,7 +260,7 @@ def _read_name(entries: Entries) -> str:
 
 def _read_heading(entries: Entries) -> Heading:
     """Return the heading in a file; mistakes go to its problems."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for inner in entries.block(SECTION, Heading._fields) or ():
         path, value = f"{SECTION}.{shorten(inner.key)}", inner.value
         if inner.key not in Heading._fields:
@@ -270,8 +270,8 @@ def _read_heading(entries: Entries) -> Heading:
         elif wrong := wrong_with(value.text):
             entries.problems.add(value.position, path, wrong)
         else:
-            found[inner.key] = value.text.strip()
-    return Heading(**found)
+            texts[inner.key] = value.text.strip()
+    return Heading(**texts)
 
 
 def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, ...]) -> Sweep:

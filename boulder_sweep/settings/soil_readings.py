@@ -77,12 +77,12 @@ def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[di
     items = node.items if isinstance(node, Sequence) and node.unit is None else [node]
     if not items:
         raise wrong(node.position, "the list is empty; give at least one reading")
-    found, mistakes = [], Mistakes()
+    readings, mistakes = [], Mistakes()
     for item in items:
         with mistakes:
-            found.append(_reading(item, method, density_kg_m3))
+            readings.append(_reading(item, method, density_kg_m3))
     mistakes.raise_if_any()
-    return found
+    return readings
 
 
 def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, float]:
@@ -129,7 +129,7 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
         With every mistake.
     """
     readings = readings_of(node, method, density_kg_m3)
-    angle, sd = min(own["friction_angle_deg"] for own in readings), _SD_DEG[method]
+    angle, sd = min(reading["friction_angle_deg"] for reading in readings), _SD_DEG[method]
     data: dict[str, Any] = {"method": method, "source": SOURCES[method], "readings": readings}
     if "friction_angle" in lacking:
         data |= {"friction_angle_deg": angle, "friction_angle_sd_deg": sd}
@@ -148,7 +148,7 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
 
 def soil_words(data: dict[str, Any], units: str = "si") -> str:
     """Return in one line what is taken of readings, by what `soil_of` returned."""
-    weakest = min(data["readings"], key=lambda own: own["friction_angle_deg"])
+    weakest = min(data["readings"], key=lambda reading: reading["friction_angle_deg"])
     count = len(data["readings"])
     of = f", the weakest of {count} readings" if count > 1 else ""
     parts = []
@@ -206,18 +206,18 @@ def unfold_soils(root: Mapping, listed: Collection[str], mistakes: Mistakes) -> 
             continue
         entry = soil.entries[given[0]]
         lacking = [key for key in SOIL_KEYS if key not in soil.entries and key not in listed]
-        found: dict[str, Any] = {}
+        constants: dict[str, Any] = {}
         with mistakes:
             if len(given) > 1:
                 raise wrong(soil.entries[given[1]].position, f"give one of {', '.join(given)}")
             if "water_table" in soil.entries and "subgrade_reaction" in lacking:
                 message = "the API curve is that of dry sand; with a water table give soil.subgrade_reaction"
                 raise wrong(entry.position, message)
-            found = soil_of(entry.value, given[0], lacking, _plain_density(soil))
-            data.append(soil.label | found)
+            constants = soil_of(entry.value, given[0], lacking, _plain_density(soil))
+            data.append(soil.label | constants)
         for key in given[1:]:
             del soil.entries[key]
-        soil.replace(given[0], _soil_entries(entry, found))
+        soil.replace(given[0], _soil_entries(entry, constants))
     return data
 
 

@@ -140,8 +140,8 @@ def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mista
         try:
             values[entry.key] = read_single(entry.value, field)
         except LeafError as error:
-            for found in error.mistakes:
-                mistakes.add(found.position, f"{entry.key}: {found.message}")
+            for mistake in error.mistakes:
+                mistakes.add(mistake.position, f"{entry.key}: {mistake.message}")
     return values
 
 

@@ -86,10 +86,10 @@ def _unfold_stages(vehicle: Mapping, spring: Sequence) -> None:
 
 def _entries_of_stages(stages: list[Mapping]) -> dict[str, Entry]:
     """Return the entries that the stages stand for."""
-    found = {"spring": stages[0].entries["stiffness"]}
+    entries = {"spring": stages[0].entries["stiffness"]}
     for stage in stages[1:]:
-        found |= {"second_spring_from": stage.entries["beyond"], "second_spring": stage.entries["stiffness"]}
-    return {key: Entry(key, entry.position, entry.value) for key, entry in found.items()}
+        entries |= {"second_spring_from": stage.entries["beyond"], "second_spring": stage.entries["stiffness"]}
+    return {key: Entry(key, entry.position, entry.value) for key, entry in entries.items()}
 
 
 class NoApproachError(ValueError):
@@ -274,13 +274,13 @@ def unfold_approaches(root: Mapping, mistakes: Mistakes) -> list[dict[str, Any]]
         entry = vehicle.entries.get(APPROACH)
         if entry is None:
             continue
-        found: list[Entry] = []
+        new: list[Entry] = []
         with mistakes:
             approach = read_approach(entry.value)
             if SPEED in vehicle.entries:
                 mistakes.add(entry.position, f"give {SPEED} or {APPROACH}, not both")
             data.append(vehicle.label | approach_data(approach))
             speed = Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s")
-            found = [Entry(SPEED, entry.position, speed)]
-        vehicle.replace(APPROACH, found)
+            new = [Entry(SPEED, entry.position, speed)]
+        vehicle.replace(APPROACH, new)
     return data

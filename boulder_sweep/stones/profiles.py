@@ -51,15 +51,15 @@ class Sections:
 
     def turned(self, quarters: int) -> Sections:
         """Return the sections in axes that are turned anticlockwise by some quarters of a circle."""
-        found = self
+        sections = self
         for _ in range(quarters % 4):
             # The new x is the old y, the new y is minus the old x.
-            middle = np.stack([found.middle[:, 1], -found.middle[:, 0]], axis=1)
-            low = np.stack([found.low[:, 1], -found.high[:, 0]], axis=1)
-            high = np.stack([found.high[:, 1], -found.low[:, 0]], axis=1)
-            second = found.second[:, ::-1]
-            found = Sections(found.height, found.area, middle, low, high, second)
-        return found
+            middle = np.stack([sections.middle[:, 1], -sections.middle[:, 0]], axis=1)
+            low = np.stack([sections.low[:, 1], -sections.high[:, 0]], axis=1)
+            high = np.stack([sections.high[:, 1], -sections.low[:, 0]], axis=1)
+            second = sections.second[:, ::-1]
+            sections = Sections(sections.height, sections.area, middle, low, high, second)
+        return sections
 
 
 def sections_of(solid: Solid, axes: np.ndarray, heights: np.ndarray) -> Sections:
@@ -77,16 +77,16 @@ def sections_of(solid: Solid, axes: np.ndarray, heights: np.ndarray) -> Sections
     count = len(heights)
     area = np.zeros(count)
     middle, least, most, second = (np.zeros((count, 2)) for _ in range(4))
-    for place, (start, end) in enumerate(_cuts(solid, axes, heights)):
+    for k, (start, end) in enumerate(_cuts(solid, axes, heights)):
         if not len(start):
             continue
         cross = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
-        area[place] = 0.5 * cross.sum()
-        if area[place] > 0.0:
-            middle[place] = ((start + end) * cross[:, None]).sum(axis=0) / (6.0 * area[place])
+        area[k] = 0.5 * cross.sum()
+        if area[k] > 0.0:
+            middle[k] = ((start + end) * cross[:, None]).sum(axis=0) / (6.0 * area[k])
             squares = start * start + start * end + end * end
-            second[place] = (squares * cross[:, None]).sum(axis=0) / 12.0
-        least[place], most[place] = start.min(axis=0), start.max(axis=0)
+            second[k] = (squares * cross[:, None]).sum(axis=0) / 12.0
+        least[k], most[k] = start.min(axis=0), start.max(axis=0)
     return Sections(np.asarray(heights, dtype=float), area, middle, least, most, second)
 
 
@@ -253,8 +253,8 @@ def fitted(sections: Sections, foot: float, top: float, volume: float) -> Profil
     weights /= weights.sum()
     size = float(max(length.max(), width.max()))
     points = np.concatenate([[0.0], 0.5 * (z[:-1] + z[1:]), [top - foot]])
-    for places in _divisions(z, curves, weights):
-        knots = points[places]
+    for bounds in _divisions(z, curves, weights):
+        knots = points[bounds]
         values = _least_squares(z, curves, weights, knots, LEAST_SIDE * size)
         missed = _hats(z, knots) @ values - curves
         error = float(np.sqrt((weights[:, None] * missed**2).sum() / 3.0))
@@ -273,17 +273,17 @@ def _hats(z: np.ndarray, knots: np.ndarray) -> np.ndarray:
 
 
 def _divisions(z: np.ndarray, curves: np.ndarray, weights: np.ndarray) -> Iterator[list[int]]:
-    """Yield where n sections are divided into one piece, two, ... with the least squared error.
+    """Yield the bounds that divide n sections into one piece, two, ... with the least squared error.
 
-    Every piece is fitted by a line of its own. A place is the number of sections below.
+    Every piece is fitted by a line of its own. A bound is the number of sections below it.
     """
     costs = _costs(z, curves, weights)
     best, before = costs[0], [np.zeros(len(z) + 1, dtype=int)]
     for pieces in range(1, min(MOST_PIECES, len(z) // LEAST_SECTIONS) + 1):
-        places = [len(z)]
+        bounds = [len(z)]
         for chosen in reversed(before):
-            places.append(int(chosen[places[-1]]))
-        yield places[::-1]
+            bounds.append(int(chosen[bounds[-1]]))
+        yield bounds[::-1]
         if pieces < MOST_PIECES:
             total = best[:, None] + costs
             before.append(total.argmin(axis=0))
@@ -309,8 +309,8 @@ def _costs(z: np.ndarray, curves: np.ndarray, weights: np.ndarray) -> np.ndarray
         for curve in (curves - curves.mean(axis=0)).T:
             y, yy, yz = sums(curve), sums(curve * curve), sums(curve * z)
             total += yy - y * y / n - (yz - s * y / n) ** 2 / spread
-    place = np.arange(len(n))
-    return np.where(place[None, :] - place[:, None] >= LEAST_SECTIONS, np.maximum(total, 0.0), np.inf)
+    index = np.arange(len(n))
+    return np.where(index[None, :] - index[:, None] >= LEAST_SECTIONS, np.maximum(total, 0.0), np.inf)
 
 
 def _least_squares(

@@ -169,7 +169,7 @@ def _check_size(path: Path, used: np.ndarray, metres: float) -> None:
     side = float(np.ptp(used, axis=0).max())
     if LEAST_SIZE_M <= side * metres <= LARGEST_SIZE_M:
         return
-    fitting = [name for name, own in OTHER_UNITS.items() if 0.5 <= side * own <= 6.0 and own != metres]
+    fitting = [name for name, unit in OTHER_UNITS.items() if 0.5 <= side * unit <= 6.0 and unit != metres]
     advice = f"; if the scan is in {fitting[0]}, add its unit: {fitting[0]}" if fitting else ""
     raise ScanError(
         f"{path}: its largest side is {side * metres:.4g} m; stones of {LEAST_SIZE_M:g} to {LARGEST_SIZE_M:g} m are "
@@ -224,7 +224,7 @@ def _faces_of_glb(data: bytes) -> int:
     if sum(counts) > 20 * MAX_FACES:
         return sum(counts)
     faces = [
-        sum(counts[own.get("indices", own["attributes"]["POSITION"])] // 3 for own in mesh.get("primitives", ()))
+        sum(counts[part.get("indices", part["attributes"]["POSITION"])] // 3 for part in mesh.get("primitives", ()))
         for mesh in header.get("meshes", ())
     ]
     return max(sum(faces[node["mesh"]] for node in nodes if "mesh" in node), max(counts, default=0) // 3)
@@ -236,4 +236,4 @@ _FACES: dict[str, Callable[[bytes], int]] = {
     ".obj": _faces_of_obj,
     ".glb": _faces_of_glb,
 }
-"""How much a file holds, by the end of its name, told from its bytes without loading it."""
+"""How much a file holds, by the end of its name, read from its bytes without loading it."""

@@ -78,17 +78,17 @@ def solid_of(scan: Scan) -> Solid:
         It is flat, holds several bodies, or is too open to be closed.
     """
     repairs: list[str] = []
-    vertices, faces = _merged(scan.vertices, scan.faces)
+    vertices, faces = _merge_points(scan.vertices, scan.faces)
     if len(faces) < 4:
         raise ScanError(f"{scan.file}: has {counted(len(faces), 'face')} with an area; a stone has at least 4")
     faces, crumbs = _largest_body(vertices, faces, scan.file)
     if crumbs:
         repairs.append(f"{_bodies(crumbs)} beside the stone left out")
-    faces, turned = _consistent(faces)
+    faces, turned = _orient_faces(faces)
     if turned:
         repairs.append(f"{counted(turned, 'face')} turned to the side of the others")
     open_volume = abs(_volume(vertices, faces))
-    vertices, faces, closed, holes = _closed(vertices, faces)
+    vertices, faces, closed, holes = _close_holes(vertices, faces)
     if closed > MOST_CLOSED:
         raise ScanError(
             f"{scan.file}: is open: {closed:.0%} of its surface would be added to close it, at most {MOST_CLOSED:.0%} "
@@ -106,12 +106,12 @@ def solid_of(scan: Scan) -> Solid:
     if holes:
         words = f"{counted(holes, 'hole')} closed, {100 * closed:.2g} % of the surface"
         repairs.append(f"{words}, over {100 * abs(volume - open_volume) / volume:.2g} % of the volume")
-    used, places = np.unique(faces, return_inverse=True)
-    vertices, faces = np.ascontiguousarray(vertices[used]), np.ascontiguousarray(places.reshape(-1, 3))
+    used, inverse = np.unique(faces, return_inverse=True)
+    vertices, faces = np.ascontiguousarray(vertices[used]), np.ascontiguousarray(inverse.reshape(-1, 3))
     return Solid(vertices, faces, *_moments(vertices, faces), tuple(repairs), closed)
 
 
-def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _merge_points(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a surface whose points are single and whose faces have an area, each once."""
     import trimesh
 
@@ -144,7 +144,7 @@ def _neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first // 3, second // 3, up[first] == up[second]
 
 
-def _consistent(faces: np.ndarray) -> tuple[np.ndarray, int]:
+def _orient_faces(faces: np.ndarray) -> tuple[np.ndarray, int]:
     """Return faces that all have their outer side on the same side, and how many were turned for it."""
     first, second, same = _neighbours(faces)
     if not same.any():
@@ -164,9 +164,9 @@ def _consistent(faces: np.ndarray) -> tuple[np.ndarray, int]:
         weights = np.asarray(graph[order[1:], before[order[1:]]]).reshape(-1) if len(order) > 1 else np.empty(0)
         for face, parent, weight in zip(order[1:], before[order[1:]], weights, strict=True):
             turn[face] = turn[parent] ^ (weight == 2)
-        own = body == body[start]
-        if 2 * turn[own].sum() > own.sum():
-            turn[own] = ~turn[own]
+        patch = body == body[start]
+        if 2 * turn[patch].sum() > patch.sum():
+            turn[patch] = ~turn[patch]
     faces = faces.copy()
     faces[turn] = faces[turn][:, ::-1]
     return faces, int(turn.sum())
@@ -187,8 +187,8 @@ def _largest_body(vertices: np.ndarray, faces: np.ndarray, file: str) -> tuple[n
     # By the volume of the box around each: a body may be open, and its own volume then says nothing.
     bulk = np.empty(len(names))
     order = np.argsort(body, kind="stable")
-    for place, own in enumerate(np.split(order, np.cumsum(counts)[:-1])):
-        bulk[place] = np.prod(np.ptp(vertices[faces[own]].reshape(-1, 3), axis=0))
+    for k, members in enumerate(np.split(order, np.cumsum(counts)[:-1])):
+        bulk[k] = np.prod(np.ptp(vertices[faces[members]].reshape(-1, 3), axis=0))
     largest = int(bulk.argmax())
     others = float(np.delete(bulk, largest).sum() / max(bulk[largest], 1e-300))
     if others > MOST_CRUMBS:
@@ -199,15 +199,15 @@ def _largest_body(vertices: np.ndarray, faces: np.ndarray, file: str) -> tuple[n
     return faces[body == names[largest]], len(names) - 1
 
 
-def _closed(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int]:
+def _close_holes(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int]:
     """Return a surface without holes, the part of it that was added, and how many holes there were."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     low, high, up = _edges(faces)
     key = low * len(vertices) + high
-    edges, places = np.unique(key, return_inverse=True)
-    balance = np.bincount(places, np.where(up, 1, -1)).astype(np.int64)
+    edges, inverse = np.unique(key, return_inverse=True)
+    balance = np.bincount(inverse, np.where(up, 1, -1)).astype(np.int64)
     rims = np.flatnonzero(balance)
     if not len(rims):
         return vertices, faces, 0.0, 0
@@ -253,5 +253,5 @@ def _moments(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, np.ndarray
     """Return volume, centre of mass, and moments of inertia about it for a density of 1 kg/m^3."""
     from trimesh.triangles import mass_properties
 
-    found = mass_properties(vertices[faces], density=1.0)
-    return float(found.volume), np.asarray(found.center_mass), np.asarray(found.inertia)
+    properties = mass_properties(vertices[faces], density=1.0)
+    return float(properties.volume), np.asarray(properties.center_mass), np.asarray(properties.inertia)

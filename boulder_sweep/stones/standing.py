@@ -201,15 +201,15 @@ class Stone:
             kinds = "one of a, b, c or one of x, y, z each"
             raise ScanError(f"up: {up} and facing: {facing} do not go together: give two different axes, {kinds}")
         if up not in self._ups:
-            self._ups[up] = self._found(up)
-        found = self._ups[up]
-        frame, cut = found.frame, found.cut
+            self._ups[up] = self._set_up(up)
+        upright = self._ups[up]
+        frame, cut = upright.frame, upright.cut
         # The frame is turned by quarters until x points away from the road.
         towards = self._direction(facing) @ frame.T
         quarters = next(k for k, (x, y) in enumerate(((-1, 0), (0, -1), (1, 0), (0, 1))) if _is_nearest(towards, x, y))
         for _ in range(quarters):
             frame = np.stack([frame[1], -frame[0], frame[2]])
-        sections, left = found.sections.turned(quarters), self._left(frame, cut)
+        sections, left = upright.sections.turned(quarters), self._left(frame, cut)
         profile = fitted(sections, cut, self._height(frame[2]), left.volume)
         low, high = sections.low[:, 0], sections.high[:, 0]
         foot = float(((self.solid.vertices - self.solid.centre) @ frame[2]).min())
@@ -217,10 +217,10 @@ class Stone:
             up,
             facing,
             frame,
-            found.stands,
+            upright.stands,
             cut,
             1.0 - left.volume / self.solid.volume,
-            found.rests,
+            upright.rests,
             profile,
             (left.x - profile.foot_x, left.z - foot - cut),
             left.moment,
@@ -233,12 +233,12 @@ class Stone:
         axes, names = (self._box[0], OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
         return (-1.0 if end[0] == "-" else 1.0) * axes[names.index(end[-1])]
 
-    def _found(self, up: str) -> _Up:
+    def _set_up(self, up: str) -> _Up:
         """Return the stone with one end up."""
         frame, stands = self._steadiest(up)
         height = self._height(frame[2])
-        places = (np.arange(SECTIONS) + 0.5) / SECTIONS
-        sections = sections_of(self.solid, frame, places * height)
+        shares = (np.arange(SECTIONS) + 0.5) / SECTIONS
+        sections = sections_of(self.solid, frame, shares * height)
         rests = float(self._resting(frame).area[0] / sections.area.max())
         return _Up(frame, sections, stands, min(rests, 1.0), self._cut(frame, sections))
 
@@ -263,7 +263,7 @@ class Stone:
         if up[-1] in OF_STONE:
             ways += islice(((-normal, True) for normal, stands in parts if stands), CANDIDATES)
         frames = [_frame(upwards, self._direction(beside)) for upwards, _ in ways]
-        rooms = [min(found.high.min(), -found.low.max()) for found in map(self._resting, frames)]
+        rooms = [min(section.high.min(), -section.low.max()) for section in map(self._resting, frames)]
         best = int(np.argmax(np.round(rooms, 6)))
         return frames[best], ways[best][1]
 
@@ -286,8 +286,8 @@ class Stone:
         """Return the share of the volume that the surface encloses twice."""
         axes = self._box[0]
         frames = (axes, axes[[1, 2, 0]], axes[[2, 0, 1]])
-        places = (np.arange(24) + 0.5) / 24
-        return max(doubled_share(self.solid, frame, places * self._height(frame[2])) for frame in frames)
+        shares = (np.arange(24) + 0.5) / 24
+        return max(doubled_share(self.solid, frame, shares * self._height(frame[2])) for frame in frames)
 
     def _cut(self, frame: np.ndarray, sections: Sections) -> float:
         """Return the least cut in whole centimetres after which the stone stands firmly on a foot [m].
@@ -303,8 +303,8 @@ class Stone:
         firm = (sides - 2.0 * np.abs(sections.middle) >= NEARLY * asked).all(axis=1)
         enough = None
         for cut in np.arange(np.floor(MOST_CUT * height / CUT_STEP_M) + 1.0) * CUT_STEP_M:
-            place = int(np.searchsorted(sections.height, cut))
-            if not (wide[place] if enough is None else firm[place]):
+            index = int(np.searchsorted(sections.height, cut))
+            if not (wide[index] if enough is None else firm[index]):
                 continue
             left = self._left(frame, cut)
             profiles = [fitted(sections.turned(k), cut, height, left.volume) for k in range(2)]

@@ -55,13 +55,13 @@ class ScannedStone:
     def cautions(self) -> list[str]:
         """What makes one doubt the figures."""
         low, high = USUAL_ROCK_KG_M3
-        found = []
+        cautions = []
         if not low <= self.density_kg_m3 <= high:
-            found.append(
+            cautions.append(
                 f"its density is {self.density_kg_m3:,.0f} kg/m³, and rock has {low:,.0f} to {high:,.0f}: the mass, "
                 "the scale of the scan or its unit is wrong"
             )
-        return found
+        return cautions
 
     def plot(self, path: str | Path) -> None:
         """Draw the stone with each of its six ends up, from the side and to scale, with its profile.
@@ -93,24 +93,24 @@ class ScannedStone:
             "hull_share": stone.hull_share,
             "centre_m": solid.centre.tolist(),
             "inertia_kg_m2": (self.density_kg_m3 * axes @ solid.inertia @ axes.T).tolist(),
-            "standings": [self._standing(own) for own in (self.standings if standings is None else standings)],
+            "standings": [self._standing(one) for one in (self.standings if standings is None else standings)],
         }
 
-    def _standing(self, own: Standing) -> dict[str, Any]:
+    def _standing(self, standing: Standing) -> dict[str, Any]:
         """Return one way to stand as plain data."""
-        profile = own.profile
+        profile = standing.profile
         points = zip(profile.height, profile.width, profile.near, profile.far, strict=True)
         return {
-            "up": own.up,
-            "facing": own.facing,
-            "stands": own.stands,
-            "cut_m": own.cut_m,
-            "cut_share": own.cut_share,
-            "rests_share": own.rests,
-            "has_foot": own.has_foot,
-            "mass_kg": self.density_kg_m3 * own.volume,
-            "centre_m": list(own.centre),
-            "moment_kg_m2": self.density_kg_m3 * own.moment,
+            "up": standing.up,
+            "facing": standing.facing,
+            "stands": standing.stands,
+            "cut_m": standing.cut_m,
+            "cut_share": standing.cut_share,
+            "rests_share": standing.rests,
+            "has_foot": standing.has_foot,
+            "mass_kg": self.density_kg_m3 * standing.volume,
+            "centre_m": list(standing.centre),
+            "moment_kg_m2": self.density_kg_m3 * standing.moment,
             "profile_error_m": profile.error,
             "profile_moment_kg_m2": self.density_kg_m3 * profile.moment,
             "profile": [dict(zip(POINT, map(float, point), strict=True)) for point in points],

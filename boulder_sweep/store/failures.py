@@ -12,21 +12,21 @@ _LONGEST = 200
 """Most characters of a stranger's records that a message quotes."""
 
 
-def settings_file(place: object) -> str:
-    """Say that a place in which a result is expected is a settings file, and what to do; empty for another."""
-    if not str(place).lower().endswith((".yaml", ".yml")):
+def settings_file(path: object) -> str:
+    """Say that a path at which a result is expected is a settings file, and what to do; empty for another."""
+    if not str(path).lower().endswith((".yaml", ".yml")):
         return ""
-    return f"{place} is a settings file; run it first: sweep run {shlex.quote(str(place))}"
+    return f"{path} is a settings file; run it first: sweep run {shlex.quote(str(path))}"
 
 
 class StoreError(BoulderSweepError):
     """An output folder cannot be used, or can no longer be written."""
 
 
-def refuse_to_guess(place: Location, problem: OSError) -> None:
+def refuse_to_guess(location: Location, problem: OSError) -> None:
     """Raise StoreError where a file is on an object store: what does not answer is not damaged."""
-    if isinstance(place, RemotePath):
-        raise StoreError(f"{place} cannot be read: {problem.strerror}") from None
+    if isinstance(location, RemotePath):
+        raise StoreError(f"{location} cannot be read: {problem.strerror}") from None
 
 
 class OutputExistsError(StoreError):
@@ -84,7 +84,7 @@ class ForeignFilesError(StoreError):
 
 
 class NotASweepError(StoreError):
-    """There is no sweep result at the given place."""
+    """There is no sweep result at the given location."""
 
 
 class OtherVersionError(StoreError):

@@ -267,7 +267,7 @@ def _write_all(descriptor: int, content: memoryview | bytes) -> None:
 
 
 def check_target(target: Location, refusal: type[BoulderSweepError]) -> None:
-    """Check that a file may be written at a place; readers would take one within a result for rows of it.
+    """Check that a file may be written at a location; readers would take one within a result for rows of it.
 
     Parameters
     ----------

@@ -279,12 +279,12 @@ def _is(path: Path, descriptor: int) -> bool:
 def _record(path: RemotePath) -> dict[str, Any] | None:
     """Return what a lock says; None if there is no lock."""
     try:
-        found = json.loads(path.read_bytes(_RECORD_BYTES))
+        record = json.loads(path.read_bytes(_RECORD_BYTES))
     except FileNotFoundError:
         return None
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return record if isinstance(record, dict) else {}
 
 
 def _is_alive(there: dict[str, Any]) -> bool:

@@ -145,8 +145,8 @@ class Manifest:
         for name in sorted(self.parts, key=lambda name: self.parts[name].first):
             groups.setdefault(self.parts[name].first // self.rows_per_part, []).append(name)
         whole = []
-        for place, names in groups.items():
-            rows = min(self.rows_per_part, self.rows - place * self.rows_per_part)
+        for number, names in groups.items():
+            rows = min(self.rows_per_part, self.rows - number * self.rows_per_part)
             if len(names) > 1 and sum(self.parts[name].rows for name in names) == rows:
                 whole.append(names)
         return whole
@@ -229,14 +229,14 @@ def load(folder: Location) -> Manifest:
     path = folder / MANIFEST_NAME
     try:
         with storage_of(folder).open_manifest() as file:  # pyarrow takes no names that are not Unicode
-            found = pq.read_metadata(file)
+            footer = pq.read_metadata(file)
     except (FileNotFoundError, NotADirectoryError):
         raise failures.NotASweepError(_no_result(folder)) from None
     except (OSError, pa.ArrowException) as problem:
         raise failures.DamagedError(f"{path} cannot be read: {problem}") from problem
     except ValueError as problem:  # a name of a column that is no text
         raise failures.ImpossibleRecordsError(path, str(problem)) from None
-    value = (found.metadata or {}).get(_KEY, b"")
+    value = (footer.metadata or {}).get(_KEY, b"")
     checksum, text = value[:64], value[64:]
     if hashlib.sha256(text).hexdigest().encode() != checksum:
         raise failures.DamagedError(
@@ -252,7 +252,7 @@ def load(folder: Location) -> Manifest:
     try:
         manifest = _from_json(content)
         _check_claims(path, manifest)
-        manifest.columns = tuple(found.schema.names)
+        manifest.columns = tuple(footer.schema.names)
         manifest.differing = [*_differing_columns(manifest), *manifest.differing]
         return manifest
     except ValueError as unfamiliar:
@@ -274,9 +274,9 @@ def _check_claims(path: Location, manifest: Manifest) -> None:
         raise failures.ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
     for name, part in (*parts.items(), *([] if merge is None else [(merge.name, merge.part)])):
         within = 0 <= part.first < part.stop <= rows and part.first // size == (part.stop - 1) // size
-        own = part_name(part.first, part.stop, rows) if within else ""
+        expected = part_name(part.first, part.stop, rows) if within else ""
         # The first tables named the first row only. More zeros would sort otherwise than the rows do.
-        if not within or name not in (own, own.rpartition("-")[0] + PART_SUFFIX):
+        if not within or name not in (expected, expected.rpartition("-")[0] + PART_SUFFIX):
             raise failures.ImpossibleRecordsError(
                 path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}"
             )
@@ -296,7 +296,7 @@ def _check_claims(path: Location, manifest: Manifest) -> None:
     _check_kinds(path, "identity", manifest.identity, IDENTITY_KINDS)
 
 
-def check_own(manifest: Manifest, folder: Location) -> None:
+def check_resumable(manifest: Manifest, folder: Location) -> None:
     """Check that a run of this version may go on with a table.
 
     Raises

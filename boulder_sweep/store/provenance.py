@@ -111,7 +111,7 @@ def identity(
         Plain data with the keys ``settings``, ``readings``, ``control``, ``accuracy``, ``versions``,
         ``settings_sha256``, ``kernels_sha256``, ``rules_sha256``.
     """
-    found = {
+    content = {
         "settings": settings,
         "readings": readings,
         "control": control,
@@ -121,7 +121,7 @@ def identity(
         "kernels_sha256": kernels_sha256(),
         "rules_sha256": rules_sha256(),
     }
-    return json.loads(canonical(found))  # as it will be read back from a file
+    return json.loads(canonical(content))  # as it will be read back from a file
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
@@ -175,14 +175,14 @@ def file_metadata(
         How many verdicts of a sample small changes would change, see `boulder_sweep.judge.firmness`.
     """
     entries = {**identity_, "repeat": repeat, "commit": commit(), "firmness": firmness}
-    found = {
+    metadata = {
         f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(
             errors="backslashreplace"
         )
         for key, value in entries.items()
         if value is not None
     }
-    return found | cpu_metadata()
+    return metadata | cpu_metadata()
 
 
 def cpu_metadata() -> dict[bytes, bytes]:
@@ -223,8 +223,8 @@ def _version(package: str) -> str:
     imported only where there is none: it takes two megabytes and a twentieth of the time of a short run.
     """
     folders = f"{package.replace('-', '_')}-*.dist-info"
-    for place in sys.path:
-        for folder in Path(place).glob(folders):
+    for path in sys.path:
+        for folder in Path(path).glob(folders):
             return folder.stem.partition("-")[2]
     from importlib.metadata import PackageNotFoundError, version
 
@@ -237,10 +237,10 @@ def _version(package: str) -> str:
 @cache
 def kernels_sha256() -> str:
     """Hash of the sources of the compiled kernels, as `boulder_kernels.source_hash`, without the import of NumPy."""
-    found = find_spec("boulder_kernels")
-    if found is None or found.origin is None:
+    spec = find_spec("boulder_kernels")
+    if spec is None or spec.origin is None:
         raise FileNotFoundError("the sources of boulder_kernels are missing")
-    return _sources_sha256(sorted(Path(found.origin).parent.glob("*.py")))
+    return _sources_sha256(sorted(Path(spec.origin).parent.glob("*.py")))
 
 
 @cache
@@ -248,10 +248,10 @@ def rules_sha256() -> str:
     """Hash of the sources that turn settings into designs and outcomes into verdicts."""
     sources = []
     for pattern in _DECIDING_SOURCES:
-        found = sorted(_PACKAGE_FOLDER.glob(pattern))
-        if not found:
+        paths = sorted(_PACKAGE_FOLDER.glob(pattern))
+        if not paths:
             raise FileNotFoundError(f"{_PACKAGE_FOLDER / pattern}: sources that decide a row are missing")
-        sources += found
+        sources += paths
     return _sources_sha256(sources)
 
 

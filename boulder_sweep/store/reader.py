@@ -183,7 +183,7 @@ class FinishedRows:
             warnings.warn(f"{folder} {'; it '.join(said)}", OlderRulesWarning, stacklevel=2)
         self._folder = folder
         self._schemas: dict[str, pa.Schema] = {}
-        self._places = _Places(manifest)
+        self._index = _Index(manifest)
         self._ranges = manifest.ranges
 
     def _other_columns(self, today: Sequence[str]) -> Iterator[str]:
@@ -241,21 +241,21 @@ class FinishedRows:
 
     def _between(self, first: int, stop: int, columns: list[str] | None, verify: bool) -> list[pa.Table]:
         """Read the rows [first, stop)."""
-        found = []
+        tables = []
         while first < stop:
-            name, part, file = self._opened(first)
+            name, part, file = self._open_part(first)
             with file:
                 table = self._read(file, name, part, columns, verify)
             end = min(stop, part.stop)
-            found.append(table.slice(first - part.first, end - first))
+            tables.append(table.slice(first - part.first, end - first))
             first = end
-        return found
+        return tables
 
-    def _opened(self, row: int) -> tuple[str, Part, IO[bytes]]:
+    def _open_part(self, row: int) -> tuple[str, Part, IO[bytes]]:
         """Open the file that holds a row. An open file stays readable, even if it is removed."""
-        places = self._places
+        index = self._index
         while True:
-            for name, part in places.of(row):
+            for name, part in index.of(row):
                 try:
                     return name, part, (self._folder / name).open("rb")
                 except FileNotFoundError:
@@ -263,13 +263,13 @@ class FinishedRows:
                 except OSError as problem:
                     refuse_to_guess(self._folder / name, problem)
                     raise self._damaged({name: str(problem.strerror)}) from problem
-            before, places = places, _Places(load(self._folder))
-            if places.manifest.identity != self.identity:
+            before, index = index, _Index(load(self._folder))
+            if index.manifest.identity != self.identity:
                 raise StoreError(f"{self._folder} was replaced by the result of another sweep while it was read")
-            if places.manifest == before.manifest:
-                name = next((name for name, _ in places.of(row)), f"the part with row {row}")
+            if index.manifest == before.manifest:
+                name = next((name for name, _ in index.of(row)), f"the part with row {row}")
                 raise self._damaged({name: "missing"})
-            self._places = places
+            self._index = index
 
     def _read(self, file: IO[bytes], name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
         """Read a part from its open file."""
@@ -309,7 +309,7 @@ class FinishedRows:
         )
 
 
-class _Places:
+class _Index:
     """Which rows are in which file, by a manifest."""
 
     def __init__(self, manifest: Manifest):
@@ -319,9 +319,9 @@ class _Places:
 
     def of(self, row: int) -> Iterator[tuple[str, Part]]:
         """Yield the files in which a row may be, in the order to try them."""
-        place = bisect_right(self._firsts, row) - 1
-        if place >= 0:
-            name = self._names[place]
+        k = bisect_right(self._firsts, row) - 1
+        if k >= 0:
+            name = self._names[k]
             if row < self.manifest.parts[name].stop:
                 yield name, self.manifest.parts[name]
         merge = self.manifest.merge

@@ -138,21 +138,21 @@ def verdict_counts(judged: Judged) -> dict[str, int]:
     """
     width = len(judged.reasons)
     counts = np.bincount(judged.verdict.astype(np.int64) * width + judged.reason)
-    found = {}
+    rows = {}
     for code in np.flatnonzero(counts):
         verdict, reason = VERDICTS[code // width], judged.reasons[code % width]
-        found[f"{verdict}/{reason}" if reason else verdict] = int(counts[code])
+        rows[f"{verdict}/{reason}" if reason else verdict] = int(counts[code])
     passing = judged.verdict == PASS
     grade, standing = judged["robustness"][passing], judged["stands_under"][passing]
-    found.pop("pass", None)
+    rows.pop("pass", None)
     pairs = np.bincount((grade.astype(np.int64) + 1) * (len(STANDINGS) + 1) + standing + 1)  # -1 is none
     for code in np.flatnonzero(pairs):
-        place, under = divmod(int(code), len(STANDINGS) + 1)
-        word = GRADES[place - 1]
+        graded, under = divmod(int(code), len(STANDINGS) + 1)
+        word = GRADES[graded - 1]
         laws = STANDINGS[under - 1].split(";")[1:] if word == "sensitive" and under else []
         key = f"pass/{word}" + (f" (stands under {' and '.join(laws)})" if laws else "")
-        found[key] = found.get(key, 0) + int(pairs[code])
-    return dict(sorted((key, count) for key, count in found.items() if count))
+        rows[key] = rows.get(key, 0) + int(pairs[code])
+    return dict(sorted((key, count) for key, count in rows.items() if count))
 
 
 def _field(spec: ColumnSpec, type_: pa.DataType) -> pa.Field:
@@ -217,9 +217,9 @@ def _coded(column: pa.ChunkedArray, words: tuple[str, ...]) -> tuple[tuple[str, 
     array = column.unify_dictionaries().combine_chunks()
     if isinstance(array, pa.ChunkedArray):
         array = array.chunk(0)
-    found = array.dictionary.to_pylist()
-    words = (*words, *(word for word in found if word not in words))
-    translation = np.array([words.index(word) for word in found], dtype=np.int32)
+    stored = array.dictionary.to_pylist()
+    words = (*words, *(word for word in stored if word not in words))
+    translation = np.array([words.index(word) for word in stored], dtype=np.int32)
     codes = np.full(len(array), -1, dtype=np.int32)
     present = array.is_valid().to_numpy(zero_copy_only=False)
     codes[present] = translation[array.indices.drop_null().to_numpy()]

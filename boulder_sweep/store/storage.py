@@ -246,17 +246,17 @@ class ObjectStorage(_Storage):
         OSError
             The store does not answer. The version may be there; writing it again is right.
         """
-        own = self._token.encode()
+        writer = self._token.encode()
         while True:
             number = self._version + 1
-            content = bytes(encode({_NUMBER_KEY: str(number).encode(), _WRITER_KEY: own}))
+            content = bytes(encode({_NUMBER_KEY: str(number).encode(), _WRITER_KEY: writer}))
             try:
                 there = self._created(number, content)
             except OSError:
                 if not self._only_new:
                     self._version = number  # it may arrive late, and must then not replace another
                 raise
-            if there != content and _metadata(there).get(_WRITER_KEY, b"") != own:
+            if there != content and _metadata(there).get(_WRITER_KEY, b"") != writer:
                 raise failures.FolderInUseError(f"{self.path} was taken over by another run")
             self._version = number
             if there == content:
@@ -323,9 +323,9 @@ Storage = DiskStorage | ObjectStorage
 """What a run does to its output folder, and where the manifest is read. Both have the same methods."""
 
 
-def storage_of(place: Location) -> Storage:
+def storage_of(location: Location) -> Storage:
     """Return how a run writes into a folder."""
-    return DiskStorage(place) if isinstance(place, Path) else ObjectStorage(place)
+    return DiskStorage(location) if isinstance(location, Path) else ObjectStorage(location)
 
 
 class Version(NamedTuple):
@@ -346,11 +346,11 @@ def newest(folder: RemotePath) -> Version:
         The store does not answer.
     """
     for _ in range(_ATTEMPTS):
-        found = _begin(folder)
-        if found is not None:
-            while (later := _version(folder, found.number + 1)) is not None:
-                found = later
-            return found
+        version = _begin(folder)
+        if version is not None:
+            while (later := _version(folder, version.number + 1)) is not None:
+                version = later
+            return version
     raise OSError(errno.EIO, "the newest manifest is gone each time it is read")
 
 

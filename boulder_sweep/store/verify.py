@@ -146,7 +146,7 @@ def _into(out: str | Path, command: str) -> tuple[str, str | None]:
 
 
 def _moved_with(out: str | Path, settings: str, recorded_out: str) -> str:
-    """Return the path of a settings file, by its place relative to the folder if there is one now."""
+    """Return the path of a settings file, by its location relative to the folder if there is one now."""
     now, then = location_of(out), location_of(recorded_out)
     if not isinstance(now, Path) or not isinstance(then, Path) or then.is_absolute() or Path(settings).is_absolute():
         return settings
@@ -233,8 +233,8 @@ def damaged_parts(folder: Location, parts: Mapping[str, Part], *, read_parts: bo
 
     # Checksums are computed without the interpreter's lock, so threads work in parallel.
     with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
-        found = pool.map(lambda name: check(folder / name, parts[name]), parts)
-        return {name: wrong for name, wrong in zip(parts, found, strict=True) if wrong}
+        results = pool.map(lambda name: check(folder / name, parts[name]), parts)
+        return {name: wrong for name, wrong in zip(parts, results, strict=True) if wrong}
 
 
 def wrong_size(path: Location, part: Part) -> str:

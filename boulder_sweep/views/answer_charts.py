@@ -109,12 +109,12 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
         caption(fig, _caption(need, held, units))
 
 
-def draw_answers(found: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
+def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
     """Draw the answers for several designs: what each withstands, or its probability of passing with the interval.
 
     Parameters
     ----------
-    found
+    answers
         The answers.
     path
         Picture to write.
@@ -126,12 +126,12 @@ def draw_answers(found: Reserves | Uncertainty, path: str | Path, *, units: str 
     PictureError
         Nothing varies, or the picture cannot be written.
     """
-    names = {name: spec for name, spec in ANSWERS.items() if name in found.arrow.column_names}
-    given, listed = found.sweep.plan.given, found.sweep.table is not None
+    names = {name: spec for name, spec in ANSWERS.items() if name in answers.arrow.column_names}
+    given, listed = answers.sweep.plan.given, answers.sweep.table is not None
     derived = [name for name in ("embedment_depth_m", "impact_height_m") if name not in given]
     what = "what designs withstand" if len(names) > 1 else "probability of passing"
     # The designs of a list stand side by side.
-    shown = Shown(found.frame, {}, "design_id", None, {}) if listed else _shown(found.sweep, found.frame, derived)
+    shown = Shown(answers.frame, {}, "design_id", None, {}) if listed else _shown(answers.sweep, answers.frame, derived)
     frame, sets, across, over, held = shown
     with figure(path, 3.4 * len(names) + 1.6 * (len(names) == 1), 4.0) as fig:
         panels = fig.subplots(1, len(names), squeeze=False)[0]
@@ -150,10 +150,10 @@ def draw_answers(found: Reserves | Uncertainty, path: str | Path, *, units: str 
             axes.set_ylabel(f"{words} [{printed}]" if printed else words)
         if over is not None:
             panels[0].legend(loc="best")
-        headline(fig, f"{found.sweep.name}: {what}")
+        headline(fig, f"{answers.sweep.name}: {what}")
         parts = [one if isinstance(one, str) else value_text(name, one, units) for name, one in held.items()]
         none = "no point: passes at no value tried" if len(names) > 1 else "band: interval of the probability"
-        caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(found.sweep.resolved())}")
+        caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(answers.sweep.resolved())}")
 
 
 class Shown(NamedTuple):

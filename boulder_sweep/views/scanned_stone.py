@@ -24,12 +24,12 @@ ROOM_M = 0.25
 """Around the largest stone of a picture."""
 
 
-def draw_stone(found: ScannedStone, path: str | Path) -> None:
+def draw_stone(scan: ScannedStone, path: str | Path) -> None:
     """Draw a stone with each of its six ends up.
 
     Parameters
     ----------
-    found
+    scan
         The stone.
     path
         Picture to write.
@@ -39,17 +39,16 @@ def draw_stone(found: ScannedStone, path: str | Path) -> None:
     PictureError
         The picture cannot be written.
     """
-    shown = [
-        next(own for own in found.standings if own.up == up) for up in dict.fromkeys(s.up for s in found.standings)
-    ]
+    shown = [next(s for s in scan.standings if s.up == up) for up in dict.fromkeys(s.up for s in scan.standings)]
     with figure(path, 3 * PANEL_IN, 2 * PANEL_IN + 0.9) as fig:
         panels = list(fig.subplots(2, 3).flat)
         _same_scale(panels, _view_of(shown, [0.0] * len(shown)))
-        for axes, own in zip(panels, shown, strict=True):
-            draw_standing(axes, own)
-            foot = f"cut {own.cut_m:.2f} m" if own.cut_m else "no cut"
-            axes.set_title(f"{own.up} up, {own.facing} to the vehicle: {foot if own.has_foot else 'rounded foot'}")
-        headline(fig, f"{found.file}: {found.mass_kg / 1e3:.3g} t")
+        for axes, standing in zip(panels, shown, strict=True):
+            draw_standing(axes, standing)
+            cut = f"cut {standing.cut_m:.2f} m" if standing.cut_m else "no cut"
+            foot = cut if standing.has_foot else "rounded foot"
+            axes.set_title(f"{standing.up} up, {standing.facing} to the vehicle: {foot}")
+        headline(fig, f"{scan.file}: {scan.mass_kg / 1e3:.3g} t")
         caption(
             fig,
             "From the side, the vehicle coming from the left. Grey: the stone as scanned, dashed what is cut off; "
@@ -80,11 +79,11 @@ def draw_placing(placing: Placing, path: str | Path) -> None:
         panels = list(np.atleast_1d(fig.subplots(1, len(best))))
         _same_scale(panels, view)
         for axes, way in zip(panels, best, strict=True):
-            own, ground_m = way.standing, way.depth_m or 0.0
+            standing, ground_m = way.standing, way.depth_m or 0.0
             axes.axhspan(axes.get_ylim()[0], 0.0, facecolor=STYLES["soil"].fill, edgecolor="none", zorder=0)
             axes.axhline(0.0, color=STYLES["wedge"].line, linewidth=1.2, zorder=1)
-            draw_standing(axes, own, ground_m)
-            axes.set_title(f"{own.up} up, {own.facing} to the vehicle:\n{ground_m:.3f} m deep")
+            draw_standing(axes, standing, ground_m)
+            axes.set_title(f"{standing.up} up, {standing.facing} to the vehicle:\n{ground_m:.3f} m deep")
         headline(fig, f"{placing.found.file}: {placing.found.mass_kg / 1e3:.3g} t")
         caption(
             fig,
@@ -93,20 +92,20 @@ def draw_placing(placing: Placing, path: str | Path) -> None:
         )
 
 
-def draw_standing(axes: Axes, own: Standing, ground_m: float = 0.0) -> None:
+def draw_standing(axes: Axes, standing: Standing, ground_m: float = 0.0) -> None:
     """Draw one stone; the ground is at this height over its foot [m]."""
     from matplotlib.patches import Polygon
 
     style = STYLES["boulder"]
-    height, near, far = own.outline.T
+    height, near, far = standing.outline.T
     outline = np.concatenate([np.stack([-near, height], axis=1), np.stack([far, height], axis=1)[::-1]])
     axes.add_patch(Polygon(outline - (0.0, ground_m), facecolor="none", edgecolor=style.line, linestyle="--", lw=0.9))
     above = outline[outline[:, 1] >= 0.0] - (0.0, ground_m)
     axes.add_patch(Polygon(above, facecolor=style.fill, edgecolor=style.line, linewidth=1.0))
-    profile = own.profile
+    profile = standing.profile
     sides = [np.stack([side, profile.height - ground_m], axis=1) for side in (-profile.near, profile.far)]
     axes.add_patch(Polygon(np.concatenate([sides[0], sides[1][::-1]]), facecolor="none", edgecolor=BLUE, linewidth=1.6))
-    axes.plot(own.centre[0], own.centre[1] - ground_m, "o", color=BLACK, markersize=4.0)
+    axes.plot(standing.centre[0], standing.centre[1] - ground_m, "o", color=BLACK, markersize=4.0)
 
 
 class View(NamedTuple):
@@ -125,7 +124,7 @@ class View(NamedTuple):
 
 def _view_of(shown: Sequence[Standing], grounds_m: Sequence[float]) -> View:
     """Return a view with room for the largest stone; the ground is at these heights over the feet."""
-    outlines = [own.outline - (ground_m, 0.0, 0.0) for own, ground_m in zip(shown, grounds_m, strict=True)]
+    outlines = [standing.outline - (ground_m, 0.0, 0.0) for standing, ground_m in zip(shown, grounds_m, strict=True)]
     height, *sides = np.concatenate(outlines).T
     low, high, (near, far) = height.min(), height.max(), (side.max() for side in sides)
     return View(-near - ROOM_M, far + ROOM_M, low - ROOM_M, high + ROOM_M)

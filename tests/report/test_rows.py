@@ -95,13 +95,13 @@ def test_the_numbers_of_the_answer_add_up(rows, table):
 def test_of_a_large_grid_the_longest_axes_are_thinned_and_it_says_so(rows):
     whole = thinned(rows)
     assert whole.words == ""
-    assert [len(places) for places in whole.places] == [2, 9, 7, 2]
+    assert [len(indices) for indices in whole.indices] == [2, 9, 7, 2]
     part = thinned(rows, most_cells=100)
-    assert [len(places) for places in part.places] == [2, 5, 4, 2]
+    assert [len(indices) for indices in part.indices] == [2, 5, 4, 2]
     assert part.words == "5 of 9 values of boulder_height_m, 4 of 7 values of embedment_ratio, spread evenly"
-    for places, length in zip(part.places, rows.shape, strict=True):
-        assert (places[0], places[-1]) == (0, length - 1)
-        assert (np.diff(places) > 0).all()
+    for indices, length in zip(part.indices, rows.shape, strict=True):
+        assert (indices[0], indices[-1]) == (0, length - 1)
+        assert (np.diff(indices) > 0).all()
 
 
 def test_a_list_of_designs_keeps_its_inputs(tmp_path, result):
@@ -117,7 +117,7 @@ def test_a_list_of_designs_keeps_its_inputs(tmp_path, result):
     assert rows.row(answer.named[0].number)["verdict"] == "pass"
     part = thinned(rows, most_points=10)
     assert part.words == "10 of the 36 designs of the list, spread evenly"
-    assert part.places[0].tolist()[:2] == [0, 4]
+    assert part.indices[0].tolist()[:2] == [0, 4]
 
 
 def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path):
@@ -141,7 +141,7 @@ def test_a_list_that_is_not_finished_has_a_report_of_its_finished_rows(tmp_path)
     rewrite_records(out, lambda records: [records["parts"].pop(name) for name in sorted(records["parts"])[1:]])
     rows = read_rows(out)
     assert rows.counts()[NOT_YET] == 5
-    assert thinned(rows).places[0].tolist() == list(range(15))
+    assert thinned(rows).indices[0].tolist() == list(range(15))
     assert boulder_sweep.read(out).verdict[answer_of(rows).named[0].number] == "pass"
     assert write_report(out, tmp_path / "list.html").stat().st_size > 100_000
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from boulder_sweep.store.failures import DamagedError, NotASweepError, OtherVersionError
 from boulder_sweep.store.files import MANIFEST_NAME, is_ours, is_part_name, part_name
-from boulder_sweep.store.manifest import Manifest, Merge, Part, Session, check_own, load, save
+from boulder_sweep.store.manifest import Manifest, Merge, Part, Session, check_resumable, load, save
 from boulder_sweep.store.storage import DiskStorage
 from tests.store.folders import OTHER_FORMS, READABLE_FORMS, rewrite_records
 
@@ -95,11 +95,11 @@ def test_records_of_another_version_are_not_guessed_at(tmp_path, form):
 def test_what_another_version_may_write_is_read_but_no_run_goes_on(tmp_path, form):
     change, words = READABLE_FORMS[form]
     manifest = saved_by_another_version(tmp_path)
-    check_own(load(tmp_path), tmp_path)
+    check_resumable(load(tmp_path), tmp_path)
     rewrite_records(tmp_path, change)
     assert load(tmp_path) == manifest
     with pytest.raises(OtherVersionError, match=words) as refused:
-        check_own(load(tmp_path), tmp_path)
+        check_resumable(load(tmp_path), tmp_path)
     assert "another version of boulder-sweep, 7.8.9" in str(refused.value)
     assert "--overwrite" in str(refused.value)
 
@@ -116,7 +116,7 @@ def test_a_table_with_other_columns_is_of_another_version(tmp_path):
         pq.write_table(other.empty_table(), path)
         assert load(tmp_path).columns == tuple(other.names)
         with pytest.raises(OtherVersionError, match=words):
-            check_own(load(tmp_path), tmp_path)
+            check_resumable(load(tmp_path), tmp_path)
     for name in ("boulder_height_m", "verdict"):
         pq.write_table(schema.remove(schema.get_field_index(name)).empty_table(), path)
         with pytest.raises(OtherVersionError, match=f"its table lacks columns: {name}"):
