@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 ColumnType = Literal["int64", "float64", "dictionary"]
-Rows = Literal["all", "judged", "computed", "free", "rated", "overturned", "passing"]
+RowKind = Literal["all", "judged", "computed", "free", "rated", "overturned", "passing"]
 
 VERDICTS = ("pass", "fail", "undecided", "error")
 REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override", "foot", "shape")
@@ -75,7 +75,7 @@ class OutcomeColumn(ColumnSpec):
     """
 
     value: Callable[[Any], np.ndarray]
-    rows: Rows = "computed"
+    rows: RowKind = "computed"
     words: tuple[str, ...] = ()
 
 

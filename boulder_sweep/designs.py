@@ -176,7 +176,7 @@ class Derived:
     inputs: tuple[Source | Derived, ...]
 
 
-Quantity = Source | Derived
+PlannedInput = Source | Derived
 Known = TypeVar("Known")
 """What is known of a quantity: its values, or how they follow from the axes."""
 
@@ -294,13 +294,13 @@ class DesignPlan:
         self.n_designs = math.prod(self.lengths)
         self.strides = tuple(math.prod(self.lengths[k + 1 :]) for k in range(len(self.lengths)))
         self.given = dict(given)
-        quantities: dict[str, Quantity] = dict(given)
+        quantities: dict[str, PlannedInput] = dict(given)
         self.columns, self.refusals = _completed(quantities, Source(np.zeros(1)), self.combine)
         for quantity in self.columns.values():
             if isinstance(quantity, Source):
                 quantity.find_dictionary()
 
-    def combine(self, function: Callable[..., np.ndarray], *inputs: Quantity) -> Quantity:
+    def combine(self, function: Callable[..., np.ndarray], *inputs: PlannedInput) -> PlannedInput:
         """Return ``function(*inputs)`` over all combinations if these are few, else per row."""
         sources = [quantity for quantity in inputs if isinstance(quantity, Source)]
         if len(sources) < len(inputs):
@@ -336,7 +336,7 @@ class DesignPlan:
         first, stop = int(numbers[0]), int(numbers[-1]) + 1
         return self._block(self._rows(first, stop, numbers))
 
-    def _block(self, rows: _Rows) -> DesignBlock:
+    def _block(self, rows: _RowIndices) -> DesignBlock:
         """Return the designs of some rows."""
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
         labels = {name: label.at(rows.index((label.axis,))) for name, label in self.labels.items()}
@@ -354,11 +354,11 @@ class DesignPlan:
         rows = self._rows(start, stop)
         return {name: rows.values(source) for name, source in self.given.items()}
 
-    def _rows(self, start: int, stop: int, numbers: np.ndarray | None = None) -> _Rows:
+    def _rows(self, start: int, stop: int, numbers: np.ndarray | None = None) -> _RowIndices:
         """Return a range of rows that must be within the sweep, or some rows of it."""
         if not 0 <= start <= stop <= self.n_designs:
             raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
-        return _Rows(self, start, stop, numbers)
+        return _RowIndices(self, start, stop, numbers)
 
 
 def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
@@ -386,7 +386,7 @@ def some(block: DesignBlock, rows: np.ndarray) -> DesignBlock:
     return DesignBlock(0, len(rows), columns, Reasons(np.asarray(block.reasons.codes)[rows], block.reasons.texts))
 
 
-class _Rows:
+class _RowIndices:
     """Indices of a range of rows along the axes; of 32 bits where they fit, which divide several times as fast."""
 
     def __init__(self, plan: DesignPlan, start: int, stop: int, numbers: np.ndarray | None = None) -> None:
@@ -422,7 +422,7 @@ class _Rows:
             self.digits[axis] = index - index // length * length  # several times as fast as a remainder
         return self.digits[axis]
 
-    def column(self, quantity: Quantity) -> Column:
+    def column(self, quantity: PlannedInput) -> Column:
         """Return a quantity as a column, with codes where its dictionary is small."""
         if isinstance(quantity, Source):
             lookup, dictionary = quantity.dictionary
@@ -431,7 +431,7 @@ class _Rows:
                 return Column(index.astype(np.int32, copy=False) if lookup is None else lookup[index], dictionary)
         return Column(None, np.ascontiguousarray(self.values(quantity)))
 
-    def values(self, quantity: Quantity) -> np.ndarray:
+    def values(self, quantity: PlannedInput) -> np.ndarray:
         """Return one value per row."""
         if isinstance(quantity, Source):
             return quantity.values[self.index(quantity.axes)]

@@ -62,7 +62,7 @@ FAMILY_FACTOR = 2.0
 """How far a pair of soil constants may be off the nearer family of data."""
 
 
-class State(NamedTuple):
+class SandState(NamedTuple):
     """A state of sand in the table of EM 1110-2-2504 (Table 3-1, after Teng 1962)."""
 
     name: str
@@ -76,9 +76,9 @@ class State(NamedTuple):
 
 
 STATES = (
-    State("loose", 0.35, 30.0, 95.0, 125.0),
-    State("medium", 0.65, 36.0, 110.0, 130.0),
-    State("dense", 0.85, 41.0, 110.0, 140.0),
+    SandState("loose", 0.35, 30.0, 95.0, 125.0),
+    SandState("medium", 0.65, 36.0, 110.0, 130.0),
+    SandState("dense", 0.85, 41.0, 110.0, 140.0),
 )
 LOOSEST = (0.15, 28.0)
 """Relative density and friction angle [deg] where the first of them begins."""

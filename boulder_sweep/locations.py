@@ -22,7 +22,7 @@ from urllib.parse import unquote
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.text import one_line
 
-Result = TypeVar("Result")
+Returned = TypeVar("Returned")
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.\-]*)://([^/?#]*)([^?#]*)(.*)", re.DOTALL)
 _SECRET_IN_URL = re.compile(r"""://([^/\s'"]*@)|(?<=[^\s'"])\?[^\s'"]+=[^\s'"]*""")
 _SECRET_NAME = re.compile("KEY|SECRET|TOKEN|PASSW|CREDENTIAL|CONNECTION_STRING")
@@ -189,8 +189,8 @@ class RemotePath:
                 raise
 
     def _request(
-        self, request: Callable[..., Result], *arguments: Any, size: int = 0, times: int = 1, **options: Any
-    ) -> Result:
+        self, request: Callable[..., Returned], *arguments: Any, size: int = 0, times: int = 1, **options: Any
+    ) -> Returned:
         """Send a request in a thread of its own, and wait for the answer; not for ever, for a store may be silent.
 
         A request that is given up may still arrive.
@@ -201,7 +201,7 @@ class RemotePath:
             What the store answered, or the last failure.
         """
         limit_s = times * REQUEST_S + size / _SLOWEST_BYTES_PER_S
-        answers: queue.SimpleQueue[tuple[Result | None, OSError | None]] = queue.SimpleQueue()
+        answers: queue.SimpleQueue[tuple[Returned | None, OSError | None]] = queue.SimpleQueue()
         given_up = threading.Event()
 
         def send() -> None:
@@ -218,10 +218,10 @@ class RemotePath:
             failure = OSError(errno.ETIMEDOUT, f"the store has not answered for {limit_s:.0f} s")
         if failure is not None:
             raise failure from None
-        return cast(Result, answer)
+        return cast(Returned, answer)
 
 
-def _tried(request: Callable[[], Result], given_up: threading.Event) -> Result:
+def _tried(request: Callable[[], Returned], given_up: threading.Event) -> Returned:
     """Send a request, again if it fails; raises as `RemotePath._request`."""
     wait = FIRST_WAIT_S
     for left in range(_TRIES - 1, -1, -1):

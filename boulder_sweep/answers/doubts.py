@@ -28,7 +28,7 @@ from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.model import SWITCHES
 
 if TYPE_CHECKING:
-    from boulder_sweep.answers.trials import Judges, Rows
+    from boulder_sweep.answers.trials import InputRows, Judges
     from boulder_sweep.settings import Sweep
 
 BASE = 2048
@@ -231,7 +231,9 @@ def parted(margins: np.ndarray) -> list[Doubt]:
     return parts
 
 
-def _numerical(sweep: Sweep, spread: Spread, rows: Rows, z: np.ndarray, judges: Judges, margins: np.ndarray) -> float:
+def _numerical(
+    sweep: Sweep, spread: Spread, rows: InputRows, z: np.ndarray, judges: Judges, margins: np.ndarray
+) -> float:
     """Return the mean square of the estimated error of the margin as a share of the variance."""
     given = spread.filled({name: np.repeat(values, len(z)) for name, values in rows.items()}, z)
     error = judges.final(block_of(given))["rotation_error_deg"] / sweep.criterion.max_rotation_deg

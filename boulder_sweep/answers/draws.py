@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
-from boulder_sweep.answers.trials import Judges, Rows, rows_at
+from boulder_sweep.answers.trials import InputRows, Judges, rows_at
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.judged import ERROR, NO_CONTACT, UNDECIDED
 from boulder_sweep.runner.pool import Pool, call
@@ -51,7 +51,7 @@ class Draws:
         Equally likely judges, one of which is chosen by the last coordinate of each point; if empty, `judges` is used.
     """
 
-    rows: Rows
+    rows: InputRows
     spread: Spread
     judges: Judges
     parallel: Pool
@@ -104,7 +104,7 @@ class Draws:
         """Return whether designs pass; arguments: see `distance`."""
         return self.distance(index, z, **inputs) > 0.0
 
-    def given(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> Rows:
+    def given(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray]) -> InputRows:
         """Return the inputs of sampled designs."""
         return self.spread.filled(rows_at(self.rows, index) | inputs, z)
 
@@ -121,8 +121,8 @@ class Draws:
                 measures[rows] = self._each(rows_at(given, rows), judges, reserve)
         return measures
 
-    def _each(self, given: Rows, judges: Judges, reserve: bool) -> np.ndarray:
-        def judged_by(evaluation: Evaluation, rows: Rows) -> tuple[Judged, np.ndarray]:
+    def _each(self, given: InputRows, judges: Judges, reserve: bool) -> np.ndarray:
+        def judged_by(evaluation: Evaluation, rows: InputRows) -> tuple[Judged, np.ndarray]:
             block = block_of(rows)
             judged = evaluation(block)
             return judged, _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)

@@ -28,7 +28,7 @@ from boulder_sweep.answers.search import (
     search,
     searched_again,
 )
-from boulder_sweep.answers.trials import Judges, Open, Remembered, Rows, beyond_reach, block_at, rows_at
+from boulder_sweep.answers.trials import InputRows, Judges, Open, Remembered, beyond_reach, block_at, rows_at
 from boulder_sweep.errors import QuestionError
 
 if TYPE_CHECKING:
@@ -111,11 +111,11 @@ class LightestQuestion:
         bounds = {side: self.bounds[side] for side in self.free} or {SCALE: SCALES}
         return bounds | {SHARE: (0.0, 1.0)} if low < high else bounds
 
-    def given(self, start: int, stop: int) -> Rows:
+    def given(self, start: int, stop: int) -> InputRows:
         """Return the other inputs of the rows ``[start, stop)``."""
         return self.open.rows(start, stop)
 
-    def trial(self, rows: Rows, side: str, final: Remembered) -> Boulders:
+    def trial(self, rows: InputRows, side: str, final: Remembered) -> Boulders:
         """Return the object that tries boulders in some rows, by a side or the scale."""
         return Boulders(self, rows, side, final)
 
@@ -158,7 +158,7 @@ class Boulders:
         Judges designs with the accuracy of the sweep; counts its own simulations.
     """
 
-    def __init__(self, asked: LightestQuestion, rows: Rows, side: str, final: Remembered) -> None:
+    def __init__(self, asked: LightestQuestion, rows: InputRows, side: str, final: Remembered) -> None:
         self.asked, self.judges, self.rows, self.side = asked, asked.judges, rows, side
         self._final = final
         self.simulated = 0
@@ -330,7 +330,7 @@ class Boulders:
         return np.rint(sizes[self.side] * MILLIMETRES).astype(np.int64)
 
 
-def _lightest(rows: Rows, answers: Sequence[_SizedBrackets]) -> _SizedBrackets:
+def _lightest(rows: InputRows, answers: Sequence[_SizedBrackets]) -> _SizedBrackets:
     """Return the lightest of several answers for each row; rather one with a bracket."""
     masses = [np.where(np.isnan(one.passes), np.inf, one.passes) + 1e-6 * np.isnan(one.fails) for one in answers]
     best, index = np.argmin(masses, axis=0), np.arange(len(masses[0]))

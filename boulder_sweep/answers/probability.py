@@ -19,7 +19,7 @@ from boulder_sweep.answers.lightest import DEPTH, RATIO, SIDES, Boulders, Lighte
 from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import Judges, Remembered, Rows, beyond_reach, ranges, rows_at, uncertain_rows
+from boulder_sweep.answers.trials import InputRows, Judges, Remembered, beyond_reach, ranges, rows_at, uncertain_rows
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import BY_NAME
@@ -65,11 +65,11 @@ class Sampling:
         self.points = points.reshape(DRAWN, -1)
         self.few = points[:, : FEW // SCRAMBLINGS].reshape(FEW, -1)
 
-    def draws(self, rows: Rows) -> Draws:
+    def draws(self, rows: InputRows) -> Draws:
         """Return what draws the designs of some rows."""
         return Draws(rows, self.spread, self.judges, Pool(1), self.variants)
 
-    def often(self, draws: Draws, index: np.ndarray, inputs: Rows, points: np.ndarray) -> np.ndarray:
+    def often(self, draws: Draws, index: np.ndarray, inputs: InputRows, points: np.ndarray) -> np.ndarray:
         """Return whether designs pass often enough, by some of the points, bool, shape (m,).
 
         Parameters
@@ -90,7 +90,7 @@ class Sampling:
             enough[start:stop] = passes.reshape(-1, len(points)).mean(axis=1) >= self.probability
         return enough
 
-    def chances(self, draws: Draws, inputs: Rows) -> Sampled:
+    def chances(self, draws: Draws, inputs: InputRows) -> Sampled:
         """Return the probabilities of passing of all rows with inputs set, from the points and more where needed."""
 
         def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -132,7 +132,7 @@ class ProbabilityQuestion(Question):
         super().__init__(sweep, key, between, judges)
         self.sampling = Sampling(Spread(sweep, key.name), judges, probability, seed, variants)
 
-    def trial(self, rows: Rows) -> Trial:
+    def trial(self, rows: InputRows) -> Trial:
         """Return the object that tries values in some rows."""
         return ProbabilityTrial(self, rows)
 
@@ -146,7 +146,7 @@ class ProbabilityQuestion(Question):
 class ProbabilityTrial(Trial):
     """Tries values of the input in some rows: whether the designs sampled with them pass often enough."""
 
-    def __init__(self, asked: ProbabilityQuestion, rows: Rows) -> None:
+    def __init__(self, asked: ProbabilityQuestion, rows: InputRows) -> None:
         super().__init__(asked.key, asked.judges, rows)
         self.asked, self.draws = asked, asked.sampling.draws(rows)
 
@@ -200,11 +200,11 @@ class LikelyLightestQuestion(LightestQuestion):
                 raise QuestionError(f"--least mass searches for {path}, which has a distribution; give it values")
         self.sampling = Sampling(spread, judges, probability, seed, variants)
 
-    def given(self, start: int, stop: int) -> Rows:
+    def given(self, start: int, stop: int) -> InputRows:
         """Return the other inputs of some rows, with the indices of named sets that have distributions."""
         return uncertain_rows(self.open.sweep, super().given(start, stop), start, stop)
 
-    def trial(self, rows: Rows, side: str, final: Remembered) -> Boulders:
+    def trial(self, rows: InputRows, side: str, final: Remembered) -> Boulders:
         """Return the object that tries boulders in some rows."""
         return LikelyBoulders(self, rows, side, final)
 
@@ -219,7 +219,7 @@ class LikelyLightestQuestion(LightestQuestion):
 class LikelyBoulders(Boulders):
     """Tries boulders for some rows: whether designs drawn with them pass often enough."""
 
-    def __init__(self, asked: LikelyLightestQuestion, rows: Rows, side: str, final: Remembered) -> None:
+    def __init__(self, asked: LikelyLightestQuestion, rows: InputRows, side: str, final: Remembered) -> None:
         super().__init__(asked, rows, side, final)
         self.sampling, self.draws = asked.sampling, asked.sampling.draws(rows)
 

@@ -23,10 +23,10 @@ from boulder_sweep.answers.search import (
     searched_again,
 )
 from boulder_sweep.answers.trials import (
+    InputRows,
     Judges,
     Open,
     Remembered,
-    Rows,
     beyond_reach,
     block_at,
     ranges,
@@ -158,17 +158,17 @@ class Question:
             trial.chances(result.shown),
         )
 
-    def lattice(self, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    def lattice(self, rows: InputRows) -> tuple[np.ndarray, np.ndarray]:
         """Return the first and the last position that are searched in some rows."""
         low, high = range_of(self.sweep, self.key, rows, self.between)
         first, last = self.key.ends(low, high)
         return (last, first) if self.key.most else (first, last)
 
-    def trial(self, rows: Rows) -> Trial:
+    def trial(self, rows: InputRows) -> Trial:
         """Return the object that tries values in some rows."""
         return Trial(self.key, self.judges, rows)
 
-    def kinds(self, rows: Rows, result: Search) -> np.ndarray:
+    def kinds(self, rows: InputRows, result: Search) -> np.ndarray:
         """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
 
         Where nothing passes, the design at the end of the range tells by its sizes whether the truck goes over it: not
@@ -186,7 +186,7 @@ class Question:
 class Trial:
     """Tries values of the input in some rows and counts the simulations."""
 
-    def __init__(self, key: Key, judges: Judges, rows: Rows) -> None:
+    def __init__(self, key: Key, judges: Judges, rows: InputRows) -> None:
         self.key, self.judges, self.rows = key, judges, rows
         self.simulated = 0
         self._final = Remembered(judges.final)

@@ -23,7 +23,7 @@ from boulder_sweep.answers.result import (
     write_parquet,
 )
 from boulder_sweep.answers.search import FAILS, HOLDS, Predicate, contradicted, search, searched_again
-from boulder_sweep.answers.trials import Judges, Rows, judges_of, ranges
+from boulder_sweep.answers.trials import InputRows, Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location
@@ -121,7 +121,7 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
     return Reserves(sweep, joined_tables(tables, sweep, judges, "boulder_sweep.answers.reserves"))
 
 
-def withstood(key: Key, judges: Judges, rows: Rows, passes: np.ndarray, best: float, worst: float) -> np.ndarray:
+def withstood(key: Key, judges: Judges, rows: InputRows, passes: np.ndarray, best: float, worst: float) -> np.ndarray:
     """Return the worst value of an input that each of n designs withstands; NaN where it fails at every value.
 
     Parameters

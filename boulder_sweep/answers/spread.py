@@ -17,7 +17,7 @@ from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 
 if TYPE_CHECKING:
-    from boulder_sweep.answers.trials import Rows
+    from boulder_sweep.answers.trials import InputRows
     from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.fields import Bound
 
@@ -68,7 +68,7 @@ class Spread:
         """Dotted keys of the uncertain inputs."""
         return [BY_NAME[name].path for name in self.names]
 
-    def filled(self, given: Rows, z: np.ndarray) -> Rows:
+    def filled(self, given: InputRows, z: np.ndarray) -> InputRows:
         """Return designs with sampled inputs.
 
         Parameters
@@ -90,7 +90,7 @@ class Spread:
 
 
 def _draw_values(
-    spread: Distribution | SetDistributions, given: Rows, mean: np.ndarray, z: np.ndarray, moving: Moving | None
+    spread: Distribution | SetDistributions, given: InputRows, mean: np.ndarray, z: np.ndarray, moving: Moving | None
 ) -> np.ndarray:
     """Return the values of an input at standard normal numbers; of named sets each from its own distribution."""
     from boulder_sweep.judge.quantiles import values_of  # loads the kernels, which a list of spreads need not

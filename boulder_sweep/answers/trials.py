@@ -37,7 +37,7 @@ SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "vehicle_crush_m")
 GRADED = ("robustness", "stands_under")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
 
-Rows = dict[str, np.ndarray]
+InputRows = dict[str, np.ndarray]
 """Inputs of n designs by column name (or ``embedment_ratio``), each of shape (n,), as given by a file."""
 
 
@@ -73,18 +73,18 @@ class Open:
         """Return the labels of the combinations ``[start, stop)``."""
         return self.sweep.block(start, stop).labels
 
-    def rows(self, start: int, stop: int) -> Rows:
+    def rows(self, start: int, stop: int) -> InputRows:
         """Return the other inputs of the combinations ``[start, stop)``."""
         given = self.sweep.plan.given_rows(start, stop)
         return {name: values for name, values in given.items() if name not in self._left_out}
 
 
-def rows_at(rows: Rows, index: np.ndarray | slice) -> Rows:
+def rows_at(rows: InputRows, index: np.ndarray | slice) -> InputRows:
     """Return some of the rows, by their indices, a mask or a slice."""
     return {name: values[index] for name, values in rows.items()}
 
 
-def block_at(rows: Rows, index: np.ndarray, **inputs: np.ndarray) -> DesignBlock:
+def block_at(rows: InputRows, index: np.ndarray, **inputs: np.ndarray) -> DesignBlock:
     """Return some of the designs as a block, with the open inputs filled in."""
     return block_of(rows_at(rows, index) | inputs)
 
@@ -201,7 +201,7 @@ def other_readings(sweep: Sweep) -> Sweep:
     return dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=ReadingChoice.of_preset(preset)))
 
 
-def uncertain_rows(sweep: Sweep, given: Rows, start: int, stop: int) -> Rows:
+def uncertain_rows(sweep: Sweep, given: InputRows, start: int, stop: int) -> InputRows:
     """Return the rows ``[start, stop)`` of a sweep with the indices of their named soils and vehicles.
 
     These are needed where named sets have distributions of their own; `boulder_sweep.designs.block_of` ignores them.

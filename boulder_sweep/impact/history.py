@@ -23,7 +23,7 @@ from boulder_kernels.layered import SoilLayers
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces, body_beside, is_outlined
 from boulder_kernels.plastic import PlasticConstants, at_sample
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
-from boulder_kernels.time_history import Stored, evaluate_samples
+from boulder_kernels.time_history import StoredEnergies, evaluate_samples
 
 MODE_NAMES = {
     SEATED: "seated",
@@ -187,7 +187,9 @@ def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return rates, stored and spent energies at the samples of a record, see `evaluate_samples`."""
     record, c, m_v = motion.record, motion.constants, motion.design.m_v
     n = len(record.times)
-    rates, stored, spent = (np.empty((count, n)) for count in (len(Acceleration._fields), len(Stored._fields), 3))
+    rates, stored, spent = (
+        np.empty((count, n)) for count in (len(Acceleration._fields), len(StoredEnergies._fields), 3)
+    )
     if not len(record.offset):
         record = record._replace(offset=np.zeros(n))
     if n:
@@ -196,7 +198,7 @@ def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @dataclass(frozen=True, eq=False)
-class SoilProfile:
+class SoilForces:
     """The soil along the buried face at one sample, arrays of shape (n,) from the soil line down."""
 
     depth_m: np.ndarray
@@ -205,7 +207,7 @@ class SoilProfile:
     """Force of each slice on the boulder, spring and drag (Eq 19)."""
 
 
-def soil_profile(motion: Motion, sample: int, slices: int) -> SoilProfile:
+def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
     """Cut the soil along the buried face into slices of equal height at one sample.
 
     Parameters
@@ -226,13 +228,13 @@ def soil_profile(motion: Motion, sample: int, slices: int) -> SoilProfile:
     velocity = k.B - k.slope_v * ratio
     if not isinstance(c, Constants):
         pressed = _pressed_at(ratio, displacement, velocity, at_sample(c, sample)) / slices
-        return SoilProfile(ratio * c.d, -pressed)
+        return SoilForces(ratio * c.d, -pressed)
     height = c.d / slices
     force = [
         -(spring_force(float(u), float(r * c.d), height, c) + drag_force(float(v), height, c))
         for u, v, r in zip(displacement, velocity, ratio, strict=True)
     ]
-    return SoilProfile(ratio * c.d, np.array(force))
+    return SoilForces(ratio * c.d, np.array(force))
 
 
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:

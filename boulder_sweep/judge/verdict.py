@@ -33,7 +33,7 @@ import numpy as np
 import boulder_kernels.rules as verdicts
 from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
 from boulder_kernels.rules import OF_CRITERION, RULES, RULINGS, VerdictLimits, write_rulings
-from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, VERDICTS, Rows
+from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, VERDICTS, RowKind
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
 from boulder_sweep.judge.robustness import grades_without_asking, is_studied
@@ -101,7 +101,7 @@ class Facts(NamedTuple):
     designs: Designs
     """Inputs of the same rows."""
     limits: Limits
-    rows: dict[Rows, np.ndarray]
+    rows: dict[RowKind, np.ndarray]
     """Masks, see `OutcomeColumn`."""
     overlap: np.ndarray
     """Height of the top of the boulder over the underside of the bumper [m]."""

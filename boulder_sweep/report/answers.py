@@ -13,8 +13,8 @@ from boulder_sweep.columns import GRADES, TO_BUILD
 from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS, meaning_of
 from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
 from boulder_sweep.report.asked import (
+    Measure,
     Named,
-    Quantity,
     Sentence,
     capacity_sentences,
     listed,
@@ -22,7 +22,7 @@ from boulder_sweep.report.asked import (
     share,
     verb,
 )
-from boulder_sweep.report.rows import CONDITIONS, NOT_YET, Rows, condition_of, label_of
+from boulder_sweep.report.rows import CONDITIONS, NOT_YET, ResultRows, condition_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import REASON_WORDS
@@ -50,7 +50,7 @@ class Answer:
     named: tuple[Named, ...]
 
 
-def answer_of(rows: Rows) -> Answer:
+def answer_of(rows: ResultRows) -> Answer:
     """Describe the result of a sweep in sentences."""
     counts, total = rows.counts(), len(rows.codes)
     passing = rows.having("pass")
@@ -99,7 +99,7 @@ def answer_of(rows: Rows) -> Answer:
     return Answer(tuple(sentences), tuple(named.values()))
 
 
-def _of_answers(rows: Rows, need: Need, n: int) -> Answer:
+def _of_answers(rows: ResultRows, need: Need, n: int) -> Answer:
     """Describe the answers of `sweep need`."""
     sentences, named = need_sentences(rows, need)
     if n == 1:
@@ -109,7 +109,7 @@ def _of_answers(rows: Rows, need: Need, n: int) -> Answer:
     return Answer(tuple(sentences), tuple(named))
 
 
-def _flagged(rows: Rows, n: int) -> list[Sentence]:
+def _flagged(rows: ResultRows, n: int) -> list[Sentence]:
     """Say how many of the n passes lie outside what the model was tested on."""
     flagged = n - rows.flags.get("", 0) if rows.flags else 0
     if flagged:
@@ -123,7 +123,7 @@ def _flagged(rows: Rows, n: int) -> list[Sentence]:
     return []
 
 
-def _grades(rows: Rows, n: int) -> Sentence:
+def _grades(rows: ResultRows, n: int) -> Sentence:
     """Say how many of the passes are robust."""
     robust, sensitive, left = (rows.grades.get(grade, 0) for grade in GRADES)
     if left == n:
@@ -135,7 +135,7 @@ def _grades(rows: Rows, n: int) -> Sentence:
     return (f"Of the {n:,} that {verb(n, 'pass', 'passes')}, {by_grade}.",)
 
 
-def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
+def _uncertain(rows: ResultRows) -> list[tuple[Sentence, Named | None]]:
     """Say how probable it is that designs pass, and name the lightest of the safe ones; nothing of a run."""
     chances = rows.chances()
     if chances is None:
@@ -163,7 +163,7 @@ def _uncertain(rows: Rows) -> list[tuple[Sentence, Named | None]]:
     return [(sentence, Named(f"{title} {_where(rows, kinds)}".rstrip(), number))]
 
 
-def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answer:
+def _of_one(rows: ResultRows, uncertain: list[tuple[Sentence, Named | None]]) -> Answer:
     """Describe the result of a single design."""
     row, name = rows.row(0), rows.names[rows.codes[0]]
     margin = "" if row["margin"] is None else f", with a margin of {row['margin']:.1%}"
@@ -176,7 +176,7 @@ def _of_one(rows: Rows, uncertain: list[tuple[Sentence, Named | None]]) -> Answe
     return Answer(tuple(sentences), (Named("The design", 0),))
 
 
-def _of_row(rows: Rows, row: dict[str, Any]) -> list[Sentence]:
+def _of_row(rows: ResultRows, row: dict[str, Any]) -> list[Sentence]:
     """Say how firm the verdict of a design is, and where it lies outside what the model was tested on."""
     sentences: list[Sentence] = []
     grade = rows.grade(row)
@@ -189,16 +189,16 @@ def _of_row(rows: Rows, row: dict[str, Any]) -> list[Sentence]:
     return sentences
 
 
-def _sizes(rows: Rows, number: int) -> Sentence:
+def _sizes(rows: ResultRows, number: int) -> Sentence:
     """Say how heavy a boulder is and how deep it stands."""
     mass, depth = (float(values.flat[number]) for values in (rows.mass(), rows.depth()))
-    return Quantity(mass, "kg"), " of rock, ", Quantity(depth, "m")
+    return Measure(mass, "kg"), " of rock, ", Measure(depth, "m")
 
 
-def _to_build(rows: Rows, number: int) -> Sentence:
+def _to_build(rows: ResultRows, number: int) -> Sentence:
     """Say what a design takes to build beside its mass, as a sentence that follows another."""
     quantities = rows.to_build(number)
-    above, excavated, backfilled = (Quantity(quantities[spec.name], spec.unit) for spec in TO_BUILD)
+    above, excavated, backfilled = (Measure(quantities[spec.name], spec.unit) for spec in TO_BUILD)
     return (
         " It stands ",
         above,
@@ -239,19 +239,19 @@ class Withstood(NamedTuple):
     kinds: tuple[str, ...]
     """The conditions under all of which they hold."""
 
-    def siblings(self, rows: Rows, number: int) -> tuple[np.ndarray, tuple[str, ...]]:
+    def siblings(self, rows: ResultRows, number: int) -> tuple[np.ndarray, tuple[str, ...]]:
         """Return the rows of a boulder under these conditions, and the conditions; none where it has a single row."""
         siblings = rows.siblings(number, self.kinds)
         return siblings, self.kinds if len(siblings) > 1 else ()
 
 
-def _varied(rows: Rows) -> tuple[str, ...]:
+def _varied(rows: ResultRows) -> tuple[str, ...]:
     """Conditions that vary."""
     kinds = {condition_of(name) for name in rows.varying()}
     return tuple(kind for kind in CONDITIONS if kind in kinds)
 
 
-def _withstood(rows: Rows, holds: np.ndarray) -> Withstood:
+def _withstood(rows: ResultRows, holds: np.ndarray) -> Withstood:
     """Find the boulders that hold under all conditions, or else under as many as possible; soils count first."""
     varied = _varied(rows)
     # The rows of a list need not have every combination.
@@ -263,7 +263,7 @@ def _withstood(rows: Rows, holds: np.ndarray) -> Withstood:
     return Withstood(designs, kinds)
 
 
-def _where(rows: Rows, kinds: tuple[str, ...]) -> str:
+def _where(rows: ResultRows, kinds: tuple[str, ...]) -> str:
     """Say under which conditions; empty without any."""
     if not kinds:
         return ""
@@ -273,7 +273,7 @@ def _where(rows: Rows, kinds: tuple[str, ...]) -> str:
     return f"{listed(words)} of the sweep"
 
 
-def _worst(rows: Rows, kinds: tuple[str, ...]) -> str:
+def _worst(rows: ResultRows, kinds: tuple[str, ...]) -> str:
     """Say of which row a margin is."""
     if not kinds:
         return ""
@@ -285,9 +285,9 @@ def _worst(rows: Rows, kinds: tuple[str, ...]) -> str:
     return f" {before} the {kinds[0]} that is worst for it"
 
 
-def _beyond(rows: Rows, siblings: np.ndarray, kinds: tuple[str, ...]) -> Sentence:
+def _beyond(rows: ResultRows, siblings: np.ndarray, kinds: tuple[str, ...]) -> Sentence:
     """Name the conditions of a boulder where the sweep has others, under which it need not hold."""
-    said: list[str | Quantity] = []
+    said: list[str | Measure] = []
     for name in rows.varying():
         kind = condition_of(name)
         if not kind or (rows.axes and kind in kinds):
@@ -296,12 +296,14 @@ def _beyond(rows: Rows, siblings: np.ndarray, kinds: tuple[str, ...]) -> Sentenc
             continue
         said.append(f"{',' if said else ', with'} {label_of(name)} ")
         unit = BY_NAME[name].unit if name in BY_NAME else ""
-        low, high = (end if isinstance(end, str) else Quantity(end, unit) for end in rows.ends(name, siblings))
+        low, high = (end if isinstance(end, str) else Measure(end, unit) for end in rows.ends(name, siblings))
         said += [low] if low == high else [low, " to ", high]
     return tuple(said)
 
 
-def _describe(rows: Rows, number: int, siblings: np.ndarray, kinds: tuple[str, ...], lead: str, held: str) -> Sentence:
+def _describe(
+    rows: ResultRows, number: int, siblings: np.ndarray, kinds: tuple[str, ...], lead: str, held: str
+) -> Sentence:
     """Describe a boulder behind the words that lead to it: conditions, sizes, worst row, what it takes to build."""
     return (
         lead,
@@ -313,7 +315,7 @@ def _describe(rows: Rows, number: int, siblings: np.ndarray, kinds: tuple[str, .
     )
 
 
-def _least(rows: Rows, withstood: Withstood, what: str) -> tuple[Sentence, Named]:
+def _least(rows: ResultRows, withstood: Withstood, what: str) -> tuple[Sentence, Named]:
     """Find the design of least mass or depth among boulders that pass, in the row that is worst for it."""
     values, other = (rows.mass(), rows.depth()) if what == "mass" else (rows.depth(), rows.mass())
     least = np.where(withstood.designs, values, np.inf)

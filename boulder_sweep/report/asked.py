@@ -15,7 +15,7 @@ from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile
 from boulder_sweep.answers.search import BLOCKED, NEVER, WORDS
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS
-from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, Rows, condition_of, label_of
+from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, ResultRows, condition_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import counted
 
@@ -28,14 +28,14 @@ NOTHING = {
 """What is said where there is no answer."""
 
 
-class Quantity(NamedTuple):
+class Measure(NamedTuple):
     """A number in a sentence, in a unit of the table; the page shows it in the reader's."""
 
     value: float
     unit: str
 
 
-Sentence = tuple[str | Quantity, ...]
+Sentence = tuple[str | Measure, ...]
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,11 @@ def listed(words: tuple[str, ...] | list[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
-class Table(NamedTuple):
+class AnswerTable(NamedTuple):
     """Answers as the page lists them."""
 
     heads: tuple[str, ...]
-    rows: tuple[tuple[str | Quantity, ...], ...]
+    rows: tuple[tuple[str | Measure, ...], ...]
     left_out: str
     """Which answers it leaves out; empty if none."""
 
@@ -77,7 +77,7 @@ def key_words(need: Need) -> str:
     return f"{'largest' if need.key.most else 'least'} {name}"
 
 
-def need_sentences(rows: Rows, need: Need) -> tuple[list[Sentence], list[Named]]:
+def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], list[Named]]:
     """Return the question with how many rows have an answer, why others have none, and the governing answer."""
     answers = need.arrow[need.key.answer].to_numpy()
     has_answer, total = ~np.isnan(answers), len(answers)
@@ -96,7 +96,7 @@ def need_sentences(rows: Rows, need: Need) -> tuple[list[Sentence], list[Named]]
     return [sentence, *sentences] if total == 1 else [sentences[0], sentence, *sentences[1:]], [named]
 
 
-def _terms(need: Need, rows: Rows) -> str:
+def _terms(need: Need, rows: ResultRows) -> str:
     """Say what an answer must have besides passing."""
     assert isinstance(rows.finished, AnswerFile)
     words = [f"a margin of {need.least_margin:.0%} or more"] if need.least_margin else []
@@ -105,7 +105,7 @@ def _terms(need: Need, rows: Rows) -> str:
     return f"{robust}{' with ' if words else ''}{listed(words) if words else ''}"
 
 
-def _governing(rows: Rows, need: Need, answers: np.ndarray) -> tuple[Sentence, Named]:
+def _governing(rows: ResultRows, need: Need, answers: np.ndarray) -> tuple[Sentence, Named]:
     """Find the boulder to recommend, and its answer where that is worst.
 
     The lightest boulder with an answer under every condition of the file, or of those with an answer under most.
@@ -129,15 +129,15 @@ def _governing(rows: Rows, need: Need, answers: np.ndarray) -> tuple[Sentence, N
     if under and not whole[boulders[number]]:
         under = f"in {int(held.max()):,} of its {int(np.bincount(boulders)[boulders[number]]):,} combinations"
     row = rows.row(number)
-    sizes: list[str | Quantity] = []
+    sizes: list[str | Measure] = []
     if need.key.name != BOULDER_MASS:
-        sizes += [", ", Quantity(float(mass[number]), "kg"), " of rock"]
+        sizes += [", ", Measure(float(mass[number]), "kg"), " of rock"]
     if need.key.name != DEPTH:
-        sizes += [", ", Quantity(row[DEPTH], "m"), " deep"]
+        sizes += [", ", Measure(row[DEPTH], "m"), " deep"]
     more = [f"margin {row['margin']:.1%}"] if row["margin"] is not None and need.probability is None else []
     more += [f"P(pass) = {row['p_pass']:.1%}"] if "p_pass" in row else []
     more += [row["robustness"]] if row["robustness"] in ("robust", "sensitive") else []
-    asked = Quantity(float(answers[number]), need.key.field.unit)
+    asked = Measure(float(answers[number]), need.key.field.unit)
     where = " where that is worst for it" if several else ""
     if len(answers) == 1:
         lead = f"The {key_words(need)} that passes{_terms(need, rows)}: "
@@ -155,15 +155,15 @@ def capacity_sentences(row: dict[str, Any]) -> list[Sentence]:
         "mass of the truck": ("withstands_mass_kg", "kg"),
         "friction angle": ("withstands_friction_angle_deg", "deg"),
     }
-    parts: list[str | Quantity] = []
+    parts: list[str | Measure] = []
     for name, (column, unit) in asked.items():
         value = row[column]
         parts += ["; " if parts else "", f"{name} "]
-        parts += ["none of those tried"] if value is None else [Quantity(value, unit)]
+        parts += ["none of those tried"] if value is None else [Measure(value, unit)]
     return [("All else unchanged, the worst at which it passes: ", *parts, ".")]
 
 
-def answers_table(rows: Rows) -> Table | None:
+def answers_table(rows: ResultRows) -> AnswerTable | None:
     """Return the answers as a table; None for the result of a run, and where the sentences say it all."""
     file = rows.finished
     if not isinstance(file, AnswerFile) or len(rows.codes) == 1:
@@ -184,7 +184,7 @@ def answers_table(rows: Rows) -> Table | None:
     more = len(table) > MOST_LINES
     left = f"the first {MOST_LINES:,} of {len(table):,} answers; `sweep export` writes them all" if more else ""
     lines = tuple(tuple(_cell(row, name, unit, open_) for _, name, unit in columns) for row in kept)
-    return Table(tuple(head for head, _, _ in columns), lines, left)
+    return AnswerTable(tuple(head for head, _, _ in columns), lines, left)
 
 
 def _answer_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
@@ -218,7 +218,7 @@ def _answer_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
     return columns_of[kind]
 
 
-def _cell(row: dict[str, Any], name: str, unit: str, searched: set[str]) -> str | Quantity:
+def _cell(row: dict[str, Any], name: str, unit: str, searched: set[str]) -> str | Measure:
     """Return one cell; of a row without an answer, why there is none in place of it."""
     value, none = row[name], "passes_at" in row and row["passes_at"] is None
     if none and name.startswith(("least_", "most_")):
@@ -227,4 +227,4 @@ def _cell(row: dict[str, Any], name: str, unit: str, searched: set[str]) -> str 
         return "–"
     if unit == "%":
         return f"{value:.1%}"
-    return Quantity(float(value), unit) if unit else str(value)
+    return Measure(float(value), unit) if unit else str(value)

@@ -25,7 +25,7 @@ from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS
 from boulder_sweep.report import page_records
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, parts_of
-from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, SIZES, Rows, label_of
+from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, SIZES, ResultRows, label_of
 from boulder_sweep.settings.checks import (
     BEYOND_FRONT,
     FLOATS,
@@ -164,7 +164,7 @@ class Thinned:
     words: str
 
 
-def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
+def thinned(rows: ResultRows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
     """Choose the rows that go into the page: all, or values spread evenly along the longest axes."""
     if not rows.axes:
         computed = np.flatnonzero(~rows.having(NOT_YET))  # the inputs of the others are in no file yet
@@ -187,7 +187,7 @@ def thinned(rows: Rows, most_cells: int = MOST_CELLS, most_points: int = MOST_PO
     return Thinned(indices, f"{', '.join(left)}, spread evenly" if left else "")
 
 
-def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
+def table_data(rows: ResultRows, kept: Thinned) -> dict[str, Any]:
     """Return the data of the map: codes of the designs kept, values along the axes or of the list."""
     codes = rows.codes.reshape(rows.shape)[np.ix_(*kept.indices)].ravel()
     if rows.axes:
@@ -214,7 +214,7 @@ def table_data(rows: Rows, kept: Thinned) -> dict[str, Any]:
     }
 
 
-def map_of(rows: Rows) -> dict[str, Any]:
+def map_of(rows: ResultRows) -> dict[str, Any]:
     """Return what the map of answers adds to that of a list: the axes it starts with, and the input asked for."""
     if rows.need is None:
         return {"first": [], "asked": ""}
@@ -224,7 +224,7 @@ def map_of(rows: Rows) -> dict[str, Any]:
     return {"first": [*others, *asked][:2], "asked": "".join(asked)}
 
 
-def held_at(rows: Rows, kept: Thinned, number: int) -> dict[str, int]:
+def held_at(rows: ResultRows, kept: Thinned, number: int) -> dict[str, int]:
     """Return the index of a design along each axis of the map; the nearest one kept where its own is left out."""
     if not rows.axes:
         return {}

@@ -24,7 +24,7 @@ from boulder_sweep.views.wording import NOT_A_TEST
 if TYPE_CHECKING:
     import pyarrow as pa
 
-Result = FinishedRows | AnswerFile
+Exportable = FinishedRows | AnswerFile
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
@@ -102,7 +102,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
         )
-    writer: Callable[[BinaryIO, Result, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
+    writer: Callable[[BinaryIO, Exportable, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
     try:
         with replacing(target) as passing:
             return writer(passing, finished, units)
@@ -110,7 +110,7 @@ def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si")
         raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
 
-def about(finished: Result, columns: Iterable[Shown], units: str = "si") -> Iterator[tuple[str, str, str]]:
+def about(finished: Exportable, columns: Iterable[Shown], units: str = "si") -> Iterator[tuple[str, str, str]]:
     """Yield what a reader must know about a table, three texts for each line; settings in ``si`` or ``us`` units."""
     identity: Mapping[str, Any] = finished.identity
     yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
@@ -147,7 +147,7 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
     return lines
 
 
-def _tables(finished: Result, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
+def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
     """Yield the rows piece by piece in the requested units."""
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -190,7 +190,7 @@ def _shown(field: pa.Field, units: str) -> Shown:
     return shown_as(field.name, unit, meaning, units if str(field.type) == "double" else "si")
 
 
-def _csv(target: BinaryIO, finished: Result, units: str) -> int:
+def _csv(target: BinaryIO, finished: Exportable, units: str) -> int:
     """Write comma-separated values; null is empty."""
     rows = 0
     file = TextIOWrapper(target, newline="", encoding="utf-8")
@@ -215,7 +215,7 @@ def _cell(text: str) -> str:
     return f"'{shown}" if first.startswith(FORMULA_SIGNS) else shown
 
 
-def _parquet(target: BinaryIO, finished: Result, units: str) -> int:
+def _parquet(target: BinaryIO, finished: Exportable, units: str) -> int:
     """Write one Parquet file with units and meanings in its field metadata, settings and versions in its own."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -239,7 +239,7 @@ def _parquet(target: BinaryIO, finished: Result, units: str) -> int:
     return rows
 
 
-def _sheet(target: BinaryIO, finished: Result, units: str) -> int:
+def _sheet(target: BinaryIO, finished: Exportable, units: str) -> int:
     """Write a spreadsheet: the designs, and what a reader must know about them."""
     rows, columns = 0, list[Shown]()
     with _workbook(target) as book:

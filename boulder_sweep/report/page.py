@@ -23,8 +23,8 @@ from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
 if TYPE_CHECKING:
-    from boulder_sweep.report.asked import Sentence, Table
-    from boulder_sweep.report.rows import Rows
+    from boulder_sweep.report.asked import AnswerTable, Sentence
+    from boulder_sweep.report.rows import ResultRows
 
 ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = ("kernel", "verdict", "simulator", "texts", "plots", "scene", "maps", "controls", "page")
@@ -50,8 +50,8 @@ def assembled(
     readings: Readings,
     start: Mapping[str, float],
     sentences: Sequence[Sentence] = (),
-    answers: Table | None = None,
-    rows: Rows | None = None,
+    answers: AnswerTable | None = None,
+    rows: ResultRows | None = None,
     chosen: Sequence[Mapping[str, Any]] = (),
     facts: Sequence[tuple[str, str]] = (),
     notes: Sequence[str] = (),

@@ -72,7 +72,7 @@ class NamedSets(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class ResultRows:
     """The rows of a result.
 
     Attributes
@@ -284,7 +284,7 @@ class Rows:
         return next(self.finished.tables(["p_pass"])).column("p_pass").to_numpy()
 
 
-def read_rows(folder: Location) -> Rows:
+def read_rows(folder: Location) -> ResultRows:
     """Read what the page needs of a result.
 
     Raises
@@ -334,7 +334,7 @@ def read_rows(folder: Location) -> Rows:
             inputs[name] = along.reshape([-1 if k == index else 1 for k in range(len(axes))])
     by_flag = flag_counts(flags.items()) if flags else {}
     words, robustness = zip(*names, (NOT_YET, ""), strict=True)
-    return Rows(folder, finished, words, codes, by_flag, dict(grades), axes, sets, inputs, robustness)
+    return ResultRows(folder, finished, words, codes, by_flag, dict(grades), axes, sets, inputs, robustness)
 
 
 def _check_whole(file: AnswerFile, path: Location) -> None:

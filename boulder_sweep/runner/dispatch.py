@@ -54,7 +54,7 @@ class Task(NamedTuple, Generic[Item]):
     options: Mapping[str, Any] = {}
 
 
-class Outcome(NamedTuple, Generic[Item]):
+class TaskResult(NamedTuple, Generic[Item]):
     """What came of a task."""
 
     item: Item
@@ -136,7 +136,7 @@ class Dispatcher(Generic[Item]):
         """What the tasks that are not done stand for."""
         return [*(submitted.task.item for submitted in self._in_flight.values()), *(task.item for task in self._again)]
 
-    def outcomes(self, next_task: Callable[[], Task[Item] | None]) -> Iterator[Outcome[Item]]:
+    def outcomes(self, next_task: Callable[[], Task[Item] | None]) -> Iterator[TaskResult[Item]]:
         """Yield what comes of tasks, in the order in which they end.
 
         Parameters
@@ -159,7 +159,7 @@ class Dispatcher(Generic[Item]):
                 raise ClusterLostError(self._cluster.lost_text()) from problem
             raise
 
-    def _outcomes(self, next_task: Callable[[], Task[Item] | None]) -> Iterator[Outcome[Item]]:
+    def _outcomes(self, next_task: Callable[[], Task[Item] | None]) -> Iterator[TaskResult[Item]]:
         looked = result = self._clock()
         self._look_at_workers()
         if self._silence.silent:
@@ -209,7 +209,7 @@ class Dispatcher(Generic[Item]):
         for future in self._in_flight.keys() & lost:
             future.add_done_callback(self._arrived.put)
 
-    def _received(self, future: Any) -> Outcome[Item] | None:
+    def _received(self, future: Any) -> TaskResult[Item] | None:
         """Return what came of a task; None where the result has not come, and is still waited for."""
         if future not in self._in_flight:  # submitted again meanwhile
             return None
@@ -230,7 +230,7 @@ class Dispatcher(Generic[Item]):
                 self._fetch_s *= 2.0
                 future.add_done_callback(self._arrived.put)
                 return None
-        return Outcome(self._in_flight.pop(future).task.item, result, problem)
+        return TaskResult(self._in_flight.pop(future).task.item, result, problem)
 
     def _fetch(self, future: Any, limit_s: float) -> None:
         """Wait longer for a result."""

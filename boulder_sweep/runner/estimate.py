@@ -51,7 +51,7 @@ _MOST_LOOKED_AT = 1000
 _GOLDEN = 0.618033988749895
 
 
-class Sample(NamedTuple):
+class RowCost(NamedTuple):
     """Cost of a few sampled rows."""
 
     seconds_per_row: float
@@ -61,7 +61,7 @@ class Sample(NamedTuple):
     """Size of a part without rows."""
 
 
-_GUESS = Sample(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
+_GUESS = RowCost(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
 """For a sweep none of whose sampled rows can be computed."""
 
 
@@ -126,7 +126,7 @@ def take_sample(
     sweep: Sweep,
     metadata: Mapping[bytes, bytes],
     work_clock: Callable[[], float] = time.thread_time,
-) -> Sample:
+) -> RowCost:
     """Compute a few rows spread over the table and measure the time; the kernels must be warm.
 
     Samples grow from one row to the largest that is affordable, and that one counts: it is computed like a block of
@@ -165,7 +165,7 @@ def take_sample(
         return _GUESS
     beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
     written = max(len(encode(table)) - beside_rows, 0)
-    return Sample(seconds_per_row, written / len(table), beside_rows)
+    return RowCost(seconds_per_row, written / len(table), beside_rows)
 
 
 def _larger_sample(size: int, seconds_per_row: float, rows: int) -> int:
@@ -188,7 +188,7 @@ def _spread_rows(rows: int, count: int) -> np.ndarray:
 
 
 def estimated(
-    sample: Sample,
+    sample: RowCost,
     *,
     rows: int,
     rows_to_compute: int,

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 from boulder_sweep.errors import Interrupted
 
-Result = TypeVar("Result")
+Returned = TypeVar("Returned")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _LOOK_EVERY_S = 0.05
 LAST_S = 3.0
@@ -49,7 +49,7 @@ class Signals:
         if self.caught is not None:
             raise Interrupted(self.caught)
 
-    def call(self, function: Callable[[], Result], undo: Callable[[Result], Any] = lambda result: None) -> Result:
+    def call(self, function: Callable[[], Returned], undo: Callable[[Returned], Any] = lambda result: None) -> Returned:
         """Call a function in a thread of its own, and return what it returns or raise what it raises.
 
         Parameters
@@ -64,7 +64,7 @@ class Signals:
         Interrupted
             A signal arrived. The function goes on until the process ends, and its result is undone.
         """
-        outcome: list[Result] = []
+        outcome: list[Returned] = []
         problem: list[BaseException] = []
         deciding = [None]
 

@@ -88,7 +88,7 @@ def prepare(work: Work) -> None:
 
 
 @dataclass(frozen=True)
-class _Rows:
+class _RowRange:
     """Rows [start, stop) to be computed, and how often that has failed."""
 
     start: int
@@ -130,7 +130,7 @@ class ClusterWorkers(Workers):
     ):
         super().__init__()
         self._computation = computation
-        self._ranges = (_Rows(*rows) for rows in tasks)
+        self._ranges = (_RowRange(*rows) for rows in tasks)
         self._folder = folder
         manifest = folder.manifest
         work = Work(
@@ -142,9 +142,9 @@ class ClusterWorkers(Workers):
             manifest.rows,
             fingerprint(),
         )
-        self._dispatcher: Dispatcher[_Rows] = Dispatcher(cluster, work, self._note, clock)
-        self._again: deque[_Rows] = deque()
-        self._suspects: deque[_Rows] = deque()
+        self._dispatcher: Dispatcher[_RowRange] = Dispatcher(cluster, work, self._note, clock)
+        self._again: deque[_RowRange] = deque()
+        self._suspects: deque[_RowRange] = deque()
         """Rows whose workers died; computed one task after the other."""
 
     def stop(self) -> None:
@@ -163,7 +163,7 @@ class ClusterWorkers(Workers):
         """Tell the user something."""
         self.messages.put(Note(text))
 
-    def _next_task(self) -> Task[_Rows] | None:
+    def _next_task(self) -> Task[_RowRange] | None:
         """Return rows to be computed next; suspects wait until nothing else is under way, and others for them."""
         under_way = self._dispatcher.under_way
         if self._suspects:
@@ -174,7 +174,7 @@ class ClusterWorkers(Workers):
             rows = self._again.popleft() if self._again else next(self._ranges, None)
         return None if rows is None else Task(rows, compute, (rows.start, rows.stop, rows.relayed))
 
-    def _accept(self, rows: _Rows, done: Done) -> None:
+    def _accept(self, rows: _RowRange, done: Done) -> None:
         """Pass on the parts that a worker has written, or write those that it sent."""
         for part in done.relayed:
             done.staged.append(self._folder.stage(part))
@@ -188,10 +188,10 @@ class ClusterWorkers(Workers):
                 self._note("a worker does not share the output folder: its rows go through the scheduler")
             there = {staged.part.first for staged in here}
             self._again += [
-                _Rows(start, stop, rows.tries + 1, relayed=True) for start, stop in expected if start not in there
+                _RowRange(start, stop, rows.tries + 1, relayed=True) for start, stop in expected if start not in there
             ]
 
-    def _retry(self, rows: _Rows, problem: BaseException) -> None:
+    def _retry(self, rows: _RowRange, problem: BaseException) -> None:
         """Submit a failed task again; halve one that ends its workers, until the row that does so is alone."""
         if isinstance(problem, OSError) and problem.errno is not None:
             raise self._folder.write_error(problem) from problem

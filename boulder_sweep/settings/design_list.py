@@ -100,7 +100,7 @@ def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList 
     return None if len(problems.problems) > before else designs
 
 
-class _Rows:
+class _RowReader:
     """Turns rows of text into columns of numbers, a chunk at a time."""
 
     def __init__(self, path: Location, problems: ProblemList, position: Callable[[Origin, int], Position]) -> None:
@@ -255,7 +255,7 @@ def _read_lines(source: _Lines, path: Location, problems: ProblemList) -> Design
         raise refuse(label, "is empty; the first line must hold the column names")
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
     hint = " (numbers need a decimal point, and text with a comma needs quotation marks)" if delimiter == "," else ""
-    rows = _Rows(path, problems, lambda origin, index: cell_position(label, *origin, delimiter, index))
+    rows = _RowReader(path, problems, lambda origin, index: cell_position(label, *origin, delimiter, index))
     try:
         names = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]
         rows.header(names, (source.number, header))
@@ -287,7 +287,7 @@ def _read_xlsx(path: Location, problems: ProblemList) -> DesignList:
         from openpyxl import load_workbook  # an extra, for tables in this format only
     except ImportError:
         raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
-    rows = _Rows(path, problems, lambda origin, index: Position(label, origin[0], index + 1))
+    rows = _RowReader(path, problems, lambda origin, index: Position(label, origin[0], index + 1))
     for number, cells in enumerate(_sheet_rows(path, load_workbook), 1):
         texts = ["" if cell is None else str(cell) for cell in cells]
         origin = (number, "")

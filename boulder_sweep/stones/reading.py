@@ -31,7 +31,7 @@ OTHER_UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class ScannedSurface:
     """The surface in a file, as it is.
 
     Attributes
@@ -66,7 +66,7 @@ def require_trimesh() -> None:
         raise ScanError("scans need trimesh, which is not installed: pip install 'boulder-sweep[scan]'")
 
 
-def read_scan(path: str | Path, metres: float = 1.0) -> Scan:
+def read_scan(path: str | Path, metres: float = 1.0) -> ScannedSurface:
     """Read the surface of a stone.
 
     Parameters
@@ -97,7 +97,7 @@ def read_scan(path: str | Path, metres: float = 1.0) -> Scan:
     if not np.isfinite(used).all():
         raise ScanError(f"{path}: is damaged: it has coordinates that are no finite numbers")
     _check_size(path, used, metres)
-    return Scan(path.name, hashlib.sha256(data).hexdigest(), vertices * metres, faces)
+    return ScannedSurface(path.name, hashlib.sha256(data).hexdigest(), vertices * metres, faces)
 
 
 def _content(path: Path) -> bytes:

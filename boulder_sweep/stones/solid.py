@@ -15,7 +15,7 @@ from boulder_sweep.errors import ScanError
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
-    from boulder_sweep.stones.reading import Scan
+    from boulder_sweep.stones.reading import ScannedSurface
 
 MOST_CLOSED = 0.25
 """Largest part of the surface of a stone that may be a hole; the side on which a block lies is a fifth of it."""
@@ -64,7 +64,7 @@ class Solid:
         return float(axis @ self.inertia @ axis)
 
 
-def solid_of(scan: Scan) -> Solid:
+def solid_of(scan: ScannedSurface) -> Solid:
     """Return the stone that a scan is the surface of.
 
     Parameters

@@ -127,7 +127,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Sample:
+class SampledDesigns:
     """The designs that all methods simulate, and how their outcomes are judged."""
 
     designs: Designs
@@ -161,7 +161,7 @@ class Sample:
         both = ((outcome, judge(outcome, fewer.designs, self.limits)) for outcome in (out, ref))
         return compared(method, accuracy, 1e6 * best / len(rows), *both)
 
-    def rows(self, chosen: np.ndarray) -> Sample:
+    def rows(self, chosen: np.ndarray) -> SampledDesigns:
         """Return a sample of some of the designs, by their indices."""
         return replace(self, designs=self.designs.rows(chosen))
 

@@ -28,7 +28,7 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.runner.pool import THREADING, pool
 from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.store.files import replacing
-from boulder_sweep.tradeoff.points import Method, Point, Sample, mark_front
+from boulder_sweep.tradeoff.points import Method, Point, SampledDesigns, mark_front
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -245,7 +245,7 @@ def measure(
         if time.monotonic() - begun > seconds:
             left_out += _methods(name, readings)
             continue
-        sample = Sample(sample_designs, readings, limits, control)
+        sample = SampledDesigns(sample_designs, readings, limits, control)
         if progress is not None:
             progress(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {sample_designs.size:,}")
         known, twice = (

@@ -131,7 +131,9 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
     derived = [name for name in ("embedment_depth_m", "impact_height_m") if name not in given]
     what = "what designs withstand" if len(names) > 1 else "probability of passing"
     # The designs of a list stand side by side.
-    shown = Shown(answers.frame, {}, "design_id", None, {}) if listed else _shown(answers.sweep, answers.frame, derived)
+    shown = (
+        ChartRows(answers.frame, {}, "design_id", None, {}) if listed else _shown(answers.sweep, answers.frame, derived)
+    )
     frame, sets, across, over, held = shown
     with figure(path, 3.4 * len(names) + 1.6 * (len(names) == 1), 4.0) as fig:
         panels = fig.subplots(1, len(names), squeeze=False)[0]
@@ -156,7 +158,7 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
         caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(answers.sweep.resolved())}")
 
 
-class Shown(NamedTuple):
+class ChartRows(NamedTuple):
     """What a chart shows: its rows, named sets, what is across, what tells curves apart, and what is held."""
 
     frame: pd.DataFrame
@@ -166,7 +168,7 @@ class Shown(NamedTuple):
     held: dict[str, float | str]
 
 
-def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> Shown:
+def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> ChartRows:
     """Choose what a chart shows."""
     sets = {axis.name: axis.labels for axis in sweep.axes if axis.labels}
     open_ = [name for name in sweep.plan.columns if name not in searched]
@@ -188,7 +190,7 @@ def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> Shown:
             levels = np.unique(frame[name].astype(float))
             held[name] = levels[len(levels) // 2]
             frame = frame[frame[name].astype(float) == held[name]]
-    return Shown(frame, sets, across, over, held)
+    return ChartRows(frame, sets, across, over, held)
 
 
 def _styled(

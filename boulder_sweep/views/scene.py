@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
 
-class Shape(NamedTuple):
+class SceneItem(NamedTuple):
     """One thing to draw; lengths in metres."""
 
     kind: str
@@ -111,7 +111,7 @@ class SideView:
         peak = self.trajectory.motion.outcome.maxima.F_v
         return LONGEST_ARROW_M / peak if peak > 0.0 else 1e-6
 
-    def ground(self) -> list[Shape]:
+    def ground(self) -> list[SceneItem]:
         """Return what does not move: soil, initial position of the boulder, line of the rating, scale of force."""
         w, design = self.window, self.trajectory.motion.design
         rating = self.trajectory.settings["criterion"]["rating"]
@@ -120,18 +120,18 @@ class SideView:
         length, x, y = unit * self.metres_per_newton, w.left + 0.25, w.bottom + 0.25
         line = self.rating_line
         return [
-            Shape("polygon", "soil", ((w.left, w.bottom), (w.right, w.bottom), (w.right, 0.0), (w.left, 0.0))),
-            Shape("line", "limit", ((line, 0.0), (line, w.top - 0.75))),
-            Shape("text", "limit", ((line + 0.06, w.top - 0.8),), f"{rating}: cargo bed\nmust stop here"),
-            Shape("line", "initial", (*((x, z - design.d) for x, z in outline), (outline[0][0], -design.d))),
-            Shape("line", "scale", ((x, y), (x + length, y))),
-            Shape("text", "scale", ((x, y + 0.08),), f"{unit / 1e3:.0f} kN"),
-            Shape("text", "contact_force", ((x, y + 0.80),), "force of the vehicle"),
-            Shape("text", "soil_force", ((x, y + 0.58),), f"soil, each 1/{SLICES} of its depth"),
-            Shape("text", "weight", ((x, y + 0.36),), "weight of the boulder"),
+            SceneItem("polygon", "soil", ((w.left, w.bottom), (w.right, w.bottom), (w.right, 0.0), (w.left, 0.0))),
+            SceneItem("line", "limit", ((line, 0.0), (line, w.top - 0.75))),
+            SceneItem("text", "limit", ((line + 0.06, w.top - 0.8),), f"{rating}: cargo bed\nmust stop here"),
+            SceneItem("line", "initial", (*((x, z - design.d) for x, z in outline), (outline[0][0], -design.d))),
+            SceneItem("line", "scale", ((x, y), (x + length, y))),
+            SceneItem("text", "scale", ((x, y + 0.08),), f"{unit / 1e3:.0f} kN"),
+            SceneItem("text", "contact_force", ((x, y + 0.80),), "force of the vehicle"),
+            SceneItem("text", "soil_force", ((x, y + 0.58),), f"soil, each 1/{SLICES} of its depth"),
+            SceneItem("text", "weight", ((x, y + 0.36),), "weight of the boulder"),
         ]
 
-    def moving(self, sample: int) -> list[Shape]:
+    def moving(self, sample: int) -> list[SceneItem]:
         """Return what moves, at one sample: soil wedge, boulder, truck, forces."""
         return [
             *self._wedge(sample),
@@ -157,16 +157,16 @@ class SideView:
         centre = c.c_x + float(self.trajectory.boulder_displacement_m[sample])
         return centre + x * cos + y * sin, -c.z_0 - x * sin + y * cos
 
-    def _boulder(self, sample: int) -> list[Shape]:
+    def _boulder(self, sample: int) -> list[SceneItem]:
         c, body = self.trajectory.motion.constants, self.trajectory.motion.body
         corners = [(x - c.c_x, z - c.c_y) for x, z in self._outline()]
         centre = self._position(sample, body.x - c.c_x, body.y - c.c_y)
         weight = body.m_b * G
         tip = (centre[0], centre[1] - weight * self.metres_per_newton)
         return [
-            Shape("polygon", "boulder", tuple(self._position(sample, *corner) for corner in corners)),
-            Shape("circle", "centre", (centre,), radius=0.05),
-            Shape("arrow", "weight", (centre, tip)),
+            SceneItem("polygon", "boulder", tuple(self._position(sample, *corner) for corner in corners)),
+            SceneItem("circle", "centre", (centre,), radius=0.05),
+            SceneItem("arrow", "weight", (centre, tip)),
         ]
 
     def _faces(self, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -188,7 +188,7 @@ class SideView:
         near, far = self._faces(np.array([motion.design.d - depth]))
         return float((near if is_near else far)[0] - motion.constants.c_x)
 
-    def _wedge(self, sample: int) -> list[Shape]:
+    def _wedge(self, sample: int) -> list[SceneItem]:
         """The soil that moves with the boulder: a wedge cut into slices, each moving with its element."""
         motion = self.trajectory.motion
         c, design = motion.constants, motion.design
@@ -196,9 +196,9 @@ class SideView:
         levels = [k / 24 * c.d for k in range(25)]
         near = [self._position(sample, self._face(level, is_near=False), c.z_0 - level) for level in levels]
         far = [(x + (c.d - level) * slope, y) for (x, y), level in zip(near, levels, strict=True)]
-        return [Shape("polygon", "wedge", (*near, *far[::-1]))]
+        return [SceneItem("polygon", "wedge", (*near, *far[::-1]))]
 
-    def _soil_forces(self, sample: int) -> list[Shape]:
+    def _soil_forces(self, sample: int) -> list[SceneItem]:
         motion = self.trajectory.motion
         c = motion.constants
         profile = soil_profile(motion, sample, SLICES)
@@ -209,16 +209,16 @@ class SideView:
                 continue
             # Pressed forward the soil pushes on the far face; pressed back, on the near one.
             x, y = self._position(sample, self._face(float(z), is_near=length >= 0.0), c.z_0 - float(z))
-            arrows.append(Shape("arrow", "soil_force", ((x - length, y), (x, y))))
+            arrows.append(SceneItem("arrow", "soil_force", ((x - length, y), (x, y))))
         return arrows
 
-    def _contact(self, sample: int) -> list[Shape]:
+    def _contact(self, sample: int) -> list[SceneItem]:
         length = float(self.trajectory.contact_force_N[sample]) * self.metres_per_newton
         if length < SHORTEST_ARROW_M:
             return []
         c, design = self.trajectory.motion.constants, self.trajectory.motion.design
         head = self._position(sample, -c.c_x, design.e + c.z_0)
-        return [Shape("arrow", "contact_force", ((head[0] - length, head[1]), head))]
+        return [SceneItem("arrow", "contact_force", ((head[0] - length, head[1]), head))]
 
 
 def samples_shown(trajectory: Trajectory, most: int, every_s: float) -> np.ndarray:
@@ -237,7 +237,7 @@ WHEEL_RADIUS_M = 0.42
 BED_LENGTH_M = 6.0
 
 
-def truck_shapes(trajectory: Trajectory, sample: int) -> list[Shape]:
+def truck_shapes(trajectory: Trajectory, sample: int) -> list[SceneItem]:
     """Return the truck at one sample.
 
     The damper's crush m_v (v_0 - v)/c_v stays, the spring's comes and goes with the force; together they are how far
@@ -280,14 +280,14 @@ def truck_shapes(trajectory: Trajectory, sample: int) -> list[Shape]:
     )
     frame = (at(cab_back, 0.7), at(cab_back, 1.05), at(offset + BED_LENGTH_M, 1.05), at(offset + BED_LENGTH_M, 0.7))
     wheels = [
-        Shape("circle", "wheel", (at(behind, WHEEL_RADIUS_M),), radius=WHEEL_RADIUS_M)
+        SceneItem("circle", "wheel", (at(behind, WHEEL_RADIUS_M),), radius=WHEEL_RADIUS_M)
         for behind in (0.36 * cab_back, offset + 3.2)
     ]
     return [
-        Shape("polygon", "truck", frame),
-        Shape("polygon", "bed", bed),
-        Shape("polygon", "truck", cab),
-        Shape("polygon", "window", window),
-        Shape("line", "bed_edge", (at(offset, 0.75), at(offset, 2.45))),
+        SceneItem("polygon", "truck", frame),
+        SceneItem("polygon", "bed", bed),
+        SceneItem("polygon", "truck", cab),
+        SceneItem("polygon", "window", window),
+        SceneItem("line", "bed_edge", (at(offset, 0.75), at(offset, 2.45))),
         *wheels,
     ]

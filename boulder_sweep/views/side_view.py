@@ -15,7 +15,7 @@ from boulder_sweep.errors import PictureError
 from boulder_sweep.store.files import replacing
 from boulder_sweep.text import ProgressCallback, script_data, why
 from boulder_sweep.views import pictures
-from boulder_sweep.views.scene import STYLES, Shape, SideView, samples_shown
+from boulder_sweep.views.scene import STYLES, SceneItem, SideView, samples_shown
 from boulder_sweep.views.time_curves import require_samples
 from boulder_sweep.views.wording import NOT_A_TEST, design_line, verdict_line
 
@@ -78,7 +78,7 @@ def stage(fig: Figure, view: SideView) -> Axes:
     return axes
 
 
-def draw(axes: Axes, shapes: Iterable[Shape], *, behind: bool = False) -> list[Any]:
+def draw(axes: Axes, shapes: Iterable[SceneItem], *, behind: bool = False) -> list[Any]:
     """Draw shapes; return what was added, so that it can be removed before the next frame."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, FancyArrowPatch, Polygon
@@ -279,7 +279,7 @@ def page(trajectory: Trajectory) -> str:
     return template.replace("/*DATA*/null", script_data(content))
 
 
-def _plain(shape: Shape) -> dict[str, Any]:
+def _plain(shape: SceneItem) -> dict[str, Any]:
     """Return a shape as plain data, rounded to millimetres."""
     plain: dict[str, Any] = {"k": shape.kind, "s": shape.style, "p": [[round(v, 3) for v in at] for at in shape.points]}
     if shape.text:

@@ -87,7 +87,7 @@ def finished_pieces(finished: FinishedRows) -> Pieces:
     return pieces
 
 
-class Kept:
+class PictureRows:
     """The rows that a picture shows, collected piece by piece.
 
     Parameters
@@ -301,7 +301,7 @@ def plane(
     admitted = [(name, [value]) for name, value in fixed.items()]
     multiples = ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows))
     admitted += [(name, values) for name, values in multiples if name is not None]
-    kept = Kept(str(chosen["across"]), str(chosen["up"]), [chosen["columns"], chosen["rows"]], levels)
+    kept = PictureRows(str(chosen["across"]), str(chosen["up"]), [chosen["columns"], chosen["rows"]], levels)
     for piece in pieces([*{*kept.columns, *fixed}]):
         keep = np.ones(len(piece), dtype=bool)
         for name, shown in admitted:

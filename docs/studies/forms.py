@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import DesignTable, Status
-from boulder_kernels.heave import Base, Form
+from boulder_kernels.heave import Base, HeaveOptions
 from boulder_kernels.second_opinion import USUAL_BASE, WHOLE, HeaveControl, HeaveOutcome, second_opinions
 from boulder_sweep import elementary
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
@@ -27,8 +27,8 @@ from boulder_sweep.soils import with_law
 from docs.studies.random_designs import RANGES
 
 PAPER = RESISTANCES[0]
-PLANAR = Form(heave=False, friction=False)
-RISING, RUBBING = Form(heave=True, friction=False), Form(heave=False, friction=True)
+PLANAR = HeaveOptions(heave=False, friction=False)
+RISING, RUBBING = HeaveOptions(heave=True, friction=False), HeaveOptions(heave=False, friction=True)
 FORMS = {"planar, no friction": PLANAR, "planar, friction": RUBBING, "friction and vertical motion": WHOLE}
 SPEEDS = {"M30": "30 mph", "M40": "40 mph"}
 DRAWN, SEED = 1200, 1
@@ -86,7 +86,7 @@ def by_second_opinion(
     designs: Designs,
     law: str,
     evaluation: Evaluation,
-    form: Form = WHOLE,
+    form: HeaveOptions = WHOLE,
     base: Base = USUAL_BASE,
     *,
     watched: bool = False,
@@ -98,7 +98,7 @@ def by_second_opinion(
 
 
 def passing(
-    designs: Designs, law: str, evaluation: Evaluation, form: Form = WHOLE, base: Base = USUAL_BASE
+    designs: Designs, law: str, evaluation: Evaluation, form: HeaveOptions = WHOLE, base: Base = USUAL_BASE
 ) -> np.ndarray:
     """Return which designs pass by a law and a form, bool, shape (n,); by the planar model where nothing is added."""
     if form == PLANAR:
@@ -119,7 +119,7 @@ def grids_table(grid: Path, count: int = DRAWN) -> Table:
     for name, speed in SPEEDS.items():
         evaluation, drawn = grid_evaluation(grid, speed), drawn_of_grid(grid, speed, count)
 
-        def cell(law: str, form: Form, evaluation: Evaluation = evaluation, drawn: Any = drawn) -> str:
+        def cell(law: str, form: HeaveOptions, evaluation: Evaluation = evaluation, drawn: Any = drawn) -> str:
             kept, won = (passing(designs, law, evaluation, form).mean() for designs in drawn)
             return f"{kept:.0%} ({won:.0%})"
 

@@ -76,7 +76,7 @@ AA = tuple(
 """Weights of the accelerations in the stage displacements, A A, shape (7, 7)."""
 
 
-class Point(NamedTuple):
+class DegreeOfFreedom(NamedTuple):
     """Displacement and velocity of one degree of freedom."""
 
     x: float
@@ -84,51 +84,51 @@ class Point(NamedTuple):
 
 
 @inlined
-def stage_2(x: float, v: float, h: float, a1: float) -> Point:
+def stage_2(x: float, v: float, h: float, a1: float) -> DegreeOfFreedom:
     """Second stage of one degree of freedom."""
-    return Point(x + h * (C[1] * v), v + h * (A[1][0] * a1))
+    return DegreeOfFreedom(x + h * (C[1] * v), v + h * (A[1][0] * a1))
 
 
 @inlined
-def stage_3(x: float, v: float, h: float, a1: float, a2: float) -> Point:
+def stage_3(x: float, v: float, h: float, a1: float, a2: float) -> DegreeOfFreedom:
     """Third stage of one degree of freedom."""
-    return Point(
+    return DegreeOfFreedom(
         x + h * (C[2] * v + h * (AA[2][0] * a1)),
         v + h * (A[2][0] * a1 + A[2][1] * a2),
     )
 
 
 @inlined
-def stage_4(x: float, v: float, h: float, a1: float, a2: float, a3: float) -> Point:
+def stage_4(x: float, v: float, h: float, a1: float, a2: float, a3: float) -> DegreeOfFreedom:
     """Fourth stage of one degree of freedom."""
-    return Point(
+    return DegreeOfFreedom(
         x + h * (C[3] * v + h * (AA[3][0] * a1 + AA[3][1] * a2)),
         v + h * (A[3][0] * a1 + A[3][1] * a2 + A[3][2] * a3),
     )
 
 
 @inlined
-def stage_5(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float) -> Point:
+def stage_5(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float) -> DegreeOfFreedom:
     """Fifth stage of one degree of freedom."""
-    return Point(
+    return DegreeOfFreedom(
         x + h * (C[4] * v + h * (AA[4][0] * a1 + AA[4][1] * a2 + AA[4][2] * a3)),
         v + h * (A[4][0] * a1 + A[4][1] * a2 + A[4][2] * a3 + A[4][3] * a4),
     )
 
 
 @inlined
-def stage_6(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float, a5: float) -> Point:
+def stage_6(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float, a5: float) -> DegreeOfFreedom:
     """Sixth stage of one degree of freedom."""
-    return Point(
+    return DegreeOfFreedom(
         x + h * (v + h * (AA[5][0] * a1 + AA[5][1] * a2 + AA[5][2] * a3 + AA[5][3] * a4)),
         v + h * (A[5][0] * a1 + A[5][1] * a2 + A[5][2] * a3 + A[5][3] * a4 + A[5][4] * a5),
     )
 
 
 @inlined
-def stage_7(x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: float, a6: float) -> Point:
+def stage_7(x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: float, a6: float) -> DegreeOfFreedom:
     """End of the step, of fifth order, for one degree of freedom."""
-    return Point(
+    return DegreeOfFreedom(
         x + h * (v + h * (AA[6][0] * a1 + AA[6][2] * a3 + AA[6][3] * a4 + AA[6][4] * a5)),
         v + h * (A[6][0] * a1 + A[6][2] * a3 + A[6][3] * a4 + A[6][4] * a5 + A[6][5] * a6),
     )

@@ -53,7 +53,7 @@ class Base(NamedTuple):
     """Speed of slip v_s at which friction has 0.71 of its full value [m/s]."""
 
 
-class Form(NamedTuple):
+class HeaveOptions(NamedTuple):
     """What is added to the planar motion."""
 
     heave: bool
@@ -121,7 +121,7 @@ def bearing_capacity_factor(phi: float) -> float:
 
 
 @kernel
-def heave_constants(design: Design, c: Constants, form: Form, base: Base) -> HeaveConstants:
+def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base) -> HeaveConstants:
     """Constants of the motion with heave and friction (Eqs 131-134).
 
     Parameters

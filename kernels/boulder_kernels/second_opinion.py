@@ -24,8 +24,8 @@ from .heave import (
     SUMS,
     Base,
     Forces,
-    Form,
     HeaveConstants,
+    HeaveOptions,
     heave_constants,
     inertia_at,
     prepare,
@@ -57,7 +57,7 @@ from .soil import soil_kinematics
 
 READINGS = corrected()
 """The only readings that there are second opinions of."""
-WHOLE, USUAL_BASE = Form(heave=True, friction=True), Base()
+WHOLE, USUAL_BASE = HeaveOptions(heave=True, friction=True), Base()
 """The second opinion itself; other forms and bases are for comparison."""
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 2e-4, 8e-3, 1e-9
 """Lengths of steps [s]."""
@@ -207,7 +207,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
         bottom = min(bottom, strip_depth(work, j, 0.0, sin, versin, f) - f.q_strip / f.k_strip)
     least = np.inf
     for start in range(3):
-        position = Position(left + 0.5 * start * (right - left), 0.0, np.inf)
+        position = Equilibrium(left + 0.5 * start * (right - left), 0.0, np.inf)
         for _ in range(TURNS):
             if f.heave > 0.0:
                 position = move_to_least_energy(position, False, bottom, top, theta, work, f)
@@ -216,7 +216,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     return least
 
 
-class Position(NamedTuple):
+class Equilibrium(NamedTuple):
     """Where the boulder stands at some rotation."""
 
     x: float
@@ -229,8 +229,8 @@ class Position(NamedTuple):
 
 @kernel
 def move_to_least_energy(
-    position: Position, sideways: bool, low: float, high: float, theta: float, work: np.ndarray, f: HeaveConstants
-) -> Position:
+    position: Equilibrium, sideways: bool, low: float, high: float, theta: float, work: np.ndarray, f: HeaveConstants
+) -> Equilibrium:
     """Move along x_b, or else along y_b, between two ends that push inwards, to where the energy is least."""
     x, y, energy = position
     weight = f.m_b * G
@@ -245,7 +245,7 @@ def move_to_least_energy(
         b = narrowed(b, at, push)
         at = next_guess(b)
         x, y = (at, y) if sideways else (x, at)
-    return Position(x, y, energy)
+    return Equilibrium(x, y, energy)
 
 
 @kernel
@@ -356,7 +356,7 @@ def simulate_heave(
 @kernel
 def run_second_opinions(
     designs: np.ndarray,
-    form: Form,
+    form: HeaveOptions,
     base: Base,
     control: HeaveControl,
     work: np.ndarray,
@@ -381,7 +381,7 @@ def run_second_opinions(
 def second_opinions(
     table: Any,
     control: HeaveControl,
-    form: Form = WHOLE,
+    form: HeaveOptions = WHOLE,
     base: Base = USUAL_BASE,
     record: HeaveRecord | None = None,
 ) -> HeaveOutcome:

@@ -40,7 +40,7 @@ GAUSS_WEIGHTS = (0.17392742256872692, 0.32607257743127305, 0.32607257743127305, 
 """Nodes and weights of the four-point Gauss-Legendre rule on 0 ... 1."""
 
 
-class Stored(NamedTuple):
+class StoredEnergies(NamedTuple):
     """Energies that follow from the state [J]."""
 
     truck_kinetic: float
@@ -76,7 +76,7 @@ def nothing_exchanged() -> Exchanged:
 
 
 @kernel
-def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, c: Constants) -> Stored:
+def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, c: Constants) -> StoredEnergies:
     """Stored energies at a state [J].
 
     Parameters
@@ -95,7 +95,7 @@ def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, 
     sin, versin = sine_versine(y.theta_b)
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
     u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
-    return Stored(
+    return StoredEnergies(
         0.5 * m_v * y.v_v * y.v_v,
         0.5 * c.m_eff * y.v_b * y.v_b,
         0.5 * c.J_eff * y.omega_b * y.omega_b,
@@ -217,7 +217,7 @@ class Sample(NamedTuple):
 
     rate: Acceleration
     """Accelerations, and the moment of soil and truck without the restoring moment."""
-    stored: Stored
+    stored: StoredEnergies
     """Stored energies [J]; of plastic soil, what its elements would give back."""
     spent: float
     """Energy that was spent when a second spring took over [J] (Eq 112)."""
@@ -300,7 +300,7 @@ def evaluate_samples(
     rates
         Where the fields of `Acceleration` go, shape (4, n).
     stored
-        Where those of `Stored` go, shape (6, n) [J].
+        Where those of `StoredEnergies` go, shape (6, n) [J].
     spent
         Where the energies go that were spent when a second spring took over, by plastic soil up to the step of the
         sample, and by it since then, shape (3, n) [J]. The last is a part of the elastic energy of the soil.

@@ -14,8 +14,8 @@ from boulder_kernels.heave import (
     SETS,
     Base,
     Forces,
-    Form,
     HeaveConstants,
+    HeaveOptions,
     accelerations,
     forces,
     heave_constants,
@@ -30,7 +30,7 @@ from tests.oracle.heave import energy as known_energy
 
 from .samples import design_of, inputs_of, random_designs, random_state
 
-FORMS = [Form(True, True), Form(True, False), Form(False, True), Form(False, False)]
+FORMS = [HeaveOptions(True, True), HeaveOptions(True, False), HeaveOptions(False, True), HeaveOptions(False, False)]
 NAMES = ["heave and friction", "heave", "friction", "neither"]
 RISING = pytest.mark.parametrize("form", FORMS[:2], ids=NAMES[:2])
 RWG = design_of(oracle.RWG)
@@ -38,7 +38,7 @@ BASE = Base()
 NOTHING = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def constants(design: bk.Design, form: Form, base: Base = BASE, **changes: float) -> HeaveConstants:
+def constants(design: bk.Design, form: HeaveOptions, base: Base = BASE, **changes: float) -> HeaveConstants:
     """Constants of the motion, with some of them changed."""
     return heave_constants(design, constants_of(design, bk.corrected(), 0), form, base)._replace(**changes)
 
@@ -56,7 +56,7 @@ def random_sets(rng: np.random.Generator) -> np.ndarray:
     return np.where(rng.random(PIECES) < 0.4, rng.uniform(0.0, 0.01, PIECES), 0.0)
 
 
-def random_motion(rng: np.random.Generator, form: Form) -> tuple[State, float, float]:
+def random_motion(rng: np.random.Generator, form: HeaveOptions) -> tuple[State, float, float]:
     """State, rise and its rate: every other one close to rest, where parts of the foot are on the base."""
     y = random_state(rng, (-1.2, 1.2))
     if rng.random() < 0.5:
@@ -75,13 +75,13 @@ def coordinates(y: State, rise: float, rate: float) -> tuple[np.ndarray, np.ndar
     return np.array([y.x_b, y.theta_b, rise]), np.array([y.v_b, y.omega_b, rate])
 
 
-def as_vector(Q: Forces, form: Form) -> np.ndarray:
+def as_vector(Q: Forces, form: HeaveOptions) -> np.ndarray:
     """Generalised forces by x, theta, y; what would lift a boulder that may not rise counts for nothing."""
     return np.array([Q.Q_x, Q.Q_theta, Q.Q_y if form.heave else 0.0])
 
 
 @pytest.mark.parametrize("form", FORMS, ids=NAMES)
-def test_forces_and_accelerations_are_those_of_the_oracle(form: Form) -> None:
+def test_forces_and_accelerations_are_those_of_the_oracle(form: HeaveOptions) -> None:
     rng = np.random.default_rng(251)
     for design in random_designs(4, seed=252):
         f = constants(design, form)
@@ -100,7 +100,7 @@ def test_forces_and_accelerations_are_those_of_the_oracle(form: Form) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS[1::2], ids=NAMES[1::2])
-def test_energies_are_those_of_the_oracle(form: Form) -> None:
+def test_energies_are_those_of_the_oracle(form: HeaveOptions) -> None:
     rng = np.random.default_rng(253)
     for design in random_designs(4, seed=254):
         f = constants(design, form)
@@ -116,7 +116,7 @@ def test_energies_are_those_of_the_oracle(form: Form) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS[1::2], ids=NAMES[1::2])
-def test_forces_at_rest_are_the_slopes_of_the_energy(form: Form) -> None:
+def test_forces_at_rest_are_the_slopes_of_the_energy(form: HeaveOptions) -> None:
     """Soil, base and weight, the couple of a boulder that may not rise included: minus central differences."""
     rng = np.random.default_rng(255)
     for design in random_designs(4, seed=256):
@@ -136,7 +136,7 @@ def test_forces_at_rest_are_the_slopes_of_the_energy(form: Form) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS, ids=NAMES)
-def test_what_depends_on_velocities_takes_energy(form: Form) -> None:
+def test_what_depends_on_velocities_takes_energy(form: HeaveOptions) -> None:
     """Drag, dashpot and friction, wherever the boulder is and however it moves."""
     rng = np.random.default_rng(257)
     for design in random_designs(4, seed=258):
@@ -151,7 +151,7 @@ def test_what_depends_on_velocities_takes_energy(form: Form) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS, ids=NAMES)
-def test_a_boulder_at_rest_stays_at_rest(form: Form) -> None:
+def test_a_boulder_at_rest_stays_at_rest(form: HeaveOptions) -> None:
     for design in [RWG, *random_designs(4, seed=259)]:
         f = constants(design, form)
         Q = forces_at(NOTHING._replace(v_v=design.v_0), 0.0, 0.0, True, workspace(f), f)
@@ -255,7 +255,7 @@ def test_foot_rubs_with_what_it_carries() -> None:
 
 
 @pytest.mark.parametrize("form", FORMS[2:], ids=NAMES[2:])
-def test_without_rise_the_weight_is_the_couple_of_the_planar_motion(form: Form) -> None:
+def test_without_rise_the_weight_is_the_couple_of_the_planar_motion(form: HeaveOptions) -> None:
     """Once the foot has tilted by more than 6 s_0/L; before, a share of it (Eq 135)."""
     f = constants(RWG, form, Base(stiffness=1e9))
     weight = f.m_b * bk.design.G
@@ -270,7 +270,7 @@ def test_without_rise_the_weight_is_the_couple_of_the_planar_motion(form: Form) 
 
 
 @RISING
-def test_a_spring_lifts_by_its_energy_per_depth(form: Form) -> None:
+def test_a_spring_lifts_by_its_energy_per_depth(form: HeaveOptions) -> None:
     """Pushed forward while upright: elements press on the far face and lift it by v_n each (Eq 132)."""
     f = constants(RWG, form)
     x_b = 0.5 * f.c.x_yield

@@ -8,13 +8,13 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import G, constants_of
 from boulder_kernels.dormand_prince import Track
-from boulder_kernels.heave import PIECES, SETS, Base, Form, heave_constants, prepare
+from boulder_kernels.heave import PIECES, SETS, Base, HeaveOptions, heave_constants, prepare
 from boulder_kernels.heave_steps import START, WORKSPACE, Tracks, foot_rises, press_in
 from tests import oracle
 
 from .samples import design_of
 
-RWG, BASE, BOTH = design_of(oracle.RWG), Base(), Form(True, True)
+RWG, BASE, BOTH = design_of(oracle.RWG), Base(), HeaveOptions(True, True)
 
 
 def test_a_step_ends_where_a_strip_that_is_pressed_in_comes_back() -> None:

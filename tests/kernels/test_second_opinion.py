@@ -12,15 +12,15 @@ import boulder_kernels as bk
 from boulder_kernels import Status
 from boulder_kernels.design import G, constants_of
 from boulder_kernels.dynamics import contact_displacement, spring_compression
-from boulder_kernels.heave import PIECES, SETS, Base, Form, HeaveConstants, heave_constants, prepare
+from boulder_kernels.heave import PIECES, SETS, Base, HeaveConstants, HeaveOptions, heave_constants, prepare
 from boulder_kernels.heave_steps import START, WORKSPACE
 from boulder_kernels.second_opinion import (
     CAUTION,
     PLACED,
+    Equilibrium,
     HeaveControl,
     HeaveOutcome,
     HeaveRecord,
-    Position,
     energy_at,
     least_energy,
     move_to_least_energy,
@@ -41,7 +41,7 @@ from .samples import control, design_of, inputs_of, random_designs, same_bits, t
 
 RWG, ABG = design_of(oracle.RWG), design_of(oracle.ABG)
 BASE = Base()
-BOTH, RISE, NEITHER = Form(True, True), Form(True, False), Form(False, False)
+BOTH, RISE, NEITHER = HeaveOptions(True, True), HeaveOptions(True, False), HeaveOptions(False, False)
 LIMIT = np.radians(60.0)
 LAWS = ("broms", "width_capped")
 DEGREE = np.degrees(1.0)
@@ -69,7 +69,7 @@ class Motion(NamedTuple):
 
 def simulate(
     design: bk.Design,
-    form: Form,
+    form: HeaveOptions,
     how: HeaveControl,
     base: Base = BASE,
     record: HeaveRecord | None = None,
@@ -88,7 +88,9 @@ def empty_record(end: float, count: int) -> HeaveRecord:
     return HeaveRecord(np.linspace(0.0, end, count), np.full((count, 8), np.nan), np.full(count, np.nan))
 
 
-def assert_as_the_oracle(design: bk.Design, law: str, form: Form, horizon: float, tolerance: float = 1e-12) -> None:
+def assert_as_the_oracle(
+    design: bk.Design, law: str, form: HeaveOptions, horizon: float, tolerance: float = 1e-12
+) -> None:
     """Hold an impact against the oracle: 1e-3 degrees, 1e-5 m and s."""
     inputs = replace(inputs_of(design), resistance=law)
     known = known_impact(inputs, heave=form.heave, friction=form.friction, horizon=horizon, limit=LIMIT)
@@ -119,8 +121,8 @@ def test_crash_tests_are_those_of_the_oracle(design: bk.Design, law: str) -> Non
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("form", [RISE, Form(False, True), NEITHER], ids=["heave", "friction", "neither"])
-def test_other_forms_are_those_of_the_oracle(form: Form) -> None:
+@pytest.mark.parametrize("form", [RISE, HeaveOptions(False, True), NEITHER], ids=["heave", "friction", "neither"])
+def test_other_forms_are_those_of_the_oracle(form: HeaveOptions) -> None:
     assert_as_the_oracle(RWG, "broms", form, 0.2)
 
 
@@ -134,7 +136,7 @@ def test_random_impacts_are_those_of_the_oracle(number: int) -> None:
 @pytest.mark.compiled
 @pytest.mark.parametrize("number", range(40))
 def test_many_random_impacts_are_those_of_the_oracle(number: int) -> None:
-    forms = [BOTH, RISE, BOTH, Form(False, True)]
+    forms = [BOTH, RISE, BOTH, HeaveOptions(False, True)]
     assert_as_the_oracle(random_designs(40, seed=272)[number], LAWS[number % 2], forms[number % 4], 0.6)
 
 
@@ -170,8 +172,8 @@ def test_energy_stays_where_nothing_dissipates() -> None:
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("form", [BOTH, RISE, Form(False, True)], ids=["both", "heave", "friction"])
-def test_energy_only_falls_with_all_that_dissipates(form: Form) -> None:
+@pytest.mark.parametrize("form", [BOTH, RISE, HeaveOptions(False, True)], ids=["both", "heave", "friction"])
+def test_energy_only_falls_with_all_that_dissipates(form: HeaveOptions) -> None:
     for design in [RWG, ABG, *some_designs(8, seed=262)]:
         record = empty_record(0.6, 301)
         simulate(design, form, HeaveControl(1.2, 0.6, 1e-12), BASE, record)
@@ -264,7 +266,7 @@ def test_on_a_stiff_base_it_turns_about_the_far_end_of_its_foot(number: int) -> 
 @pytest.mark.compiled
 @pytest.mark.parametrize("degrees", [20.0, 60.0])
 @pytest.mark.parametrize("form", [BOTH, RISE], ids=["both", "heave"])
-def test_what_is_proved_to_stay_below_the_limit_does(form: Form, degrees: float) -> None:
+def test_what_is_proved_to_stay_below_the_limit_does(form: HeaveOptions, degrees: float) -> None:
     """Simulated on for five seconds."""
     limit = np.radians(degrees)
     table = table_of(some_designs(600, seed=265))
@@ -309,7 +311,7 @@ def test_eased_is_where_a_step_either_way_costs_more() -> None:
             at_top = f.c.l_n * (1.0 - np.cos(theta)) - f.c.z_0 * np.sin(theta)
             across = sorted((at_top, at_top + design.d * np.sin(theta)))
             for sideways, (low, high) in ((True, across), (False, (-1.0, 2.0))):
-                start = Position(rng.uniform(*across), rng.uniform(-0.5, 0.5), np.inf)
+                start = Equilibrium(rng.uniform(*across), rng.uniform(-0.5, 0.5), np.inf)
                 least = move_to_least_energy(start, sideways, low, high, theta, work, f)
                 assert (least.y == start.y) if sideways else (least.x == start.x)
                 ends = np.linspace(low, high, 2001)
@@ -396,7 +398,7 @@ def test_a_boulder_that_the_base_cannot_carry_has_no_second_opinion() -> None:
     for factor, status in ((0.999, Status.HORIZON), (1.001, Status.INVALID)):
         table = table_of([RWG._replace(rho_b=factor * bearable)])
         assert second_opinions(table, how).status[0] == status
-        assert second_opinions(table, how, Form(False, True)).status[0] == Status.HORIZON
+        assert second_opinions(table, how, HeaveOptions(False, True)).status[0] == Status.HORIZON
 
 
 @pytest.mark.compiled
@@ -423,6 +425,8 @@ def test_extremes_end(change: dict[str, float], statuses: set[Status]) -> None:
 def test_friction_holds_and_rise_loosens() -> None:
     """Either alone does what it is said to: with friction a boulder turns less, free to rise it turns further."""
     table, how = table_of(some_designs(60, seed=278)), HeaveControl(LIMIT, 0.4, stop=False)
-    turned_by = {form: second_opinions(table, how, form).theta_max for form in (BOTH, RISE, Form(False, True), NEITHER)}
-    assert np.mean(turned_by[Form(False, True)] < turned_by[NEITHER]) > 0.9
+    turned_by = {
+        form: second_opinions(table, how, form).theta_max for form in (BOTH, RISE, HeaveOptions(False, True), NEITHER)
+    }
+    assert np.mean(turned_by[HeaveOptions(False, True)] < turned_by[NEITHER]) > 0.9
     assert np.mean(turned_by[BOTH] < turned_by[RISE]) > 0.9

@@ -19,7 +19,7 @@ from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import Quantity, answers_table
+from boulder_sweep.report.asked import Measure, answers_table
 from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
@@ -99,7 +99,7 @@ def test_the_governing_answer_is_named(files: dict[str, Path], name: str) -> Non
     answer = answer_of(read_rows(files[name]))
     assert answer.named[0].number == row
     governing = answer.sentences[1]
-    assert frame[key][row] in [part.value for part in governing if isinstance(part, Quantity)]
+    assert frame[key][row] in [part.value for part in governing if isinstance(part, Measure)]
     words = "".join(str(part) for part in governing if isinstance(part, str))
     assert f"(design {row}, " in words
     found = int(frame[key].notna().sum())
@@ -142,7 +142,7 @@ def test_the_table_has_every_answer_with_its_inputs(files: dict[str, Path]) -> N
             assert [row[found.heads.index("soil")] for row in found.rows] == table["soil"].to_pylist()
         if name == "capacity":
             speeds = [row[found.heads.index("withstands speed")] for row in found.rows]
-            assert [part.value for part in speeds if isinstance(part, Quantity)] == [
+            assert [part.value for part in speeds if isinstance(part, Measure)] == [
                 value for value in table["withstands_speed_m_s"].to_pylist() if value is not None
             ]
 

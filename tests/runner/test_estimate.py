@@ -18,7 +18,7 @@ from boulder_sweep.runner import sweeper
 from boulder_sweep.runner.estimate import (
     LARGEST_BLOCK,
     Estimate,
-    Sample,
+    RowCost,
     blocks,
     estimated,
     peak_memory,
@@ -185,7 +185,7 @@ def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
 
 
 def test_an_estimate_is_in_proportion():
-    sample = Sample(1e-6, 50.0, 10_000.0)
+    sample = RowCost(1e-6, 50.0, 10_000.0)
     common = {"jobs": 2, "out": None}
     one = estimated(sample, rows=10**6, rows_to_compute=10**6, **common)
     ten = estimated(sample, rows=10**7, rows_to_compute=10**7, **common)
@@ -196,7 +196,7 @@ def test_an_estimate_is_in_proportion():
 
 
 def test_more_workers_than_cores_are_not_faster(monkeypatch):
-    monkeypatch.setattr(sweeper, "take_sample", lambda *_: Sample(1e-3, 50.0, 10_000.0))
+    monkeypatch.setattr(sweeper, "take_sample", lambda *_: RowCost(1e-3, 50.0, 10_000.0))
     monkeypatch.setattr(sweeper, "available_cores", lambda: 2)
     one, two, eight = (estimate(grid(), jobs=jobs, simulate=plausible) for jobs in (1, 2, 8))
     assert one.seconds == pytest.approx(0.441)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from distributed import Future
 
-from boulder_sweep.runner.dispatch import Dispatcher, Outcome
+from boulder_sweep.runner.dispatch import Dispatcher, TaskResult
 from boulder_sweep.runner.pool import Pool, call, pool
 
 
@@ -62,7 +62,7 @@ def test_a_result_lost_with_its_worker_is_waited_for(workers: Pool, monkeypatch:
     """The loss is noticed before the result is fetched; another worker computes it anew."""
     receive, expect, seen = Dispatcher._received, Dispatcher._expect_lost, []
 
-    def receive_late(self: Dispatcher[int], future: Future) -> Outcome[int] | None:
+    def receive_late(self: Dispatcher[int], future: Future) -> TaskResult[int] | None:
         if not seen:
             told(workers, future._state.lose)
         seen.append(future.status)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from boulder_sweep.stones.reading import Scan
+from boulder_sweep.stones.reading import ScannedSurface
 from boulder_sweep.stones.solid import Solid, solid_of
 from boulder_sweep.stones.standing import Stone
 from docs.studies.example_rock import askew, rock_surface
@@ -53,8 +53,8 @@ def _of(mesh: trimesh.Trimesh) -> Surface:
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
-def scan(surface: Surface) -> Scan:
-    return Scan("rock.ply", "", *surface)
+def scan(surface: Surface) -> ScannedSurface:
+    return ScannedSurface("rock.ply", "", *surface)
 
 
 def solid(surface: Surface) -> Solid:

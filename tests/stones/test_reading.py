@@ -43,7 +43,7 @@ def test_every_format_holds_the_same_stone(kind, tmp_path):
     assert len(found.sha256) == 64
     own = solid_of(found)
     assert len(own.faces) == len(surface[1])
-    whole = solid_of(reading.Scan("", "", *surface))
+    whole = solid_of(reading.ScannedSurface("", "", *surface))
     assert own.volume == pytest.approx(whole.volume, rel=1e-6)
     np.testing.assert_allclose(own.centre, whole.centre, atol=1e-5)
 
@@ -51,7 +51,9 @@ def test_every_format_holds_the_same_stone(kind, tmp_path):
 def test_units(tmp_path):
     points, faces = rock(1)
     path = written((points * 1000.0, faces), tmp_path / "rock.ply")
-    assert solid_of(read_scan(path, 1e-3)).volume == pytest.approx(solid_of(reading.Scan("", "", points, faces)).volume)
+    assert solid_of(read_scan(path, 1e-3)).volume == pytest.approx(
+        solid_of(reading.ScannedSurface("", "", points, faces)).volume
+    )
     with pytest.raises(ScanError, match=r"its largest side is 3\d\d\d m; .*; if the scan is in mm, add its unit: mm"):
         read_scan(path)
 
@@ -73,7 +75,7 @@ def test_parts_of_a_scene_are_placed(tmp_path):
     scene.add_geometry(trimesh.Trimesh(points, faces, process=False), transform=placing)
     scene.export(tmp_path / "rock.glb")
     own = solid_of(read_scan(tmp_path / "rock.glb"))
-    assert own.volume == pytest.approx(8.0 * solid_of(reading.Scan("", "", points, faces)).volume, rel=1e-5)
+    assert own.volume == pytest.approx(8.0 * solid_of(reading.ScannedSurface("", "", points, faces)).volume, rel=1e-5)
     np.testing.assert_allclose(own.centre, (5.0, 0.0, 0.0), atol=1e-5)
 
 

@@ -19,16 +19,16 @@ from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.views import side_view
-from boulder_sweep.views.scene import SLICES, STYLES, Shape, SideView, samples_shown
+from boulder_sweep.views.scene import SLICES, STYLES, SceneItem, SideView, samples_shown
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-def of_style(shapes: list[Shape], style: str) -> list[Shape]:
+def of_style(shapes: list[SceneItem], style: str) -> list[SceneItem]:
     return [shape for shape in shapes if shape.style == style]
 
 
-def lengths(shapes: list[Shape]) -> np.ndarray:
+def lengths(shapes: list[SceneItem]) -> np.ndarray:
     """Lengths of arrows along X, with their direction."""
     return np.array([shape.points[1][0] - shape.points[0][0] for shape in shapes])
 

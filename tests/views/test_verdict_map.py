@@ -16,7 +16,7 @@ from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings import load_text
-from boulder_sweep.views.slices import Kept, Pieces, Slice, pieces_of, plane
+from boulder_sweep.views.slices import PictureRows, Pieces, Slice, pieces_of, plane
 from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
 from boulder_sweep.views.wording import label, value_text
 
@@ -229,8 +229,8 @@ def test_the_command_never_holds_more_than_a_few_parts(out, monkeypatch, capsys)
         held.append(len(rows))
         plain(kept, rows)
 
-    plain = Kept.add
-    monkeypatch.setattr(Kept, "add", add)
+    plain = PictureRows.add
+    monkeypatch.setattr(PictureRows, "add", add)
     monkeypatch.setattr("boulder_sweep.store.read", None)
     assert (
         boulder_sweep.run(boulder_sweep.load(out.parent / "grid.yaml"), out, overwrite=True, rows_per_part=5).rows == 36
