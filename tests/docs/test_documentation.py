@@ -148,7 +148,8 @@ def test_command_needs_the_repository(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.nightly
 def test_pictures_are_drawn_by_the_command(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    for folder in ("configs", "docs/examples"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
     drawn = draw_all(tmp_path)
     assert all(path.stat().st_size < MOST_BYTES for path in drawn)
     assert {path.name for path in drawn} == {path.name for path in (DOCS / "images").iterdir()}
