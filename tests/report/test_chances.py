@@ -14,7 +14,8 @@ import boulder_sweep
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import Quantity, answer_of
+from boulder_sweep.report.answers import answer_of
+from boulder_sweep.report.asked import Measure
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import sha256_of
@@ -54,7 +55,7 @@ def test_the_probabilities_are_said_first(chances: Path) -> None:
     assert str(answer.sentences[0][0]).startswith(f"{len(safe)} of 4 designs pass with a probability of 95% or more")
     mass = safe.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3").astype(float)
     lightest = int(mass.idxmin())
-    numbers = [part.value for part in answer.sentences[0] if isinstance(part, Quantity)]
+    numbers = [part.value for part in answer.sentences[0] if isinstance(part, Measure)]
     assert numbers[:3] == pytest.approx([40.0, mass[lightest], 2.2])  # in the looser soil it is not safe: it is named
     assert numbers[3] == pytest.approx(frame.boulder_height_m[lightest] - 2.2)
     assert answer.sentences[0][1] == ", with soil friction angle "

@@ -9,7 +9,8 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import Quantity, answer_of
+from boulder_sweep.report.answers import answer_of
+from boulder_sweep.report.asked import Measure
 from boulder_sweep.report.contents import table_data, thinned
 from boulder_sweep.report.rows import NOT_YET, read_rows
 from tests.report.conftest import GRID, LIST, SETS
@@ -73,7 +74,7 @@ def test_the_answer_names_the_least_boulder_that_passes_in_every_soil(rows, tabl
     answer = answer_of(rows)
     assert answer.named[0].number == lightest.design_id
     sentence = next(sentence for sentence in answer.sentences if "lightest" in str(sentence[0]))
-    quantities = [part for part in sentence if isinstance(part, Quantity)]
+    quantities = [part for part in sentence if isinstance(part, Measure)]
     above = lightest.boulder_height_m - lightest.embedment_depth_m
     assert [part.value for part in quantities[:3]] == pytest.approx([lightest.mass, lightest.embedment_depth_m, above])
     assert [part.unit for part in quantities] == ["kg", "m", "m", "m^3", "m^3"]
