@@ -33,14 +33,8 @@ from .timing import machine, timed, versions
 
 PACKAGE = "boulder_kernels_single"
 SOURCES = Path(bk.__file__).parent
-KEPT = ("design", "stability")
+KEPT = ("design", "control")
 """Modules that stay in double precision: what is computed once per design."""
-ORDER = (
-    *("design", "stability", "numerics", "flat", "modes", "soil", "layered", "layered_soil", "plastic"),
-    *("soil_laws", "dynamics", "dense_output", "dormand_prince", "outcomes", "embedded", "gaps", "events", "energy"),
-    *("settling", "after_step", "second_spring", "unloading", "onset", "workspace", "_lowering", "impact"),
-    *("lane_events", "lane_steps", "lanes"),
-)
 CHANGES = {
     "soil": (
         ("TINY = 1e-30", "TINY = 1e-15"),  # its square must not be zero
@@ -77,10 +71,24 @@ def load_single_precision() -> types.ModuleType:
     package.__path__ = []
     sys.modules[PACKAGE] = package
     _add("_jit", _decorators())
-    for name in ORDER:
-        _add(name, sys.modules[f"boulder_kernels.{name}"] if name in KEPT else _translated(name))
+    for name in ("_lowering", "lanes"):  # the first is what the second compiles with
+        _load(name)
     _jit.compiler()  # tells Numba of what is no kernel
     return sys.modules[f"{PACKAGE}.lanes"]
+
+
+def _load(name: str) -> None:
+    """Add a module of the kernels, and first those that it imports."""
+    if f"{PACKAGE}.{name}" in sys.modules:
+        return
+    if name in KEPT:
+        _add(name, sys.modules[f"boulder_kernels.{name}"])
+        return
+    for node in ast.parse((SOURCES / f"{name}.py").read_text()).body:
+        if isinstance(node, ast.ImportFrom) and node.level == 1:
+            for imported in [node.module] if node.module else [one.name for one in node.names]:
+                _load(imported)
+    _add(name, _translated(name))
 
 
 def _add(name: str, module: types.ModuleType) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +15,15 @@ from benchmarks.accuracy import control
 from benchmarks.designs import sample
 from benchmarks.single_precision import load_single_precision, simulated, single_control
 from boulder_kernels import lanes as double_lanes
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_kernels_are_all_read_in_single_precision() -> None:
+    """Without compiling them, in a process of its own: which modules there are is not written down a second time."""
+    script = "from benchmarks.single_precision import load_single_precision as load; print(load().__name__)"
+    found = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert found.stdout == "boulder_kernels_single.lanes\n"
 
 
 @pytest.mark.nightly
