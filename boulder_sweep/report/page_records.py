@@ -91,7 +91,7 @@ LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 
 PIECE_ROOM = len(OutlinedPieces._fields) - 1
 """The same for each piece of the soil beside a boulder with an outline: of M layers and P points M + P - 2."""
-MEMORY_AT = max(len(law.record._fields) for law in ELEMENT_LAWS)  # type: ignore[attr-defined]
+MEMORY_AT = max(len(law.record._fields) for law in ELEMENT_LAWS)
 """Where the memory of N soil elements begins, over N."""
 ELEMENT_ROOM, MEMORY_ROOM = MEMORY_AT + 2, LAST + 6
 """The same for each of N soil elements with what it remembers, and once for all; before them, where a record is kept,

@@ -42,10 +42,9 @@ FOOT_WORDS = {
 }
 """What every answer says of it."""
 
-PLASTIC_UNLOADINGS = ("plastic", "plastic_with_gap")
-"""Ways to unload after which boulders come to rest; see `boulder_kernels.plastic`."""
-UNLOADINGS = ("elastic", *PLASTIC_UNLOADINGS)
+UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
 """How the soil unloads, in the order of `boulder_kernels.soil_laws.ELEMENT_LAWS`; the first is the paper's."""
+PLASTIC_UNLOADINGS = UNLOADINGS[1:3]  # after which boulders come to rest
 PLASTIC_ELEMENTS = 200
 """Soil elements where the soil is not elastic and no number is given."""
 
@@ -390,8 +389,7 @@ class Model:
     @property
     def elements(self) -> int:
         """Number of soil elements that is computed with; 0 for the closed form, which elastic soil has."""
-        is_elastic = self.unloading == UNLOADINGS[0]
-        return PLASTIC_ELEMENTS if not is_elastic and self.soil_elements == 0 else self.soil_elements
+        return self.soil_elements or (0 if self.unloading == UNLOADINGS[0] else PLASTIC_ELEMENTS)
 
     @property
     def ground(self) -> Ground:

@@ -87,8 +87,8 @@ class SoilLaw(NamedTuple):
 class ElementLaw(NamedTuple):
     """Which elements a soil consists of where it is computed by elements."""
 
-    record: type = SoilElements
-    """Their record, one of `LAWS`; its fields are arrays of shape (N,)."""
+    record: Any = SoilElements
+    """Type of their record, one of `LAWS`; its fields are arrays of shape (N,)."""
     gap: bool | None = None
     """Whether a gap opens between plastic elements and boulder; None for elements without memory."""
 
@@ -267,7 +267,7 @@ def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None, un
     if outline is not None:
         return empty_outlined(layers + len(outline) - 2, elements, outline)
     if elements > 0:
-        record: Any = ELEMENT_LAWS[unloading].record
+        record = ELEMENT_LAWS[unloading].record
         return record(*np.empty((len(record._fields), elements)))
     to, K, inverse_K, P_0, P_1, R = np.empty((6, layers))
     return SoilLayers(to, K, inverse_K, P_0, P_1, R, np.empty(len(SoilSums._fields)))
