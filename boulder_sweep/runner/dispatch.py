@@ -22,8 +22,8 @@ from boulder_sweep.runner.cluster import Cluster, no_worker_text
 from boulder_sweep.text import counted
 
 FETCH_S = 2.0
-"""How long to wait for a result that a worker of a cluster has finished; twice as long after each time that this was
-too short [s].
+"""How long to wait for a result that a worker of a cluster has finished; twice as long as any time that was too short
+[s].
 
 If a worker dies between finishing a task and handing over the result, the scheduler may try to reach it for 30 s,
 Dask's limit for a connection. Asked again, it gives the result of the worker that has computed the task anew.
@@ -109,7 +109,7 @@ class Dispatcher(Generic[Item]):
         self._lost: list[Any] = []
         """Futures in flight whose result was lost with its worker before it was received."""
         self._fetch_s = FETCH_S
-        self._late: dict[Any, tuple[Any, Exception | None]] = {}
+        self._late: dict[Any, _Fetched] = {}
         """What came of futures whose results did not come at once."""
         self._stopped = threading.Event()
         self._there: dict[str, int] = {}
@@ -222,12 +222,12 @@ class Dispatcher(Generic[Item]):
             # It may lie on a worker that is silent: others go on meanwhile.
             threading.Thread(target=self._fetch, args=(future, self._fetch_s), daemon=True).start()
             return None
-        result, problem = self._late.pop(future) if future in self._late else _fetched(future, FETCH_S)
+        limit_s, result, problem = self._late.pop(future) if future in self._late else _fetched(future, FETCH_S)
         if problem is not None:
             if future.cancelled() or self._cluster.client.status != "running":
                 raise ClusterLostError(self._cluster.lost_text()) from problem
             if isinstance(problem, TimeoutError) and future.status != "error":
-                self._fetch_s *= 2.0
+                self._fetch_s = max(self._fetch_s, 2.0 * limit_s)  # several may have waited as long at once
                 future.add_done_callback(self._arrived.put)
                 return None
         return TaskResult(self._in_flight.pop(future).task.item, result, problem)
@@ -279,12 +279,21 @@ class Dispatcher(Generic[Item]):
         self._fetch_s = FETCH_S
 
 
-def _fetched(future: Any, limit_s: float) -> tuple[Any, Exception | None]:
+class _Fetched(NamedTuple):
+    """What came of waiting for the result of a future."""
+
+    limit_s: float
+    """How long it was waited for at most [s]."""
+    result: Any
+    problem: Exception | None
+
+
+def _fetched(future: Any, limit_s: float) -> _Fetched:
     """Return the result of a future, or what went wrong."""
     try:
-        return future.result(timeout=limit_s), None
+        return _Fetched(limit_s, future.result(timeout=limit_s), None)
     except Exception as problem:
-        return None, problem
+        return _Fetched(limit_s, None, problem)
 
 
 class Silence:

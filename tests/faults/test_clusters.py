@@ -142,18 +142,20 @@ def test_a_result_lost_with_its_worker_is_computed_again(tmp_path, monkeypatch):
 def test_a_result_that_does_not_come_is_asked_for_again(tmp_path, monkeypatch):
     """As where its worker has just died, and the scheduler still tries to reach it."""
     rows, how = 2000, {"rows_per_part": 500, "simulate": plausible}
-    result, waited = Future.result, []
+    result, limits, in_flight = Future.result, [], threading.Barrier(2)
 
     def comes_at_last(self, timeout=None):
-        waited.append(timeout)
-        if len(waited) < 3:
+        limits.append(timeout)
+        if timeout < 8.0:
+            if timeout > 2.0:
+                in_flight.wait(HANG_GUARD_S)  # hang guard
             raise TimeoutError
         return result(self, HANG_GUARD_S)  # hang guard
 
     monkeypatch.setattr(Future, "result", comes_at_last)
     run(grid_of(rows), tmp_path / "out", backend="dask", jobs=1, **how)
-    assert waited[:2] == [2.0, 4.0]
-    assert set(waited[2:]) == {8.0}, "a slow connection is not found out again for every result"
+    assert limits[:3] == [2.0, 4.0, 4.0], "both in flight wait longer after the first"
+    assert set(limits[3:]) == {8.0}, "a slow connection is not found out again for every result, or twice at once"
     run(grid_of(rows), tmp_path / "whole", **how)
     assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
 
