@@ -24,7 +24,7 @@ from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
 from boulder_sweep.judge.refinement import RowStates, finer_controls
 from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
-from boulder_sweep.judge.verdict import Limits, judge, limits_of
+from boulder_sweep.judge.verdict import JudgedOnce, Limits, judge, judge_once, limits_of
 from boulder_sweep.settings.model import SECOND_OPINIONS, Model
 from boulder_sweep.soils import with_soil
 
@@ -141,17 +141,16 @@ class Evaluation:
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         Second opinions are asked with the reduced limit.
         """
-        rows = RowStates(designs, self.control, *self._once(designs, self.control))
+        rows = RowStates(designs, self.control, self._once(designs, self.control))
         for control in finer_controls(self.control):
             again = rows.wanted(control)
             if len(again):
-                rows.update(again, control, *self._once(designs.rows(again), control))
-            elif not rows.unconfirmed.any():
+                rows.update(again, control, self._once(designs.rows(again), control))
+            elif not len(rows.unconfirmed):
                 break
         judged = rows.judged
-        if rows.unconfirmed.any():
-            doubted = np.flatnonzero(rows.unconfirmed)
-            judged = self._judge_doubted(judged, doubted, designs, rows.outcomes)
+        if len(rows.unconfirmed):
+            judged = self._judge_doubted(judged, rows.unconfirmed, designs, rows.outcomes)
         judged = joined([judged])
         if self.least_margin > 0.0:
             judged = self._margins_proved(judged, designs)
@@ -196,10 +195,10 @@ class Evaluation:
         margin[there[reduced.judged(designs.rows(there)).verdict != PASS]] = np.nextafter(self.least_margin, 0.0)
         return replace(judged, columns=judged.columns | {"margin": margin})
 
-    def _once(self, designs: Designs, control: Control) -> tuple[Judged, OutcomeTable]:
+    def _once(self, designs: Designs, control: Control) -> JudgedOnce:
         """Simulate and judge designs once."""
         outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
-        return judge(outcomes, designs, self.limits, self.only), outcomes
+        return judge_once(outcomes, designs, self.limits, self.only)
 
     def _judge_doubted(self, judged: Judged, rows: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> Judged:
         """Judge late rows, on which no two solutions agree, as of unknown error."""

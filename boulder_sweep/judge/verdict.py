@@ -58,8 +58,6 @@ STATUS_REASONS = {
     Status.INVALID: "a constant of the design (mass, inertia or stiffness) is zero, negative or not finite",
 }
 """Reason of a row that the kernels could not compute."""
-STEP_REASONS = frozenset(text for status, text in STATUS_REASONS.items() if status != Status.INVALID)
-"""Those that a finer time step may resolve."""
 _VERDICTS = np.array([VERDICTS.index(verdict) for verdict, _ in RULES], dtype=np.int32)
 _REASONS = np.array([REASONS.index(reason) for _, reason in RULES], dtype=np.int32)
 NOT_FINITE = "the computed result is not a finite number"
@@ -93,6 +91,15 @@ class Limits(NamedTuple):
         return PENETRATION_LIMITS_M[self.rating]
 
 
+class JudgedOnce(NamedTuple):
+    """What one solution of n rows gives."""
+
+    judged: Judged
+    outcomes: OutcomeTable
+    rule: np.ndarray
+    """The rule that decides each row, one of `boulder_kernels.rules.RULES`, shape (n,)."""
+
+
 class Facts(NamedTuple):
     """What is known of n rows: what the columns of the table are computed from. Arrays have the shape (n,)."""
 
@@ -109,6 +116,8 @@ class Facts(NamedTuple):
     """How far the leading edge of the cargo bed came past the far face of the boulder [m]."""
     margin: np.ndarray
     """Least (limit - value) / limit over the criteria."""
+    rule: np.ndarray
+    """The rule that decides each row, one of `boulder_kernels.rules.RULES`."""
     verdict: np.ndarray
     """Codes of the verdicts."""
     reason: np.ndarray
@@ -149,6 +158,11 @@ def judge(
     Judged
         One verdict a row; no row is dropped.
     """
+    return judge_once(outcomes, designs, limits, only).judged
+
+
+def judge_once(outcomes: OutcomeTable, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> JudgedOnce:
+    """Apply the rules of this module to n rows, and tell which one decides each; see `judge`."""
     facts = facts_of(outcomes, designs, limits)
     columns, words = {}, {}
     for spec in (*OUTCOMES, *(AT_REST if isinstance(outcomes, OutcomesAtRest) else ())):
@@ -166,7 +180,7 @@ def judge(
             none = -1 if spec.type == "dictionary" else np.nan
             values = np.where(facts.rows[spec.rows], values, none).astype(values.dtype, copy=False)
         columns[spec.name] = values
-    return Judged(columns, words)
+    return JudgedOnce(Judged(columns, words), outcomes, facts.rule)
 
 
 def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
@@ -208,6 +222,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
         overlap=overlap,
         penetration=penetration,
         margin=margin,
+        rule=rule,
         verdict=verdict,
         reason=reason,
         rating=_ratings(penetration),

@@ -21,7 +21,7 @@ from boulder_sweep.investigation import FAMILY_FACTOR, api_curve, terzaghi_curve
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.validity import FLAGS, TESTED_OVERLAP_M, TESTED_ROTATION_DEG, usual_range
-from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, STEP_REASONS
+from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import page_records
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, parts_of
@@ -91,12 +91,14 @@ def page_data(
     law = settings["model"].get("resistance", RESISTANCES[0])
     simulated = control._replace(elements=min(control.elements, MOST_ELEMENTS))
     simulated = simulated._replace(paired=is_paired(readings, simulated, layered=is_layered(law, ground, shape)))
+    controls = [simulated, *finer_controls(simulated)]
     return {
         "title": str(settings["name"]),
         "units": units,
         "unit": {unit: {system: shown_unit(unit, system) for system in SYSTEMS} for unit in _units()},
         "layout": _layout(),
-        "settings": [float(value) for value in (*readings, *simulated)],
+        "controls": [[float(value) for value in (*readings, *one)] for one in controls],
+        "steps_s": [reported_step_s(one) for one in controls],
         "rules": _rules(control.theta_limit, settings),
         "inputs": [
             _input(spec.name, start, settings, ground) for spec in (*INPUTS, *OPTIONAL_INPUTS) if spec.name in start
@@ -128,18 +130,6 @@ def page_data(
             "most_solidity": MOST_SOLIDITY,
         },
         "words": REASON_WORDS,
-        "step_s": reported_step_s(control),
-        "finer": [
-            {
-                "h": finer.h,
-                "locate_yield": float(finer.locate_yield),
-                "paired": float(finer.paired),
-                "event_tolerance": finer.event_tolerance,
-                "step_s": reported_step_s(finer),
-            }
-            for finer in finer_controls(simulated)
-            if not finer.last_resort
-        ],
         "parts": parts_of(control),
         "colours": COLOURS,
         "yaml": {system: _yaml(settings, ground, system) for system in SYSTEMS},
@@ -294,7 +284,6 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
         "ratings": list(PENETRATION_LIMITS_M.items()),
         "status": {status.name: status.value for status in Status},
         "why": {str(status.value): words for status, words in STATUS_REASONS.items()},
-        "open": sorted(STEP_REASONS),
         "tested": _tested(settings["model"]),
     }
 

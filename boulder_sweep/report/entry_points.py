@@ -1,7 +1,7 @@
-"""What the page calls: the kernels behind three functions over pointers to doubles.
+"""What the page calls: the kernels behind two functions over pointers to doubles.
 
-`outcomes` does the work of ``sweep run``, one design after another instead of in lanes, `rulings`
-that of its verdicts, and `history` that of ``sweep simulate``.
+`rows` does the work of ``sweep run``, one design after another instead of in lanes, and `history` that of
+``sweep simulate``.
 """
 
 from __future__ import annotations
@@ -33,10 +33,20 @@ from boulder_kernels.error_estimates import (
     step_errors,
 )
 from boulder_kernels.ground import Ground, put_soil
-from boulder_kernels.impact import failed
+from boulder_kernels.impact import failed, simulate_last_resort
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, Status, write_outcome
 from boulder_kernels.plastic import memory_of
-from boulder_kernels.rules import limits_in, write_rulings
+from boulder_kernels.rules import (
+    AGREEING,
+    Confirmation,
+    after_finer,
+    agree,
+    is_late,
+    is_wanted,
+    limits_in,
+    put_ruling,
+    ruling_of,
+)
 from boulder_kernels.soil_laws import ELEMENT_LAWS, SoilProfile, constants_in
 from boulder_kernels.time_history import sample_of, state_of
 from boulder_kernels.unloading import plastic_work, recall
@@ -51,12 +61,16 @@ from boulder_sweep.report.page_records import (
     ONCE,
     PAIRED_AT,
     PIECE_ROOM,
+    RULINGS_COUNT,
     SETTINGS_COUNT,
+    SIZES_COUNT,
+    V_0,
     first_control,
     given_control,
     halved_control,
     layers_from,
     memory_from,
+    outcome_at,
     outcomes_from,
     outlined_elements_from,
     pieces_from,
@@ -66,7 +80,7 @@ from boulder_sweep.report.page_records import (
     written_out,
 )
 
-EXPORTS = {"outcomes": "pippipipippppp", "rulings": "ipppp", "history": "pppipipipppippppppp"}
+EXPORTS = {"rows": "pippipipipppippppp", "history": "pppipipipppippppppp"}
 """The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number."""
 carray: Any = None
 """`numba.carray`, which is there when kernels are compiled: a report is written without Numba."""
@@ -202,6 +216,8 @@ def simulate_in_soil(
     m, points, n, samples = len(layers), len(outline), control.elements, record.times.size
     kept = samples * (2 * n + 1)
     room = carray(soil_at, (kept + ELEMENT_ROOM * n + MEMORY_ROOM,))[kept:]
+    if m == 0 and control.last_resort and control.stop_at_limit:
+        return simulate_last_resort(Problem(design, None, second), readings, control, record)
     if m == 0:
         return simulate_recorded(None, design, second, readings, control, record, out, centre)
     if points > 0 and n == 0:
@@ -245,8 +261,63 @@ def solve(
     return second_solution
 
 
+@inlined
+def copy_row(outcomes: np.ndarray, to: np.ndarray, row: int) -> None:
+    """Copy the results of one design."""
+    for column in range(outcomes.shape[0]):
+        to[column, row] = outcomes[column, row]
+
+
 @array_kernel
-def outcomes(
+def solve_for_error(
+    finer: np.ndarray,
+    coarser: np.ndarray,
+    row: int,
+    designs: np.ndarray,
+    layers: np.ndarray,
+    outlines: np.ndarray,
+    soil_at: Any,
+    settings: np.ndarray,
+) -> None:
+    """Simulate one design, and estimate its error as its settings ask for it.
+
+    Parameters
+    ----------
+    finer, coarser
+        Where the results go, and room for the second solution, shape (len(OUTCOME), n).
+    row, designs, layers, outlines, soil_at
+        The design and its soil, as of `solve`.
+    settings
+        Shape (len(SETTINGS),).
+    """
+    readings, given, way = readings_from(settings), given_control(settings), int(settings[PAIRED_AT])
+    estimated = given.error_estimate
+    nothing = carray(soil_at, (0,))
+    record = Record(nothing, carray(soil_at, (0, 6)), nothing, nothing, carray(soil_at, (0, 4)), nothing)
+    first = first_control(given, estimated)
+    second = solve(finer, row, designs, layers, outlines, soil_at, readings, first, record)
+    if not estimated or way == ONCE or (way == CHECKED and second == NONE_NEEDED):
+        return
+    table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
+    if way == CHECKED and second == FINER:
+        solve(coarser, row, designs, layers, outlines, soil_at, readings, halved_control(first), record)
+        if not np.isnan(coarser[THETA_MAX, row]):
+            confirm_error(fine, coarse, table, SAFETY_CONFIRMED, row)
+            copy_row(coarser, finer, row)
+            return
+    solve(coarser, row, designs, layers, outlines, soil_at, readings, first_control(given, False), record)
+    safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
+    if way == CHECKED and second == COARSER:
+        confirm_error(coarse, fine, table, safety, row)
+    else:
+        estimate_error(coarse, fine, table, safety, row)
+    # The status of a simulation that continues beyond the limit does not say that it reached it.
+    if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
+        fine.theta_error[row] = fine.x_error[row] = np.inf
+
+
+@array_kernel
+def rows(
     designs_at: Any,
     n: int,
     ground_at: Any,
@@ -258,11 +329,15 @@ def outcomes(
     m: int,
     outlines_at: Any,
     soil_at: Any,
-    settings_at: Any,
-    fine_at: Any,
-    coarse_at: Any,
+    controls_at: Any,
+    count: int,
+    sizes_at: Any,
+    limits_at: Any,
+    outcomes_at: Any,
+    room_at: Any,
+    rulings_at: Any,
 ) -> None:
-    """Simulate n designs, and estimate their errors as the settings ask for it.
+    """Simulate n designs, apply the rules of the verdict, and simulate again what is open or late by finer steps.
 
     Parameters
     ----------
@@ -285,68 +360,50 @@ def outcomes(
     soil_at
         Room for the soil of one design: for its layers, LAYER_ROOM m numbers, for its pieces beside an outline,
         PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + MEMORY_ROOM.
-    settings_at
-        Settings, shape (len(SETTINGS),).
-    fine_at
-        Where the results go, shape (len(OUTCOME), n).
-    coarse_at
-        Room for as many again, the coarser solutions.
-    """
-    s = carray(settings_at, (SETTINGS_COUNT,))
-    readings, given, way = readings_from(s), given_control(s), int(s[PAIRED_AT])
-    estimated = given.error_estimate
-    fine_control, coarse_control = first_control(given, estimated), first_control(given, False)
-    halved = halved_control(fine_control)
-    designs, finer, coarser = carray(designs_at, (17, n)), carray(fine_at, (11, n)), carray(coarse_at, (11, n))
-    layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
-    put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
-    nothing = carray(coarse_at, (0,))
-    record = Record(nothing, carray(coarse_at, (0, 6)), nothing, nothing, carray(coarse_at, (0, 4)), nothing)
-    table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
-    safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
-    for row in range(n):
-        second = solve(finer, row, designs, layers, outlines, soil_at, readings, fine_control, record)
-        if not estimated or way == ONCE:
-            continue
-        if way == CHECKED and second == NONE_NEEDED:
-            continue
-        if way == CHECKED and second == FINER:
-            solve(coarser, row, designs, layers, outlines, soil_at, readings, halved, record)
-            if not np.isnan(coarser[THETA_MAX, row]):
-                confirm_error(fine, coarse, table, SAFETY_CONFIRMED, row)
-                for column in range(11):
-                    finer[column, row] = coarser[column, row]
-                continue
-        solve(coarser, row, designs, layers, outlines, soil_at, readings, coarse_control, record)
-        if way == CHECKED and second == COARSER:
-            confirm_error(coarse, fine, table, safety, row)
-        else:
-            estimate_error(coarse, fine, table, safety, row)
-        # The status of a simulation that continues beyond the limit does not say that it reached it.
-        if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
-            fine.theta_error[row] = fine.x_error[row] = np.inf
-
-
-@array_kernel
-def rulings(n: int, outcomes_at: Any, sizes_at: Any, limits_at: Any, rulings_at: Any) -> None:
-    """Apply the rules of the verdict to n designs.
-
-    Parameters
-    ----------
-    n
-        Number of designs.
-    outcomes_at
-        Results of `outcomes`, shape (len(OUTCOME), n).
+    controls_at
+        Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
+        `boulder_sweep.judge.refinement.finer_controls`.
+    count
+        How many; with one alone a late row counts as it is.
     sizes_at
-        Inputs, shape (len(SIZES), n).
+        Inputs of the rules, shape (len(SIZES), n).
     limits_at
         Limits of the criterion, shape (len(LIMITS),).
+    outcomes_at
+        Where the results go, shape (len(OUTCOME), n).
+    room_at
+        Room for twice as many.
     rulings_at
-        Where the rulings go, shape (len(RULINGS), n).
+        Where the rulings go, shape (len(RULINGS) + 1, n); in the last row the number of the settings that decided.
     """
-    limits = limits_in(carray(limits_at, (LIMITS_COUNT,)))
-    table = outcomes_from(carray(outcomes_at, (11, n)))
-    write_rulings(table, carray(sizes_at, (7, n)), limits, carray(rulings_at, (4, n)))
+    controls, limits = carray(controls_at, (count, SETTINGS_COUNT)), limits_in(carray(limits_at, (LIMITS_COUNT,)))
+    designs, sizes = carray(designs_at, (17, n)), carray(sizes_at, (SIZES_COUNT, n))
+    layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
+    put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
+    both = carray(room_at, (2, 11, n))
+    counted, tried, coarser = carray(outcomes_at, (11, n)), both[0], both[1]
+    best, rulings = outcomes_from(counted), carray(rulings_at, (RULINGS_COUNT + 1, n))
+    for row in range(n):
+        solve_for_error(counted, coarser, row, designs, layers, outlines, soil_at, controls[0])
+        rule, decided_by, control = ruling_of(best, sizes, row, limits).rule, 0, given_control(controls[0])
+        known = Confirmation(AGREEING * is_late(rule, best.t_end[row], control), control.h, False)
+        for k in range(1, count):
+            control = given_control(controls[k])
+            if not is_wanted(known, rule, best.status[row], control):
+                continue
+            solve_for_error(tried, coarser, row, designs, layers, outlines, soil_at, controls[k])
+            finer = outcome_at(tried, row)
+            after = ruling_of(outcomes_from(tried), sizes, row, limits).rule
+            late = is_late(after, finer.t_end, control)
+            alike = agree(outcome_at(counted, row), finer, designs[V_0, row])
+            known, replaces = after_finer(known, rule, after, alike, late, control)
+            if replaces:
+                copy_row(tried, counted, row)
+                rule, decided_by = after, k
+        if known.unconfirmed > 0 and count > 1:
+            best.theta_error[row] = best.x_error[row] = np.inf
+        put_ruling(ruling_of(best, sizes, row, limits), rulings, row)
+        rulings[RULINGS_COUNT, row] = decided_by
 
 
 @array_kernel

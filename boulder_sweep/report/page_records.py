@@ -16,12 +16,13 @@ from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import LAST, Memory, is_plastic
-from boulder_kernels.rules import VerdictLimits
+from boulder_kernels.rules import RULINGS, SIZES, VerdictLimits
 from boulder_kernels.soil_laws import ELEMENT_LAWS
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
 first, from a crush on that it never reaches: its results have the same bits."""
+V_0 = DESIGN.index("v_0")
 SETTINGS = (*Readings._fields, *Control._fields)
 """Settings of the simulation, in this order; booleans are 0 or 1."""
 SETTINGS_COUNT = len(SETTINGS)
@@ -33,7 +34,7 @@ OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
 LIMITS = VerdictLimits._fields
 """Limits of the criterion, in this order; rad, m."""
-LIMITS_COUNT = len(LIMITS)
+LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES), len(RULINGS)
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
@@ -74,6 +75,11 @@ def changing_control(arguments: str, **changed: str) -> Callable[..., Control]:
 
 readings_from, given_control = taking(Readings), taking(Control, len(Readings._fields))
 table_from, outcomes_from = taking(DesignTable), taking(OutcomeTable)
+outcome_at = written_out(
+    f"def take(s, row):\n return OutcomeTable({', '.join(f's[{k}, row]' for k in range(len(OUTCOME)))})",
+    OutcomeTable=OutcomeTable,
+)
+"""The results of one design, numbers in place of columns."""
 first_control = changing_control(
     "c, refined",
     refined="refined",

@@ -1,17 +1,20 @@
-"""Which rule decides a row: the criterion on the maxima of a simulation, for tables and for the page of a report.
+"""Which rule decides a row, and whether another solution has to: for tables and for the page of a report.
 
 The rules are in order, the worst first; the first that applies decides the row. `boulder_sweep.judge.verdict` says what
-each means.
+each means. `boulder_sweep.judge.refinement` says which rows are simulated again, and why; what tells that here takes
+numbers of one row in the page, and arrays of shape (n,) in a table.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
+from .control import Control
 from .outcomes import OutcomeTable, Status
+from .plastic import is_plastic
 
 RULES = (
     ("error", ""),  # which has a reason of its own
@@ -133,6 +136,15 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
     return Ruling(rule, overlap, penetration, margin)
 
 
+@exact_inlined
+def put_ruling(ruling: Ruling, out: np.ndarray, row: int) -> None:
+    """Write what the rules make of one row into a column of an array, see `RULINGS`."""
+    out[0, row] = ruling.rule
+    out[1, row] = ruling.overlap
+    out[2, row] = ruling.penetration
+    out[3, row] = ruling.margin
+
+
 @exact_kernel
 def write_rulings(o: OutcomeTable, sizes: np.ndarray, limits: VerdictLimits, out: np.ndarray) -> None:
     """Apply the rules to n rows.
@@ -149,8 +161,98 @@ def write_rulings(o: OutcomeTable, sizes: np.ndarray, limits: VerdictLimits, out
         Where the rulings go, shape (len(RULINGS), n).
     """
     for row in range(out.shape[1]):
-        ruling = ruling_of(o, sizes, row, limits)
-        out[0, row] = ruling.rule
-        out[1, row] = ruling.overlap
-        out[2, row] = ruling.penetration
-        out[3, row] = ruling.margin
+        put_ruling(ruling_of(o, sizes, row, limits), out, row)
+
+
+FIRST_FACTOR = 0.5
+"""A solution confirms another only if its steps are shorter by this factor."""
+AGREEING = 2
+"""Finer solutions that confirm a late row. Among 30,000 shallow boulders one was enough for all but two
+(`benchmarks.late`): one step missed that a moment for an instant exceeds what holds the boulder, and one estimate was
+so large that everything agreed with it."""
+SAME_ANGLE, SAME_WAY = 1e-6, 1e-4
+"""Solutions of a late row agree if what they reach differs by no more than the error estimated for the coarser, or by
+less than this [rad], [m]: with the shortest steps the estimate falls below the rounding that late motion amplifies."""
+
+
+class Confirmation(NamedTuple):
+    """How far a row is decided while it is simulated again by finer steps; numbers of one row, or arrays."""
+
+    unconfirmed: Any
+    """Number of further solutions that must agree with what counts so far."""
+    compared_s: Any
+    """Step of the last solution compared or taken over [s]."""
+    given_up: Any
+    """Whether the last resort has refused it."""
+
+
+@exact_inlined
+def is_late(rule: Any, t_end: Any, control: Control) -> Any:
+    """Whether other solutions must agree with a row before it passes or overturns.
+
+    Never where errors are not confirmed, as by ``fast``. Nor in plastic soil, where every motion goes on until it
+    rests, and loses its energy to the soil instead of rocking.
+    """
+    counted = control.error_estimate and not is_plastic(control.unloading)
+    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == OVERTURNS))
+
+
+@exact_inlined
+def is_wanted(row: Confirmation, rule: Any, status: Any, control: Control) -> Any:
+    """Whether a solution by a control may decide or confirm a row.
+
+    Where errors are not confirmed, as by ``fast``, rows nearer to a limit than their error stay undecided.
+    """
+    refused = (status >= Status.UNSTABLE.value) & (status <= Status.LITTLE_INERTIA.value)
+    refused = refused & (status != Status.INVALID.value)
+    asks = control.error_estimate and not control.last_resort
+    may_decide = (refused | (asks & (rule == NUMERICAL_ERROR))) & np.logical_not(row.given_up)
+    # The last resort begins with longer steps than the usual ones end with.
+    is_finer = control.h <= FIRST_FACTOR * row.compared_s
+    return may_decide | ((row.unconfirmed > 0) & is_finer)
+
+
+@exact_inlined
+def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: Any) -> Any:
+    """Whether two solutions of a row end alike.
+
+    Parameters
+    ----------
+    coarse, fine
+        Solutions whose steps differ by a factor of two or more, each with its estimated errors.
+    v_0
+        Speed of impact [m/s]: an error of the displacement is one of the time, too, see
+        `boulder_kernels.error_estimates.estimate_errors`.
+    """
+    limit = coarse.status == Status.LIMIT.value
+    alike = limit == (fine.status == Status.LIMIT.value)
+    in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= np.maximum(coarse.x_error, SAME_WAY)
+    in_angle = np.abs(coarse.theta_max - fine.theta_max) <= np.maximum(coarse.theta_error, SAME_ANGLE)
+    return alike & np.isfinite(fine.x_error) & ((limit & in_time) | (np.logical_not(limit) & in_angle))
+
+
+@exact_inlined
+def after_finer(
+    row: Confirmation, before: Any, after: Any, alike: Any, late: Any, control: Control
+) -> tuple[Confirmation, Any]:
+    """Return how far a row is decided after one more solution, and whether that takes the place of what counts so far.
+
+    Parameters
+    ----------
+    row
+        How far it was decided.
+    before, after
+        The rule that decides what counts so far, and that of the new solution. One that cannot be computed changes
+        nothing, but the last resort is not tried again.
+    alike
+        Whether the two agree, see `agree`.
+    late, control
+        Whether the new solution is late, see `is_late`, and how it was simulated.
+    """
+    failed = after == NOT_COMPUTED
+    same = ((before == PASSES) == (after == PASSES)) & ((before <= PENETRATION) == (after <= PENETRATION))
+    confirmed = same & alike & (row.unconfirmed > 0)
+    replaces = np.logical_not(failed | confirmed)
+    unconfirmed = (row.unconfirmed - confirmed) * np.logical_not(replaces) + AGREEING * (late & replaces)
+    compared_s = failed * row.compared_s + np.logical_not(failed) * control.h
+    return Confirmation(unconfirmed, compared_s, control.last_resort & failed), replaces

@@ -115,39 +115,31 @@ class Kernel {
   }
 
   /**
-   * Simulate designs up to their verdict.
+   * Simulate designs, and apply the rules of the verdict.
    * @param {KernelDesign[]} designs
-   * @param {number[]} settings in the order of `Layout.settings`
-   * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome`
+   * @param {Record<string, number>[]} inputs the same designs by the columns of the table
+   * @param {number[][]} controls settings in the order of `Layout.settings`, each finer than those before it
+   * @param {number[]} limits of the criterion
+   * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome` and
+   *   `Layout.rulings`, and in `decided_by` the number of the settings that decided
    */
-  outcomes(designs, settings) {
-    const { design, outcome } = this.layout;
+  rows(designs, inputs, controls, limits) {
+    const { design, outcome, sizes, rulings } = this.layout;
     const n = designs.length;
+    const [results, ruled] = [outcome.length * n, (rulings.length + 1) * n];
     const { at, views } = this.room([
-      2, design.length * n, ...this.soilLengths(settings, n), settings.length, outcome.length * n, outcome.length * n,
+      2, design.length * n, ...this.soilLengths(controls[0], n), controls.flat().length, sizes.length * n,
+      limits.length, results, 2 * results, ruled,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
-    views[8].set(settings);
-    this.call("outcomes", [at[1], n, ...this.soilArguments(at.slice(2, 8), views.slice(2, 8)), ...at.slice(8)]);
-    return Object.fromEntries(outcome.map((name, k) => [name, views[9].slice(k * n, (k + 1) * n)]));
-  }
-
-  /**
-   * Apply the rules of the verdict.
-   * @param {Record<string, Float64Array>} outcomes as of `outcomes`
-   * @param {Record<string, number>[]} designs by the columns of the table
-   * @param {number[]} limits of the criterion
-   * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.rulings`
-   */
-  rulings(outcomes, designs, limits) {
-    const { outcome, sizes, rulings } = this.layout;
-    const n = designs.length;
-    const { at, views } = this.room([2, outcome.length * n, sizes.length * n, limits.length, rulings.length * n]);
-    outcome.forEach((name, k) => views[1].set(outcomes[name], k * n));
-    sizes.forEach((name, k) => designs.forEach((one, row) => (views[2][k * n + row] = one[name])));
-    views[3].set(limits);
-    this.call("rulings", [n, ...at.slice(1)]);
-    return Object.fromEntries(rulings.map((name, k) => [name, views[4].slice(k * n, (k + 1) * n)]));
+    views[8].set(controls.flat());
+    sizes.forEach((name, field) => inputs.forEach((one, row) => (views[9][field * n + row] = one[name])));
+    views[10].set(limits);
+    const soil = this.soilArguments(at.slice(2, 8), views.slice(2, 8));
+    this.call("rows", [at[1], n, ...soil, at[8], controls.length, ...at.slice(9)]);
+    /** @param {string[]} names @param {Float64Array} found */
+    const named = (names, found) => names.map((name, field) => [name, found.slice(field * n, (field + 1) * n)]);
+    return Object.fromEntries([...named(outcome, views[11]), ...named([...rulings, "decided_by"], views[13])]);
   }
 
   /**

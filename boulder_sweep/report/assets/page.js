@@ -7,6 +7,8 @@ const FEW_AROUND = 12;
 const SPREAD = 0.25;
 /** Time without a change after which the rest of the page follows the controls [ms]. */
 const PAUSE = 150;
+/** Time for which the map around a design is computed before the page answers its reader again [ms]. */
+const LONGEST_BLOCK_MS = 100;
 /** Screens on which legends stand below their figures; the style of the page has the same. */
 const NARROW = "(max-width: 46rem)";
 /** Width that is printed [px]: that of a sheet of A4 between its margins, less a tenth; so most pages hold what belongs together. */
@@ -180,12 +182,11 @@ class Page {
     byId("live-words").textContent = "";
   }
 
-  /** Simulate designs over two inputs around the one of the controls; where that takes long, line by line in between. */
+  /** Simulate designs over two inputs around the one of the controls, without keeping the reader waiting. */
   async showAround() {
     const round = (this.rounds += 1);
     const { across, up } = this.axes.live;
-    const slow = this.simulator.isSlow;
-    const size = slow ? FEW_AROUND : AROUND;
+    const size = this.simulator.isSlow ? FEW_AROUND : AROUND;
     /** @param {string} name */
     const line = (name) => {
       const input = /** @type {Input} */ (this.inputs.find((one) => one.name === name));
@@ -197,13 +198,14 @@ class Page {
     const designs = places.map(({ x, y }) => ({ ...this.design, [across]: x, [up]: y }));
     /** @type {Judged[]} */
     const found = [];
-    const piece = slow ? 1 : designs.length;
-    while (found.length < designs.length) {
-      found.push(...this.simulator.rows(designs.slice(found.length, found.length + piece)));
-      if (!slow) break;
+    let since = performance.now();
+    for (const design of designs) {
+      found.push(...this.simulator.rows([design]));
+      if (performance.now() - since < LONGEST_BLOCK_MS) continue;
       byId("live-words").textContent = `Simulating ${found.length} of ${designs.length} designs around this one.`;
       await new Promise((next) => setTimeout(next));
       if (round !== this.rounds) return;
+      since = performance.now();
     }
     const cells = places.map(({ x, y }, k) => ({
       x, y, margin: found[k].margin, pick: () => ({ [across]: x, [up]: y }),

@@ -88,19 +88,13 @@ class Simulator {
   constructor(data, kernel) {
     this.data = data;
     this.kernel = kernel;
-    const horizon = data.settings[this.at("horizon")];
+    const horizon = data.controls[0][this.at("horizon")];
     this.times = Float64Array.from({ length: SAMPLES + 1 }, (_, k) => ((horizon * k) / SAMPLES) * BEFORE_THE_END);
   }
 
   /** @param {string} setting of the kernel @returns {number} its place among them */
   at(setting) {
     return this.data.layout.settings.indexOf(setting);
-  }
-
-  /** @param {Record<string, number>} changed by name @returns {number[]} settings of the kernel */
-  settings(changed) {
-    const { settings } = this.data.layout;
-    return this.data.settings.map((/** @type {number} */ value, /** @type {number} */ k) => changed[settings[k]] ?? value);
   }
 
   /**
@@ -131,7 +125,7 @@ class Simulator {
 
   /** @returns {boolean} whether a design takes a hundred times as long as in the closed form of the soil */
   get isSlow() {
-    return this.data.settings[this.at("elements")] > 0;
+    return this.data.controls[0][this.at("elements")] > 0;
   }
 
   /**
@@ -164,23 +158,7 @@ class Simulator {
    * @returns {Judged[]}
    */
   rows(designs) {
-    const found = this.judged(designs, { stop_at_limit: 1 });
-    for (const finer of this.data.finer) {
-      const open = found.flatMap((one, row) => (this.isOpen(one) ? [row] : []));
-      if (open.length === 0) break;
-      const again = this.judged(open.map((row) => designs[row]), { ...finer, stop_at_limit: 1 });
-      again.forEach((one, k) => {
-        if (one.verdict !== "error") found[open[k]] = one;
-      });
-    }
-    return found;
-  }
-
-  /** @param {Judged} one @returns {boolean} whether finer steps may decide it */
-  isOpen(one) {
-    const refined = this.data.settings[this.at("error_estimate")] > 0;
-    const unsure = refined && one.verdict === "undecided" && one.reason === "error";
-    return unsure || this.data.rules.open.includes(one.reason);
+    return this.judged(designs, this.data.controls);
   }
 
   /**
@@ -190,20 +168,34 @@ class Simulator {
    */
   whole(design) {
     const { inputs, refusal } = this.completed(design);
-    const [decided] = this.rows([design]);
-    /** @type {Record<string, number>[]} */
-    const finer = this.data.finer;
-    const steps = finer.find((one) => this.step(one) === decided.step_s) ?? {};
-    /** @type {Record<string, number>} */
-    const beyond = { ...steps, stop_at_limit: 0 };
-    const halved = decided.step_s === exact(this.data.step_s / 2);
-    if (halved) Object.assign(beyond, { h: this.data.settings[this.at("h")] / 2, locate_yield: 1 });
-    if (this.settings(beyond)[this.at("paired")] !== PAIRED) beyond.paired = ONCE;
-    const [judged] = this.judged([design], beyond);
+    const [{ decided_by, ...decided }] = this.rows([design]);
+    const beyond = this.beyond(decided_by ?? 0, decided.step_s);
+    const [whole] = this.judged([design], [beyond]);
     const names = decided.reason === "overturns" ? DECIDED : [...DECIDED, ...ERRORS];
-    if (judged.verdict !== "error") for (const name of names) judged[name] = decided[name];
+    for (const name of names) whole[name] = decided[name];
+    // A few designs that are decided at the limit are refused beyond it.
+    const judged = whole.end_time_s === null ? decided : whole;
     const times = refusal === "" ? this.times : new Float64Array(0);
-    return { judged, motion: this.kernel.history(this.kernelDesign(inputs), this.settings(beyond), times), inputs };
+    return { judged, motion: this.kernel.history(this.kernelDesign(inputs), beyond, times), inputs };
+  }
+
+  /**
+   * The settings by which a row was decided, for a simulation that goes on beyond the limit.
+   * @param {number} number of these settings
+   * @param {number | null} step_s by which the row was decided: half of theirs where that was doubtful [s]
+   * @returns {number[]}
+   */
+  beyond(number, step_s) {
+    const settings = [...this.data.controls[number]];
+    const [h, paired] = [this.at("h"), this.at("paired")];
+    settings[this.at("stop_at_limit")] = 0;
+    if (settings[paired] === PAIRED) return settings;
+    settings[paired] = ONCE;
+    if (step_s === exact(this.data.steps_s[number] / 2)) {
+      settings[h] /= 2;
+      settings[this.at("locate_yield")] = 1;
+    }
+    return settings;
   }
 
   /** @returns {Motion} of what is not simulated */
@@ -212,25 +204,19 @@ class Simulator {
     return { time: new Float64Array(0), columns: Object.fromEntries(none), c_x: 0, c_y: 0 };
   }
 
-  /** @param {Record<string, number>} changed settings @returns {number} step of the solution that is reported [s] */
-  step(changed) {
-    return changed.step_s ?? this.data.step_s;
-  }
-
   /**
    * @param {Record<string, number>[]} designs
-   * @param {Record<string, number>} changed settings
+   * @param {number[][]} controls as of `Kernel.rows`
    * @returns {Judged[]}
    */
-  judged(designs, changed) {
+  judged(designs, controls) {
     const complete = designs.map((design) => this.completed(design));
-    const given = complete.map((one) => this.kernelDesign(one.inputs));
-    const outcomes = this.kernel.outcomes(given, this.settings(changed));
+    const inputs = complete.map((one) => one.inputs);
     const { rules } = this.data;
-    const rulings = this.kernel.rulings(outcomes, complete.map(({ inputs }) => inputs), rules.limits);
+    const results = this.kernel.rows(inputs.map((one) => this.kernelDesign(one)), inputs, controls, rules.limits);
     return complete.map(({ inputs, refusal }, row) => {
-      const found = judge(outcomes, rulings, row, inputs, rules);
-      found.step_s = found.end_time_s === null ? null : exact(outcomes.step[row]);
+      const found = judge(results, row, inputs, rules);
+      found.step_s = found.end_time_s === null ? null : exact(results.step[row]);
       if (refusal === "") return found;
       const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
       return { ...nothing, verdict: "error", reason: refusal, rating: null };

@@ -11,7 +11,6 @@
  * @property {[string, number][]} ratings every rating and its largest penetration [m], the best first
  * @property {Record<string, number>} status how a simulation can end, by name
  * @property {Record<string, string>} why the reason of each status that leaves a design without a result
- * @property {string[]} open those of them that finer steps may mend
  * @property {Tested} tested
  */
 
@@ -35,19 +34,17 @@ const DEGREES = 180 / Math.PI;
 
 /**
  * Give the verdict on one design, as the kernel has ruled.
- * @param {Record<string, Float64Array>} outcomes what the kernel computed
- * @param {Record<string, Float64Array>} rulings what its rules made of that
+ * @param {Record<string, Float64Array>} results of the kernel, as of `Kernel.rows`
  * @param {number} row which design
  * @param {Record<string, number>} inputs the design by the names of the table
  * @param {Rules} rules
  * @returns {Judged}
  */
-function judge(outcomes, rulings, row, inputs, rules) {
+function judge(results, row, inputs, rules) {
   /** @param {string} name */
-  const of = (name) => outcomes[name][row];
-  const [penetration, overlap, margin] = ["penetration", "overlap", "margin"].map((name) => rulings[name][row]);
-  const ended = of("status");
-  let [verdict, reason] = rules.verdicts[rulings.rule[row]];
+  const of = (name) => results[name][row];
+  const [penetration, overlap, margin, ended] = ["penetration", "overlap", "margin", "status"].map(of);
+  let [verdict, reason] = rules.verdicts[of("rule")];
   if (verdict === "error") reason = rules.why[ended] ?? rules.not_finite;
   const valid = verdict !== "error" && reason !== "no_contact";
   const overturned = reason === "overturns";
@@ -73,20 +70,21 @@ function judge(outcomes, rulings, row, inputs, rules) {
     vehicle_crush_m: kept(of("crush_max")),
     overlap_m: verdict === "error" ? null : overlap,
     solidity: verdict === "error" ? null : inputs.solidity,
-    validity: verdict === "error" ? null : flagsOf(outcomes, row, inputs, overlap, rules).join(";"),
+    validity: verdict === "error" ? null : flagsOf(results, row, inputs, overlap, rules).join(";"),
+    decided_by: of("decided_by"),
   };
 }
 
 /**
  * The flags of one design: those of `boulder_sweep.judge.validity`, held against them by a test.
- * @param {Record<string, Float64Array>} outcomes
+ * @param {Record<string, Float64Array>} results
  * @param {number} row
  * @param {Record<string, number>} inputs
  * @param {number} overlap [m]
  * @param {Rules} rules
  * @returns {string[]} their names
  */
-function flagsOf(outcomes, row, inputs, overlap, rules) {
+function flagsOf(results, row, inputs, overlap, rules) {
   const { tested } = rules;
   const depth = inputs.embedment_depth_m;
   /** @param {string} name @param {number} value */
@@ -96,14 +94,14 @@ function flagsOf(outcomes, row, inputs, overlap, rules) {
   const reaction = inputs.subgrade_reaction_MN_m3;
   /** @type {Record<string, boolean>} */
   const raised = {
-    crush: outcomes.crush_max[row] > tested.crush,
-    rotation: outcomes.theta_max[row] > tested.rotation,
+    crush: results.crush_max[row] > tested.crush,
+    rotation: results.theta_max[row] > tested.rotation,
     size: ["boulder_length_m", "boulder_width_m", "boulder_height_m"].some((name) => outside(name, inputs[name])),
     embedment: outside("embedment_ratio", depth / inputs.boulder_height_m),
     rock_density: outside("boulder_density_kg_m3", inputs.boulder_density_kg_m3),
     soil_pair: reaction > along(tested.soil.most) || reaction < along(tested.soil.least),
     overlap: overlap < tested.overlap,
-    unproved: outcomes.status[row] === rules.status.UNPROVABLE,
+    unproved: results.status[row] === rules.status.UNPROVABLE,
   };
   return Object.keys(tested.meanings).filter((name) => raised[name]);
 }
