@@ -82,7 +82,7 @@ def test_curves_and_energies_are_those_of_the_command_line(soil, tmp_path, opene
 
 @pytest.mark.nightly
 def test_the_map_around_a_slow_design_comes_in_pieces_and_gives_way_to_another(tmp_path, opened):
-    sweep = boulder_sweep.load("configs/rwg.yaml", [*SOILS["plastic"], "model.soil={elements: 20}"])
+    sweep = boulder_sweep.load("configs/rwg.yaml", [*SOILS["plastic"], "model.soil={elements: 2000}"])
     page = opened(write_explorer(sweep, 0, tmp_path / "page.html"))
     page.wait_until_it_is_true(
         "/^Simulating \\d+ of 144 designs/.test(document.getElementById('live-words').textContent)"
@@ -94,7 +94,7 @@ def test_the_map_around_a_slow_design_comes_in_pieces_and_gives_way_to_another(t
     assert (depths[0], depths[-1]) == pytest.approx((0.75 * 2.1, 1.25 * 2.1))
     one = cells[70]
     changed = [f"site.embedment_depth={one['embedment_depth_m']}", f"soil.friction_angle={one['friction_angle_deg']}"]
-    known = boulder_sweep.load("configs/rwg.yaml", [*SOILS["plastic"], "model.soil={elements: 20}", *changed])
+    known = boulder_sweep.load("configs/rwg.yaml", [*SOILS["plastic"], "model.soil={elements: 2000}", *changed])
     assert boulder_sweep.simulate(known).verdict == one["verdict"]
 
 

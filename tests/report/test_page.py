@@ -311,7 +311,7 @@ def test_a_design_that_cannot_be_computed_says_why(tmp_path, opened):
     boulder_sweep.run(boulder_sweep.load(tmp_path / "grid.yaml"), tmp_path / "out")
     page = opened(write_report(tmp_path / "out", tmp_path / "out.html", designs=[2]))
     assert page.inner_text("#chosen0-verdict") == "! error: embedment depth is not less than the boulder's height"
-    assert page.inner_text("#chosen0-caption") == "no impact"
+    assert page.inner_text("#chosen0-caption") == "no time history"
     assert page.complaints == []
 
 

@@ -43,7 +43,7 @@ def designs(path, n=DESIGNS, damper=138.91e3):
 
 
 def judged_by_both(folder, overrides, opened):
-    """Run a list of designs, and have the page judge them; both as frames."""
+    """Run a list of designs, and have the page judge them; return both as frames, and the page."""
     (folder / "grid.yaml").write_text("table: designs.parquet\n")
     sweep = boulder_sweep.load(folder / "grid.yaml", overrides)
     boulder_sweep.run(sweep, folder / "grid.sweep")
@@ -51,7 +51,7 @@ def judged_by_both(folder, overrides, opened):
     first = int(np.flatnonzero(table.verdict != "error")[0])
     page = opened(write_explorer(sweep, first, folder / "page.html"))
     inputs = [{name: float(table[name][k]) for name in sweep.plan.columns} for k in range(len(table))]
-    return table, pd.DataFrame(page.evaluate("(designs) => page.simulator.rows(designs)", inputs))
+    return table, pd.DataFrame(page.evaluate("(designs) => page.simulator.rows(designs)", inputs)), page
 
 
 def assert_alike(judged, table):
@@ -64,7 +64,7 @@ def assert_alike(judged, table):
 @pytest.mark.parametrize("case", CASES)
 def test_a_thousand_designs_are_judged_alike(case, tmp_path, opened):
     designs(tmp_path / "designs.parquet")
-    table, judged = judged_by_both(tmp_path, CASES[case], opened)
+    table, judged, _ = judged_by_both(tmp_path, CASES[case], opened)
     assert_alike(judged, table)
     np.testing.assert_allclose(*(one.margin.to_numpy(dtype=float) for one in (judged, table)), rtol=1e-9)
     counts = table.reason.value_counts()
@@ -73,7 +73,7 @@ def test_a_thousand_designs_are_judged_alike(case, tmp_path, opened):
 
 def test_rows_that_go_on_past_the_horizon_are_confirmed_alike(tmp_path, opened):
     shallow(1200, 5).to_parquet(tmp_path / "designs.parquet")
-    table, judged = judged_by_both(tmp_path, (), opened)
+    table, judged, _ = judged_by_both(tmp_path, (), opened)
     assert_alike(judged, table)
     late = table.end_time_s > 1.0
     assert (late & (table.verdict == "pass")).sum() >= 150
@@ -84,6 +84,10 @@ def test_rows_that_go_on_past_the_horizon_are_confirmed_alike(tmp_path, opened):
 
 def test_what_needs_the_last_resort_has_it_in_the_page_too(tmp_path, opened):
     designs(tmp_path / "designs.parquet", 40, damper=0.1)
-    table, judged = judged_by_both(tmp_path, (), opened)
+    table, judged, page = judged_by_both(tmp_path, (), opened)
     assert_alike(judged, table)
     assert (table.step_s[table.verdict != "error"] < 0.0005).sum() >= 20
+    shown = page.evaluate("() => page.simulator.whole(page.design).judged")  # refused beyond the limit of rotation
+    first = table[table.verdict != "error"].iloc[0]
+    assert (shown["verdict"], shown["reason"]) == (first.verdict, first.reason)
+    assert shown["max_vehicle_displacement_m"] == pytest.approx(first.max_vehicle_displacement_m)

@@ -113,7 +113,7 @@ class Page {
     const { scene, motion } = this.motions[panel];
     const sample = Math.max(Number(byId(`${panel}-time`).value), 0);
     new SideView(byId(`${panel}-scene`)).draw(scene, motion, sample);
-    const words = motion.time.length === 0 ? "no impact" : [
+    const words = motion.time.length === 0 ? "no time history" : [
       `${(1000 * motion.time[sample]).toFixed(0)} ms`,
       `rotation ${number(motion.columns.theta_b[sample] * DEGREES)}°`,
       `vehicle ${this.units.text(motion.columns.x_v[sample], "m")}`,

@@ -170,7 +170,7 @@ class Simulator {
     const { inputs, refusal } = this.completed(design);
     const [{ decided_by, ...decided }] = this.rows([design]);
     const beyond = this.beyond(decided_by ?? 0, decided.step_s);
-    const [whole] = this.judged([design], [beyond]);
+    const [{ decided_by: _, ...whole }] = this.judged([design], [beyond]);
     const names = decided.reason === "overturns" ? DECIDED : [...DECIDED, ...ERRORS];
     for (const name of names) whole[name] = decided[name];
     // A few designs that are decided at the limit are refused beyond it.
