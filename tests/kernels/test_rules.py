@@ -1,10 +1,14 @@
-"""The rules of the verdict on single rows: each alone, and the worst of several."""
+"""The rules of the verdict on single rows: each alone, the worst of several, and which rows need another solution."""
+
+from itertools import product
 
 import numpy as np
 import pytest
 
 import boulder_kernels as bk
+from boulder_kernels._jit import plain
 from boulder_kernels.rules import (
+    AGREEING,
     CRUSH,
     FOOT,
     NO_CONTACT,
@@ -14,12 +18,18 @@ from boulder_kernels.rules import (
     OVERTURNS,
     PASSES,
     PENETRATION,
+    RULES,
     RULINGS,
     SHAPE,
     SIZES,
     UNPROVED,
+    Confirmation,
     VerdictLimits,
+    after_finer,
+    agree,
+    is_late,
     is_simulated,
+    is_wanted,
     write_rulings,
 )
 
@@ -115,3 +125,72 @@ def test_overlap_penetration_and_margin():
 
 def test_a_simulation_has_maxima_where_the_table_says_so():
     assert [status for status in bk.Status if is_simulated(status)] == sorted(bk.SIMULATED)
+
+
+CONTROL = bk.Control(0.012, 1.0, LIMITS.rotation, 0, error_estimate=True)
+CONTROLS = [CONTROL, CONTROL._replace(error_estimate=False), CONTROL._replace(last_resort=True, h=0.004)]
+COMBINATIONS = list(
+    product(
+        range(len(RULES)),
+        (NOT_COMPUTED, OVERTURNS, PENETRATION, UNPROVED, PASSES),
+        bk.Status,
+        (0.6, 1.5),
+        range(AGREEING + 1),
+        (True, False),
+    )
+)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(control):
+    """The same functions take numbers there, and arrays here."""
+    columns = [np.array(values) for values in zip(*COMBINATIONS, strict=True)]
+
+    def answers(before, after, status, t_end, unconfirmed, flag):
+        row = Confirmation(unconfirmed, 0.006 + 0.004 * flag, flag)
+        late = plain(is_late)(after, t_end, control)
+        known, replaces = plain(after_finer)(row, before, after, np.logical_not(flag), late, control)
+        return (late, plain(is_wanted)(row, before, status, control), replaces, *known)
+
+    together = answers(*columns)
+    alone = [answers(*combination) for combination in COMBINATIONS]
+    for many, one_by_one in zip(together, zip(*alone, strict=True), strict=True):
+        assert np.array_equal(many, np.array(one_by_one))
+
+
+@pytest.mark.parametrize(
+    ("rule", "t_end", "control", "expected"),
+    [
+        (PASSES, 1.5, CONTROL, True),
+        (OVERTURNS, 1.5, CONTROL, True),
+        (PASSES, 1.0, CONTROL, False),
+        (PENETRATION, 1.5, CONTROL, False),
+        (UNPROVED, 10.0, CONTROL, False),
+        (PASSES, 1.5, CONTROLS[1], False),
+        (PASSES, 1.5, CONTROL._replace(unloading=bk.PLASTIC, elements=50), False),
+    ],
+)
+def test_a_row_is_late_that_passes_or_overturns_past_the_horizon(rule, t_end, control, expected):
+    assert plain(is_late)(rule, t_end, control) == expected
+
+
+def solution(**changed):
+    return bk.OutcomeTable(**(STANDS | changed))
+
+
+@pytest.mark.parametrize(
+    ("coarse", "fine", "expected"),
+    [
+        ({}, {}, True),
+        ({}, {"theta_max": 0.1 + 0.9e-5}, True),
+        ({}, {"theta_max": 0.1 + 1.1e-5}, False),
+        ({"theta_error": 0.0}, {"theta_max": 0.1 + 0.9e-6}, True),
+        ({}, {"x_error": np.inf}, False),
+        ({}, {"status": bk.Status.LIMIT, "t_limit": 1.2}, False),
+        ({"status": bk.Status.LIMIT, "t_limit": 1.2}, {"status": bk.Status.LIMIT, "t_limit": 1.2 + 0.9e-5}, True),
+        ({"status": bk.Status.LIMIT, "t_limit": 1.2}, {"status": bk.Status.LIMIT, "t_limit": 1.2 + 1.1e-5}, False),
+    ],
+)
+def test_solutions_agree_within_the_error_of_the_coarser(coarse, fine, expected):
+    """At 10 m/s 1e-5 s are 1e-4 m, the least by which two ways may differ."""
+    assert plain(agree)(solution(**coarse), solution(**fine), 10.0) == expected
