@@ -120,10 +120,10 @@ class RowStates:
         judged, outcomes, rule = once
         alike = plain(agree)(some_rows(self.outcomes, rows), outcomes, self._v_0[rows])
         late = plain(is_late)(rule, outcomes.t_end, control)
-        known = some_rows(self._confirmation, rows)
-        known, replaces = plain(after_finer)(known, self._rule[rows], rule, alike, late, control)
+        confirmation = some_rows(self._confirmation, rows)
+        confirmation, replaces = plain(after_finer)(confirmation, self._rule[rows], rule, alike, late, control)
         replaced = rows[replaces]
-        for values, new in zip(self._confirmation, known, strict=True):
+        for values, new in zip(self._confirmation, confirmation, strict=True):
             values[rows] = new
         for values, new in zip((*self.outcomes, self._rule), (*outcomes, rule), strict=True):
             values[replaced] = new[replaces]

@@ -386,21 +386,21 @@ def rows(
     for row in range(n):
         solve_for_error(counted, coarser, row, designs, layers, outlines, soil_at, controls[0])
         rule, decided_by, control = ruling_of(best, sizes, row, limits).rule, 0, given_control(controls[0])
-        known = Confirmation(AGREEING * is_late(rule, best.t_end[row], control), control.h, False)
+        confirmation = Confirmation(AGREEING * is_late(rule, best.t_end[row], control), control.h, False)
         for k in range(1, count):
             control = given_control(controls[k])
-            if not is_wanted(known, rule, best.status[row], control):
+            if not is_wanted(confirmation, rule, best.status[row], control):
                 continue
             solve_for_error(tried, coarser, row, designs, layers, outlines, soil_at, controls[k])
             finer = outcome_at(tried, row)
             after = ruling_of(outcomes_from(tried), sizes, row, limits).rule
             late = is_late(after, finer.t_end, control)
             alike = agree(outcome_at(counted, row), finer, designs[V_0, row])
-            known, replaces = after_finer(known, rule, after, alike, late, control)
+            confirmation, replaces = after_finer(confirmation, rule, after, alike, late, control)
             if replaces:
                 copy_row(tried, counted, row)
                 rule, decided_by = after, k
-        if known.unconfirmed > 0 and count > 1:
+        if confirmation.unconfirmed > 0 and count > 1:
             best.theta_error[row] = best.x_error[row] = np.inf
         put_ruling(ruling_of(best, sizes, row, limits), rulings, row)
         rulings[RULINGS_COUNT, row] = decided_by
