@@ -21,7 +21,7 @@ from boulder_sweep.settings.model import UNLOADINGS, WATER_KG_M3, Layer, Model, 
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.sweep import Sweep
-from boulder_sweep.settings.values import describe
+from boulder_sweep.settings.values import range_words
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 SLIDES = "or the ground slides"
@@ -194,7 +194,7 @@ def _check_ground(entries: Entries) -> None:
             entries.report("soil.water_table", message)
 
 
-def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Problem]:
+def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[str, str]) -> Iterator[Problem]:
     """Yield a note for every unusual value and for data that do not belong together.
 
     Parameters
@@ -203,21 +203,23 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position]) -> Iterator[Proble
         Valid settings.
     positions : mapping of str to Position
         Position of each input in the file, by its dotted key.
+    written : mapping of str to str
+        Unit in which inputs were written in the file, by the columns of the table.
     """
-    for path, message in _remarks(sweep):
+    for path, message in _remarks(sweep, written):
         if message:
             at = positions.get(path, Position(str(sweep.path)))
             yield Problem(at.file, at.line, at.column, path, message)
 
 
-def _remarks(sweep: Sweep) -> Iterator[tuple[str, str]]:
-    """Yield dotted keys, and what is to be remarked of each; empty where nothing is."""
+def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Yield dotted keys, and what is to be remarked of each; empty where nothing is. Arguments: see `notes_on`."""
     values = {name: np.array([value]) for name, value in sweep.constants.items()}
     groups = [axis.columns for axis in sweep.axes] + ([] if sweep.table is None else [sweep.table.columns])
     for group in groups:
         values |= group
     for name, of_input in values.items():
-        yield BY_NAME[name].path, _unusual(name, of_input)
+        yield BY_NAME[name].path, _unusual(name, of_input, written.get(name, ""))
     for axis in sweep.axes:
         if len(set(axis.values.tolist())) < len(axis.values):
             yield BY_NAME[axis.name].path, "contains a value more than once"
@@ -336,14 +338,14 @@ def _outside(values: np.ndarray, field: Field) -> np.ndarray:
     return (values < field.usual.low - slack) | (values > field.usual.high + slack)
 
 
-def _unusual(name: str, values: np.ndarray) -> str:
-    """Return a note if a value lies outside the range met in practice."""
+def _unusual(name: str, values: np.ndarray, written: str = "") -> str:
+    """Return a note if a value lies outside the range met in practice, in the unit in which it was written, if any."""
     usual, unit = BY_NAME[name].usual, BY_NAME[name].unit
     if usual is None or not _outside(values, BY_NAME[name]).any():
         return ""
     low, high = float(values.min()), float(values.max())
-    given = describe(low, unit) if low == high else f"{low:.6g} to {describe(high, unit)}"
-    ends = f"{usual.low:g} to {describe(usual.high, unit)}"
+    given = range_words(low, high, unit, written)
+    ends = range_words(usual.low, usual.high, unit, written)
     return f"{given} is outside the usual range of {ends} ({usual.remark}); {_outcome(name, low, high)}"
 
 

@@ -158,7 +158,7 @@ def read_input(node: Node, field: Field) -> Input:
     if isinstance(node, Mapping) and not set(RANGE_KEYS) & set(node.entries) and _WORDS & set(node.entries):
         return _read_distribution(node, field)
     certain = read_leaf(node, field)
-    return Input(certain.values, certain.is_axis, certain.position)
+    return Input(certain.values, certain.is_axis, certain.position, certain.written)
 
 
 def _read_distribution(node: Mapping, field: Field) -> Input:
@@ -211,7 +211,8 @@ def _read_distribution(node: Mapping, field: Field) -> Input:
     else:
         values = given.values if centre == "mean" else _means(node, kind, given.values, sd, cov)
     _check_values(node, values, distribution, field)
-    return Input(values, given is not None and given.is_axis, node.position, distribution)
+    is_axis, written = (False, "") if given is None else (given.is_axis, given.written)
+    return Input(values, is_axis, node.position, written, distribution)
 
 
 def _kind(node: Mapping) -> str:

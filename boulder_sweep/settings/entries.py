@@ -289,7 +289,7 @@ def _one_of_set(node: Node, field: fields.Field) -> Input:
     """
     leaf = read_input(node, field)
     if leaf.distribution is None:
-        return Input(np.array([read_single(node, field)]), False, node.position)
+        return Input(np.array([read_single(node, field)]), False, node.position, leaf.written)
     if leaf.is_axis:
         raise wrong(node.position, "must have one mean in a named set")
     return leaf
@@ -299,4 +299,4 @@ def _axis_of_sets(section: str, leaves: list[Input], position: Position) -> Inpu
     """Return the values that the named sets give for an input, as an axis."""
     each = tuple(one if isinstance(one := leaf.distribution, Distribution) else None for leaf in leaves)
     spread = SetDistributions(section, each) if any(each) else None
-    return Input(np.concatenate([leaf.values for leaf in leaves]), True, position, spread)
+    return Input(np.concatenate([leaf.values for leaf in leaves]), True, position, leaves[0].written, spread)

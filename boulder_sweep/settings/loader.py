@@ -304,7 +304,8 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         derived=entries.derived,
     )
     positions = {field.path: entries.position_of(field.path) for field in fields.INPUTS}
-    return replace(sweep, notes=tuple(notes_on(sweep, positions)))
+    written = {name: leaf.written for name, leaf in entries.leaves.items()}
+    return replace(sweep, notes=tuple(notes_on(sweep, positions, written)))
 
 
 def _apply_partial_factor(entries: Entries, factor: float) -> None:

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -51,10 +53,10 @@ class NumberError(ValueError):
 
 
 class Quantity(NamedTuple):
-    """An exact number in the unit of the table, and whether it was given with a unit."""
+    """An exact number in the unit of the table, and the unit in which it was written; empty for a bare number."""
 
     value: Fraction
-    has_unit: bool
+    written: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +71,14 @@ class Leaf:
         Whether it was written as a list or range (an axis of the grid) or as one value.
     position : Position
         Where it stands.
+    written : str
+        The unit in which it was written; empty for bare numbers.
     """
 
     values: np.ndarray
     is_axis: bool
     position: Position
+    written: str = ""
 
 
 def read_leaf(node: Node, field: Field) -> Leaf:
@@ -94,7 +99,8 @@ def read_leaf(node: Node, field: Field) -> Leaf:
     """
     node = _unfold_text_list(node)
     if isinstance(node, Mapping):
-        return Leaf(np.array(_read_range(node, field)), True, node.position)
+        values, written = _read_range(node, field)
+        return Leaf(np.array(values), True, node.position, written)
     items: list[Node] = [node]
     unit = None
     if isinstance(node, Sequence):
@@ -103,8 +109,9 @@ def read_leaf(node: Node, field: Field) -> Leaf:
         raise wrong(node.position, "the list is empty; give at least one value")
     if len(items) > MAX_AXIS:
         raise wrong(node.position, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")
-    values = _check_values(_read_all(items, field, unit), items, field)
-    return Leaf(np.array(values), isinstance(node, Sequence), node.position)
+    quantities = _read_all(items, field, unit)
+    values = _check_values(quantities, items, field)
+    return Leaf(np.array(values), isinstance(node, Sequence), node.position, quantities[0].written)
 
 
 def read_single(node: Node, field: Field) -> float:
@@ -164,13 +171,13 @@ def sample_of(field: Field) -> str:
     return "" if field.default is None else describe(field.default, field.unit)
 
 
-def outside(value: float, field: Field) -> str:
-    """Return why a value is not admitted, empty if it is."""
+def outside(value: float, field: Field, written: str = "") -> str:
+    """Return why a value is not admitted, in the unit in which it was written, if any; empty if it is."""
     bound = field.admitted
     if bound is None or bound.low <= value <= bound.high:
         return ""
-    high = describe(bound.high, field.unit)
-    return OUTSIDE.format(value=describe(value, field.unit), low=f"{bound.low:g}", high=high, reason=bound.reason)
+    low, high = range_words(bound.low, bound.high, field.unit, written).split(" to ")
+    return OUTSIDE.format(value=describe(value, field.unit, written), low=low, high=high, reason=bound.reason)
 
 
 def _unfold_text_list(node: Node) -> Node:
@@ -192,8 +199,8 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
     for item in items:
         with mistakes:
             quantities.append(read_quantity(item, field.unit, unit, sample_of(field)))
-    if not mistakes and len({quantity.has_unit for quantity in quantities}) > 1:
-        bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.has_unit)
+    if not mistakes and len({bool(quantity.written) for quantity in quantities}) > 1:
+        bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.written)
         message = f"{quoted(bare)} has no unit while the others have one; give all of them a unit, or none"
         mistakes.add(bare.position, message)
     unlike: dict[str, Mistake] = {}  # the same mistake in many values is reported once
@@ -207,32 +214,33 @@ def _check_values(quantities: list[Quantity], nodes: list[Node], field: Field) -
     """Return the values; every one of them must be admitted."""
     values = [_to_float(quantity.value) for quantity in quantities]
     mistakes = Mistakes()
-    for node, value in zip(nodes, values, strict=True):
-        problem = outside(value, field)
+    for node, value, quantity in zip(nodes, values, quantities, strict=True):
+        problem = outside(value, field, quantity.written)
         if problem:
             mistakes.add(node.position, problem)
     mistakes.raise_if_any()
     return values
 
 
-def _read_range(node: Mapping, field: Field) -> list[float]:
-    """Return the values of ``{from, to, count}`` or ``{from, to, step}``."""
+def _read_range(node: Mapping, field: Field) -> tuple[list[float], str]:
+    """Return the values of ``{from, to, count}`` or ``{from, to, step}``, and the unit in which they were written."""
     _check_range_keys(node)
     given = [entry for entry in node if entry.key != "count"]
     quantities = _read_all([entry.value for entry in given], field, node.unit)
     exact = {entry.key: quantity for entry, quantity in zip(given, quantities, strict=True)}
     ends = [key for key in exact if key != "step"]
     _check_values([exact[key] for key in ends], [node.entries[key].value for key in ends], field)
-    first, last = exact["from"].value, exact["to"].value
+    first, last, written = exact["from"].value, exact["to"].value, exact["from"].written
     if "step" in exact:
         position = node.entries["step"].value.position
-        return spread(first, last, _count_of_step(first, last, exact["step"].value, field.unit, position))
+        in_words = partial(describe, unit=field.unit, written=written)
+        return spread(first, last, _count_of_step(first, last, exact["step"].value, in_words, position)), written
     of_count = node.entries["count"].value
     count = read_count(of_count, "count", MAX_AXIS)
     if count == 1 and first != last:
         message = "a count of 1 cannot hold both ends of the range; give a count of 2 or more, or one value"
         raise wrong(of_count.position, message)
-    return spread(first, last, count)
+    return spread(first, last, count), written
 
 
 def _check_range_keys(node: Mapping) -> None:
@@ -252,7 +260,9 @@ def _check_range_keys(node: Mapping) -> None:
         raise wrong(node.position, "the range lacks count or step")
 
 
-def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str, position: Position) -> int:
+def _count_of_step(
+    first: Fraction, last: Fraction, step: Fraction, in_words: Callable[[float], str], position: Position
+) -> int:
     """Return how many values the steps make; the last one must be the end of the range, exactly."""
     if step == 0:
         raise wrong(position, "step must not be 0")
@@ -265,10 +275,10 @@ def _count_of_step(first: Fraction, last: Fraction, step: Fraction, unit: str, p
         raise wrong(position, f"this gives more than {MAX_AXIS} values, the limit for one axis; use a larger step")
     if steps.denominator != 1:
         below = first + math.floor(steps) * step
-        start, end, low, high = (describe(float(value), unit) for value in (first, last, below, below + step))
+        start, end, low, high = (in_words(float(value)) for value in (first, last, below, below + step))
         raise wrong(
             position,
-            f"steps of {describe(float(step), unit)} from {start} do not end at {end} but at {low} or {high}; "
+            f"steps of {in_words(float(step))} from {start} do not end at {end} but at {low} or {high}; "
             "use one of these for 'to', or give count",
         )
     return int(steps) + 1
@@ -323,7 +333,8 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
                     "give one of them"
                 )
             unit_text = outer_unit.text
-        return Quantity(number * factor(unit_text, unit) if unit_text else number, has_unit=bool(unit_text))
+        value = number * factor(unit_text, unit) if unit_text else number
+        return Quantity(value, " ".join(unit_text.split()))
     except (NumberError, UnitError) as error:
         raise wrong(node.position, str(error)) from None
 
@@ -393,9 +404,17 @@ def quoted(node: Node) -> str:
     return f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
 
 
-def describe(value: float, unit: str) -> str:
-    """Return a value with its unit, for messages."""
+def describe(value: float, unit: str, written: str = "") -> str:
+    """Return a value of a unit of the table, for messages: in the unit in which it was written, if any."""
+    if written:
+        value, unit = value / float(factor(written, unit)), written
     return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
+
+
+def range_words(low: float, high: float, unit: str, written: str = "") -> str:
+    """Return a range, or the one value that both its ends are; other arguments: see `describe`."""
+    ends = describe(low, unit, written), describe(high, unit, written)
+    return ends[1] if low == high else f"{ends[0].split()[0]} to {ends[1]}"
 
 
 def needed(unit: str, sample: str = "") -> str:

@@ -22,6 +22,13 @@ def test_usual_values_have_no_remarks(load_with, load_it, minimal):
             "vehicle.speed=30",
             "30 m/s is outside the usual range of 4 to 25 m/s (15 to 90 km/h; a bare number is in m/s, not in mph",
         ),
+        ("vehicle.speed=70 mph", "70 mph is outside the usual range of 8.94775 to 55.9234 mph"),
+        (
+            "boulder.height={from: 4 ft, to: 20 ft, count: 3}",
+            "4 to 20 ft is outside the usual range of 4.92126 to 13.1234 ft",
+        ),
+        ("soil.density=[60, 70] pcf", "60 to 70 pcf is outside"),
+        ("vehicle.mass={mean: 200 kip, sd: 9 kip}", "200 kip is outside"),
         ("vehicle.mass=150000", "not in lb"),
         ("vehicle.spring=3103.3", "a bare number is in N/m, not in kN/m"),
         ("vehicle.damper=138.91", "not in kN*s/m"),
