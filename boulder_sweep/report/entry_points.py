@@ -65,6 +65,7 @@ from boulder_sweep.report.page_records import (
     SETTINGS_COUNT,
     SIZES_COUNT,
     V_0,
+    copy_row,
     first_control,
     given_control,
     halved_control,
@@ -261,13 +262,6 @@ def solve(
     return second_solution
 
 
-@inlined
-def copy_row(outcomes: np.ndarray, to: np.ndarray, row: int) -> None:
-    """Copy the results of one design."""
-    for column in range(outcomes.shape[0]):
-        to[column, row] = outcomes[column, row]
-
-
 @array_kernel
 def solve_for_error(
     finer: np.ndarray,
@@ -279,16 +273,9 @@ def solve_for_error(
     soil_at: Any,
     settings: np.ndarray,
 ) -> None:
-    """Simulate one design, and estimate its error as its settings ask for it.
+    """Simulate one design, and estimate its error as its settings, shape (len(SETTINGS),), ask for it; see `solve`.
 
-    Parameters
-    ----------
-    finer, coarser
-        Where the results go, and room for the second solution, shape (len(OUTCOME), n).
-    row, designs, layers, outlines, soil_at
-        The design and its soil, as of `solve`.
-    settings
-        Shape (len(SETTINGS),).
+    The result goes into `finer`, and `coarser` has room for a second solution, both of shape (len(OUTCOME), n).
     """
     readings, given, way = readings_from(settings), given_control(settings), int(settings[PAIRED_AT])
     estimated = given.error_estimate
@@ -347,10 +334,8 @@ def rows(
         Number of designs.
     ground_at, below_at, deeper
         The soil as it lies, as of `put_soils`.
-    profile_at
-        Profile of the boulders, shape (points, 4).
-    points
-        Number of its points; 0 for boxes.
+    profile_at, points
+        Profile of the boulders, shape (points, 4); no points for boxes.
     layers_at
         Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`.
     m
@@ -360,11 +345,9 @@ def rows(
     soil_at
         Room for the soil of one design: for its layers, LAYER_ROOM m numbers, for its pieces beside an outline,
         PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + MEMORY_ROOM.
-    controls_at
+    controls_at, count
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
-        `boulder_sweep.judge.refinement.finer_controls`.
-    count
-        How many; with one alone a late row counts as it is.
+        `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is.
     sizes_at
         Inputs of the rules, shape (len(SIZES), n).
     limits_at
@@ -435,7 +418,7 @@ def history(
     design_from
         Inputs, shape (len(DESIGN),); K_epsilon is written over.
     ground_at, below_at, deeper, profile_at, points, layers_at, m, outline_at, soil_at
-        The soil as it lies and room for what follows from it, as of `outcomes` for one design; with soil elements the
+        The soil as it lies and room for what follows from it, as of `rows` for one design; with soil elements the
         last is room for n samples, too.
     settings_at
         Settings, shape (len(SETTINGS),).

@@ -91,6 +91,13 @@ halved_control = changing_control("c", h="0.5 * c.h", locate_yield="True")
 """Control of a second solution, `boulder_kernels.table.halved`."""
 
 
+@inlined
+def copy_row(outcomes: np.ndarray, to: np.ndarray, row: int) -> None:
+    """Copy the results of one design, columns of arrays of shape (len(OUTCOME), n)."""
+    for column in range(outcomes.shape[0]):
+        to[column, row] = outcomes[column, row]
+
+
 LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 """Numbers for each layer of the soil of a design: enough for the layers, and once for their sums."""
 

@@ -122,8 +122,8 @@ def type_of(record: Any) -> type:
 
 def records_of(c: Any) -> tuple[str, ...]:
     """Names of the records of the soil that constants carry."""
-    carries = type_of(c) in (LayeredConstants, PlasticConstants)
-    return tuple(type_of(c)._fields[len(Constants._fields) :]) if carries else ()  # type: ignore[attr-defined]
+    kind: Any = type_of(c)
+    return tuple(kind._fields[len(Constants._fields) :]) if kind in (LayeredConstants, PlasticConstants) else ()
 
 
 def law_of(c: Any) -> SoilLaw:
