@@ -1,19 +1,21 @@
 """Flags on rows outside what the model was tested on. They do not change a verdict.
 
-This is the one register: the column ``validity``, its words in summaries and pictures, and the page of the
-documentation follow from it. What the two crash tests of the paper cover is taken from their data
-(`boulder_sweep.crash_tests.cases`).
+This is the one register of what they mean: the words of the column ``validity`` in summaries and pictures, and the page
+of the documentation follow from it. `boulder_kernels.rules` raises them. What the two crash tests of the paper cover is
+taken from their data (`boulder_sweep.crash_tests.cases`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Status
+from boulder_kernels._jit import plain
+from boulder_kernels.rules import Flaggable, Tested, flags_of
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.settings.fields import BY_NAME
 
@@ -40,15 +42,12 @@ class Flag:
         The condition.
     why : str
         Why it matters, and where the threshold comes from.
-    raised : callable
-        From what is known of n rows (`boulder_sweep.judge.verdict.Facts`) to a mask, shape (n,).
     """
 
     name: str
     meaning: str
     raised_where: str
     why: str
-    raised: Callable[[Any], np.ndarray]
 
 
 def usual_range(name: str) -> tuple[float, float]:
@@ -59,11 +58,7 @@ def usual_range(name: str) -> tuple[float, float]:
     return usual.low * (1.0 - 1e-9), usual.high * (1.0 + 1e-9)
 
 
-def _outside(values: np.ndarray, low: float | np.ndarray, high: float | np.ndarray) -> np.ndarray:
-    return (values < low) | (values > high)
-
-
-_SIZES = {side: usual_range(f"boulder_{name}_m") for side, name in (("L", "length"), ("W", "width"), ("H", "height"))}
+_SIZES = [usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
 _EMBEDMENT, _ROCK = usual_range("embedment_ratio"), usual_range("boulder_density_kg_m3")
 
 FLAGS = (
@@ -73,7 +68,6 @@ FLAGS = (
         "`vehicle_crush_m` above `vehicle.calibrated_crush` (1 m)",
         "After about 1 m of crush the chassis stiffens, as the paper says, and the model parts from the test on the "
         "unsafe side. A second spring does not move the limit: the file says how far both are calibrated.",
-        lambda facts: facts.outcomes.crush_max > facts.limits.calibrated_crush,
     ),
     Flag(
         "rotation",
@@ -82,33 +76,25 @@ FLAGS = (
         f"({TESTED_ROTATION_DEG['as_printed']:g}° where a reading is printed)",
         "The larger boulder of the paper passed its test; the model turns it by so much. Between that and the limit "
         "no test supports the model.",
-        lambda facts: facts.outcomes.theta_max > facts.limits.tested_rotation,
     ),
     Flag(
         "size",
         "a boulder of unusual size",
-        "length, width or height outside " + ", ".join(f"{low:.1f} to {high:.1f} m" for low, high in _SIZES.values()),
+        "length, width or height outside " + ", ".join(f"{low:.1f} to {high:.1f} m" for low, high in _SIZES),
         "Slabs and pebbles are not what the model was made for. The boulders tested are 0.76 and 1.65 m long, 1.02 and "
         "1.68 m wide, 2.2 and 3.44 m high.",
-        lambda facts: np.logical_or.reduce(
-            [_outside(getattr(facts.designs.table, side), *ends) for side, ends in _SIZES.items()]
-        ),
     ),
     Flag(
         "embedment",
         "an unusual embedment",
         f"embedment depth over height outside {_EMBEDMENT[0]:.2g} to {_EMBEDMENT[1]:.2g}",
         "The boulders tested have 0.55 and 0.59. The range is that of usual embedments.",
-        lambda facts: _outside(facts.designs.table.d / facts.designs.table.H, *_EMBEDMENT),
     ),
     Flag(
         "rock_density",
         "a density that rock does not have",
         f"boulder density outside {_ROCK[0]:.0f} to {_ROCK[1]:.0f} kg/m³",
         "The granites tested have 2596 and 3074 kg/m³; lighter sound rock is rare.",
-        lambda facts: _outside(
-            facts.designs.table.rho_b if facts.designs.rocks is None else facts.designs.rocks, *_ROCK
-        ),
     ),
     Flag(
         "soil_pair",
@@ -117,16 +103,12 @@ FLAGS = (
         f"angle divided by {FAMILY_FACTOR:g}",
         "Friction angle and subgrade reaction of one soil rise together. The paper's own pair lies on the API curve. "
         "The factor is a judgement.",
-        lambda facts: _outside(
-            facts.designs.table.beta, *run_by_run(lambda phi: family_bounds(np.degrees(phi)), facts.designs.table.phi)
-        ),
     ),
     Flag(
         "overlap",
         "less overlap with the bumper than tested",
         f"top of the boulder less than {TESTED_OVERLAP_M:g} m over the underside of the bumper",
         "The tests had 0.49 m and 0.91 m. With less the truck may ride over, which the planar model cannot show.",
-        lambda facts: facts.overlap < TESTED_OVERLAP_M,
     ),
     Flag(
         "unproved",
@@ -134,11 +116,21 @@ FLAGS = (
         "restoring moment or separation read as printed, not overturned up to the longest horizon",
         "Forces read as printed feed energy into the motion, so nothing is proved of later times. A table leaves such "
         "rows undecided; answers and comparisons of readings count them as passing.",
-        lambda facts: np.asarray(facts.outcomes.status) == Status.UNPROVABLE,
     ),
 )
-"""In the order in which they stand in the column."""
+"""In the order of the kernels, and of the column."""
 BY_FLAG = {flag.name: flag for flag in FLAGS}
+
+
+def largest_tested_rotation(preset: str) -> float:
+    """Return the rotation that a test supports [rad]; of mixed readings the least."""
+    return math.radians(TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values())))
+
+
+def tested(calibrated_crush: float, rotation: float) -> Tested:
+    """Return what the model was tested on; arguments: see `boulder_sweep.judge.verdict.Limits`."""
+    ranges = [end for low_high in (*_SIZES, _EMBEDMENT, _ROCK) for end in low_high]
+    return Tested(calibrated_crush, rotation, TESTED_OVERLAP_M, *ranges)
 
 
 def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray) -> np.ndarray:
@@ -160,9 +152,12 @@ def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray)
 
 def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return the column ``validity`` of n rows: codes, and the words they stand for."""
-    bits = np.zeros(len(facts.verdict), dtype=np.uint16)
-    for bit, flag in enumerate(FLAGS):
-        bits |= flag.raised(facts).astype(np.uint16) << bit
+    outcomes, designs, limits, table = facts.outcomes, facts.designs, facts.limits, facts.designs.table
+    rocks = table.rho_b if designs.rocks is None else designs.rocks
+    soil = run_by_run(lambda phi: family_bounds(np.degrees(phi)), table.phi)
+    reached = outcomes.status, outcomes.crush_max, outcomes.theta_max, facts.overlap
+    rows = Flaggable(*reached, table.L, table.W, table.H, table.d, rocks, table.beta, *soil)
+    bits = plain(flags_of)(rows, tested(limits.calibrated_crush, limits.tested_rotation))
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))

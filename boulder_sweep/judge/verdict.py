@@ -37,7 +37,7 @@ from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, VERDICTS,
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
 from boulder_sweep.judge.robustness import grades_without_asking, is_studied
-from boulder_sweep.judge.validity import TESTED_ROTATION_DEG, flagged
+from boulder_sweep.judge.validity import flagged, largest_tested_rotation
 from boulder_sweep.settings.model import Criterion, Model
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Limits(NamedTuple):
     """Further limits, under the names that they have in `boulder_kernels.rules.VerdictLimits`."""
     calibrated_crush: float = Model().calibrated_crush_m
     """Crush beyond which a row is flagged [m]."""
-    tested_rotation: float = math.radians(TESTED_ROTATION_DEG["corrected"])
+    tested_rotation: float = largest_tested_rotation("corrected")
     """Rotation beyond which a row is flagged [rad]."""
     proved: bool = True
     """Whether a pass must be proved also where the readings allow no proof; without, such rows pass and are flagged."""
@@ -235,14 +235,12 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
 
 def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
     """Return the limits of a sweep; `proved` as of `Limits`."""
-    preset = sweep.model.preset
-    tested = TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values()))
     return Limits(
         rotation=math.radians(sweep.criterion.max_rotation_deg),
         rating=sweep.criterion.rating,
         criterion=sweep.criterion,
         calibrated_crush=sweep.model.calibrated_crush_m,
-        tested_rotation=math.radians(tested),
+        tested_rotation=largest_tested_rotation(sweep.model.preset),
         studied=is_studied(sweep),
         proved=proved,
         flat_foot=sweep.model.stands_flat,

@@ -17,15 +17,15 @@ from boulder_kernels.rules import OF_CRITERION, RULES
 from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
-from boulder_sweep.investigation import FAMILY_FACTOR, api_curve, terzaghi_curve
+from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
-from boulder_sweep.judge.validity import FLAGS, TESTED_OVERLAP_M, TESTED_ROTATION_DEG, usual_range
+from boulder_sweep.judge.validity import FLAGS, largest_tested_rotation, tested
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import page_records
 from boulder_sweep.report.build import KERNEL
 from boulder_sweep.report.figures import COLOURS, parts_of
-from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, SIZES, ResultRows, label_of
+from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, ResultRows, label_of
 from boulder_sweep.settings.checks import (
     BEYOND_FRONT,
     FLOATS,
@@ -73,6 +73,8 @@ MOST_CELLS = 1_500_000
 out."""
 MOST_POINTS = 20_000
 """The same for a list of designs, each of which carries its inputs."""
+OF_FLAGS = {"rock": "boulder_density_kg_m3"}
+"""The same for what the flags take."""
 ANGLES = np.arange(20.0, 61.0)
 """Friction angles [deg] at which the page knows which soil constants belong together."""
 
@@ -261,8 +263,11 @@ def _layout() -> dict[str, Any]:
         "settings": page_records.SETTINGS,
         "outcome": page_records.OUTCOME,
         "history": page_records.HISTORY,
-        "sizes": [(SOURCES | OF_THE_PAGE).get(name, name) for name in rules.SIZES],
-        "rulings": rules.RULINGS,
+        "sizes": [
+            *((SOURCES | OF_THE_PAGE).get(name, name) for name in rules.SIZES),
+            *((SOURCES | OF_FLAGS).get(name, name) for name in page_records.FLAG_INPUTS),
+        ],
+        "rulings": [*rules.RULINGS, "flags", "decided_by"],
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": page_records.LAYER_ROOM,
         "piece_room": page_records.PIECE_ROOM,
@@ -274,34 +279,20 @@ def _layout() -> dict[str, Any]:
 
 def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Limits of the criterion, and the words of every verdict."""
-    criterion, rating = settings["criterion"], settings["criterion"]["rating"]
+    criterion, rating, model = settings["criterion"], settings["criterion"]["rating"], settings["model"]
+    least, most = family_bounds(ANGLES)
+    limits = [rotation, PENETRATION_LIMITS_M[rating], 1.0, *(criterion[name] for name in OF_CRITERION)]
     return {
         "rotation": rotation,
         "rating": rating,
-        "limits": [rotation, PENETRATION_LIMITS_M[rating], 1.0, *(criterion[name] for name in OF_CRITERION)],
+        "limits": [*limits, *tested(model["calibrated_crush_m"], largest_tested_rotation(model["preset"]))],
         "verdicts": RULES,
         "not_finite": NOT_FINITE,
         "ratings": list(PENETRATION_LIMITS_M.items()),
         "status": {status.name: status.value for status in Status},
         "why": {str(status.value): words for status, words in STATUS_REASONS.items()},
-        "tested": _tested(settings["model"]),
-    }
-
-
-def _tested(model: Mapping[str, Any]) -> dict[str, Any]:
-    """What the model was tested on, and the meaning of the flags."""
-    rotation = TESTED_ROTATION_DEG.get(model["preset"], min(TESTED_ROTATION_DEG.values()))
-    return {
-        "rotation": math.radians(rotation),
-        "crush": model["calibrated_crush_m"],
-        "overlap": TESTED_OVERLAP_M,
-        "usual": {name: usual_range(name) for name in (*SIZES, "embedment_ratio")},
-        "soil": {
-            "angle": ANGLES.tolist(),
-            "least": (terzaghi_curve(ANGLES) / FAMILY_FACTOR).tolist(),
-            "most": (FAMILY_FACTOR * api_curve(ANGLES)).tolist(),
-        },
-        "meanings": {flag.name: flag.meaning for flag in FLAGS},
+        "flags": {flag.name: flag.meaning for flag in FLAGS},
+        "families": {"angle": ANGLES.tolist(), "least": least.tolist(), "most": most.tolist()},
     }
 
 

@@ -41,6 +41,7 @@ from boulder_kernels.rules import (
     Confirmation,
     after_finer,
     agree,
+    flags_of,
     is_late,
     is_wanted,
     limits_in,
@@ -67,6 +68,7 @@ from boulder_sweep.report.page_records import (
     V_0,
     copy_row,
     first_control,
+    flaggable_at,
     given_control,
     halved_control,
     layers_from,
@@ -78,6 +80,7 @@ from boulder_sweep.report.page_records import (
     readings_from,
     table_from,
     taking_elements,
+    tested_from,
     written_out,
 )
 
@@ -336,10 +339,9 @@ def rows(
         The soil as it lies, as of `put_soils`.
     profile_at, points
         Profile of the boulders, shape (points, 4); no points for boxes.
-    layers_at
-        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`.
-    m
-        Number of layers; 0 for a uniform elastic soil beside boxes.
+    layers_at, m
+        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`; none for a uniform elastic
+        soil beside boxes.
     outlines_at
         Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outlined`.
     soil_at
@@ -349,23 +351,22 @@ def rows(
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
         `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is.
     sizes_at
-        Inputs of the rules, shape (len(SIZES), n).
+        Inputs of the rules and flags, shape (len(SIZES) + len(FLAG_INPUTS), n).
     limits_at
-        Limits of the criterion, shape (len(LIMITS),).
-    outcomes_at
-        Where the results go, shape (len(OUTCOME), n).
-    room_at
-        Room for twice as many.
+        Limits of the criterion, and what the model was tested on, shape (len(LIMITS),).
+    outcomes_at, room_at
+        Where the results go, shape (len(OUTCOME), n), and room for twice as many.
     rulings_at
-        Where the rulings go, shape (len(RULINGS) + 1, n); in the last row the number of the settings that decided.
+        Where the rulings go, shape (len(RULINGS) + 2, n); below them the flags, and which settings decided.
     """
-    controls, limits = carray(controls_at, (count, SETTINGS_COUNT)), limits_in(carray(limits_at, (LIMITS_COUNT,)))
+    controls, numbers = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (LIMITS_COUNT,))
+    limits, tested = limits_in(numbers), tested_from(numbers)
     designs, sizes = carray(designs_at, (17, n)), carray(sizes_at, (SIZES_COUNT, n))
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
     both = carray(room_at, (2, 11, n))
     counted, tried, coarser = carray(outcomes_at, (11, n)), both[0], both[1]
-    best, rulings = outcomes_from(counted), carray(rulings_at, (RULINGS_COUNT + 1, n))
+    best, rulings = outcomes_from(counted), carray(rulings_at, (RULINGS_COUNT + 2, n))
     for row in range(n):
         solve_for_error(counted, coarser, row, designs, layers, outlines, soil_at, controls[0])
         rule, decided_by, control = ruling_of(best, sizes, row, limits).rule, 0, given_control(controls[0])
@@ -385,8 +386,10 @@ def rows(
                 rule, decided_by = after, k
         if confirmation.unconfirmed > 0 and count > 1:
             best.theta_error[row] = best.x_error[row] = np.inf
-        put_ruling(ruling_of(best, sizes, row, limits), rulings, row)
-        rulings[RULINGS_COUNT, row] = decided_by
+        ruling = ruling_of(best, sizes, row, limits)
+        put_ruling(ruling, rulings, row)
+        rulings[-2, row] = flags_of(flaggable_at(outcome_at(counted, row), ruling.overlap, sizes, row), tested)
+        rulings[-1, row] = decided_by
 
 
 @array_kernel
@@ -422,10 +425,8 @@ def history(
         last is room for n samples, too.
     settings_at
         Settings, shape (len(SETTINGS),).
-    n
-        Number of samples.
-    times_at
-        Their times, ascending [s], shape (n,).
+    n, times_at
+        Times of the samples, ascending [s], shape (n,).
     states_at, modes_at, exchanged_at, offset_at
         Room for the record, shapes (n, 6), (2, n), (n, 4) and (n,).
     history_at

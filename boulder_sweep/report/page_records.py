@@ -16,7 +16,7 @@ from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import LAST, Memory, is_plastic
-from boulder_kernels.rules import RULINGS, SIZES, VerdictLimits
+from boulder_kernels.rules import RULINGS, SIZES, Flaggable, Tested, VerdictLimits
 from boulder_kernels.soil_laws import ELEMENT_LAWS
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
@@ -32,9 +32,11 @@ CHECKED, PAIRED, ONCE = range(3)
 all designs, or of none."""
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
-LIMITS = VerdictLimits._fields
-"""Limits of the criterion, in this order; rad, m."""
-LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES), len(RULINGS)
+LIMITS = (*VerdictLimits._fields, *Tested._fields)
+"""Limits of the criterion, and what the model was tested on, in this order; rad, m, kg/m^3."""
+FLAG_INPUTS = Flaggable._fields[Flaggable._fields.index("L") :]
+"""Inputs of the flags, behind those of the rules."""
+LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES) + len(FLAG_INPUTS), len(RULINGS)
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
@@ -75,11 +77,18 @@ def changing_control(arguments: str, **changed: str) -> Callable[..., Control]:
 
 readings_from, given_control = taking(Readings), taking(Control, len(Readings._fields))
 table_from, outcomes_from = taking(DesignTable), taking(OutcomeTable)
+tested_from = taking(Tested, len(VerdictLimits._fields))
 outcome_at = written_out(
     f"def take(s, row):\n return OutcomeTable({', '.join(f's[{k}, row]' for k in range(len(OUTCOME)))})",
     OutcomeTable=OutcomeTable,
 )
 """The results of one design, numbers in place of columns."""
+flaggable_at = written_out(
+    "def take(o, overlap, s, row):\n return Flaggable(o.status, o.crush_max, o.theta_max, overlap, "
+    f"{', '.join(f's[{k}, row]' for k in range(len(SIZES), len(SIZES) + len(FLAG_INPUTS)))})",
+    Flaggable=Flaggable,
+)
+"""What the flags of one design depend on."""
 first_control = changing_control(
     "c, refined",
     refined="refined",

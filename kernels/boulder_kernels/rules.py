@@ -164,6 +164,74 @@ def write_rulings(o: OutcomeTable, sizes: np.ndarray, limits: VerdictLimits, out
         put_ruling(ruling_of(o, sizes, row, limits), out, row)
 
 
+FLAGS = ("crush", "rotation", "size", "embedment", "rock_density", "soil_pair", "overlap", "unproved")
+"""Names of the flags of a row, from the lowest bit of `flags_of` on; `boulder_sweep.judge.validity` says what each
+means. They decide nothing."""
+
+
+class Tested(NamedTuple):
+    """What the model was tested on, and what is usual."""
+
+    crush: float
+    """Largest crush [m]."""
+    rotation: float
+    """Largest rotation [rad]."""
+    overlap: float
+    """Least overlap of boulder and bumper [m]."""
+    least_L: float
+    most_L: float
+    least_W: float
+    most_W: float
+    least_H: float
+    most_H: float
+    """Sides of a boulder [m]."""
+    least_ratio: float
+    most_ratio: float
+    """Depth over height [-]."""
+    least_rock: float
+    most_rock: float
+    """Density of rock [kg/m^3]."""
+
+
+class Flaggable(NamedTuple):
+    """What flags depend on; numbers of one row, or arrays."""
+
+    status: Any
+    crush: Any
+    theta: Any
+    overlap: Any
+    """As of `Ruling` [m]."""
+    L: Any
+    W: Any
+    H: Any
+    """Sides of the boulder [m]."""
+    d: Any
+    rock: Any
+    """Density of its rock [kg/m^3]."""
+    beta: Any
+    least_beta: Any
+    most_beta: Any
+    """Constant of subgrade reaction, and between which the friction angle has it [MN/m^3]."""
+
+
+@exact_inlined
+def flags_of(r: Flaggable, t: Tested) -> Any:
+    """Flags of a row, bits of a whole number in the order of `FLAGS`."""
+    ratio = r.d / r.H
+    size = (t.least_L > r.L) | (t.most_L < r.L) | (t.least_W > r.W) | (t.most_W < r.W)
+    size = size | (t.least_H > r.H) | (t.most_H < r.H)
+    return (
+        1 * (r.crush > t.crush)
+        + 2 * (r.theta > t.rotation)
+        + 4 * size
+        + 8 * ((ratio < t.least_ratio) | (ratio > t.most_ratio))
+        + 16 * ((r.rock < t.least_rock) | (r.rock > t.most_rock))
+        + 32 * ((r.beta < r.least_beta) | (r.beta > r.most_beta))
+        + 64 * (r.overlap < t.overlap)
+        + 128 * (r.status == Status.UNPROVABLE.value)
+    )
+
+
 FIRST_FACTOR = 0.5
 """A solution confirms another only if its steps are shorter by this factor."""
 AGREEING = 2

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boulder_kernels import Control, Status, corrected
+from boulder_kernels import Control, Status, corrected, rules
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge import validity
@@ -114,6 +114,10 @@ def test_a_truck_inside_the_boulder_is_never_a_pass() -> None:
     assert str(row["validity"]).startswith("crush")
     assert row["margin"] is None
     assert row["rating"] is None
+
+
+def test_the_kernels_raise_the_flags_of_the_register() -> None:
+    assert tuple(flag.name for flag in FLAGS) == rules.FLAGS
 
 
 def test_the_page_names_every_flag() -> None:

@@ -119,17 +119,17 @@ class Kernel {
    * @param {KernelDesign[]} designs
    * @param {Record<string, number>[]} inputs the same designs by the columns of the table
    * @param {number[][]} controls settings in the order of `Layout.settings`, each finer than those before it
-   * @param {number[]} limits of the criterion
+   * @param {number[]} limits of the criterion, and what the model was tested on
    * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome` and
-   *   `Layout.rulings`, and in `decided_by` the number of the settings that decided
+   *   `Layout.rulings`; `decided_by` is the number of the settings that decided
    */
   rows(designs, inputs, controls, limits) {
     const { design, outcome, sizes, rulings } = this.layout;
     const n = designs.length;
-    const [results, ruled] = [outcome.length * n, (rulings.length + 1) * n];
+    const results = outcome.length * n;
     const { at, views } = this.room([
       2, design.length * n, ...this.soilLengths(controls[0], n), controls.flat().length, sizes.length * n,
-      limits.length, results, 2 * results, ruled,
+      limits.length, results, 2 * results, rulings.length * n,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
     views[8].set(controls.flat());
@@ -139,7 +139,7 @@ class Kernel {
     this.call("rows", [at[1], n, ...soil, at[8], controls.length, ...at.slice(9)]);
     /** @param {string[]} names @param {Float64Array} found */
     const named = (names, found) => names.map((name, field) => [name, found.slice(field * n, (field + 1) * n)]);
-    return Object.fromEntries([...named(outcome, views[11]), ...named([...rulings, "decided_by"], views[13])]);
+    return Object.fromEntries([...named(outcome, views[11]), ...named(rulings, views[13])]);
   }
 
   /**

@@ -81,7 +81,7 @@ class Page {
     const table = byId(`${panel}-outcomes`) ?? byId("outcomes");
     table.replaceChildren(...this.data.outcomes.map((/** @type {any} */ one) => this.row(one.label, found[one.name], one.unit)));
     const flags = String(found.validity ?? "").split(";").filter((name) => name !== "");
-    byId(`${panel}-flags`).replaceChildren(...flags.map((name) => element("li", this.data.rules.tested.meanings[name])));
+    byId(`${panel}-flags`).replaceChildren(...flags.map((name) => element("li", this.data.rules.flags[name])));
     this.plots.draw(panel, motion, this.units, this.data.rules.rotation);
     this.motions[panel] = { scene: this.scene(inputs), motion };
     this.players[panel].load(Math.max(motion.time.length - 1, 0), this.telling(motion));

@@ -23,6 +23,20 @@ function outlineOf(profile, { H, W, L }) {
   return shares.map(([height, width, near, far]) => [height * H, width * W, near * L, far * L]);
 }
 
+/**
+ * The value at a place between ascending ones, or at the nearer end.
+ * @param {number[]} places
+ * @param {number[]} values
+ * @param {number} place
+ */
+function interpolated(places, values, place) {
+  const next = places.findIndex((one) => one >= place);
+  if (next < 0) return values[values.length - 1];
+  if (next === 0) return values[0];
+  const share = (place - places[next - 1]) / (places[next] - places[next - 1]);
+  return values[next - 1] + share * (values[next] - values[next - 1]);
+}
+
 /** @param {Outline} outline @param {number} column @param {number} z height over the foot [m] @returns {number} */
 function atHeight(outline, column, z) {
   return interpolated(outline.map(([height]) => height), outline.map((point) => point[column]), z);
@@ -149,7 +163,10 @@ class Simulator {
     const known_shape = Number(profile.length > 0 || solidity >= least_solidity);
     const reach_m = reachOf(this.outline(inputs), inputs.embedment_depth_m + impact);
     const shape = { solidity, flat_foot, known_shape, reach_m };
-    return { inputs: { ...inputs, ...shape, impact_height_m: impact }, refusal, at };
+    const { angle, least, most } = this.data.rules.families;
+    const [least_beta, most_beta] = [least, most].map((/** @type {number[]} */ values) =>
+      Math.exp(interpolated(angle, values.map(Math.log), inputs.friction_angle_deg)));
+    return { inputs: { ...inputs, ...shape, least_beta, most_beta, impact_height_m: impact }, refusal, at };
   }
 
   /**

@@ -5,24 +5,15 @@
  * What a design must keep to, and the words of every verdict; written by Python.
  * @typedef {object} Rules
  * @property {number} rotation largest rotation [rad]
- * @property {number[]} limits of the criterion, as the kernel takes them
+ * @property {number[]} limits of the criterion, and what the model was tested on, as the kernel takes them
  * @property {[string, string][]} verdicts verdict and reason of every rule of the kernel
  * @property {string} not_finite the reason where a result is not a finite number
  * @property {[string, number][]} ratings every rating and its largest penetration [m], the best first
  * @property {Record<string, number>} status how a simulation can end, by name
  * @property {Record<string, string>} why the reason of each status that leaves a design without a result
- * @property {Tested} tested
- */
-
-/**
- * What the model was tested on: values beyond which a row is flagged; written by Python.
- * @typedef {object} Tested
- * @property {number} rotation [rad]
- * @property {number} crush [m]
- * @property {number} overlap [m]
- * @property {Record<string, [number, number]>} usual range of sizes, embedment ratio and density of rock
- * @property {{angle: number[], least: number[], most: number[]}} soil subgrade reaction [MN/m^3] over friction angle [deg]
- * @property {Record<string, string>} meanings of every flag, in their order
+ * @property {Record<string, string>} flags meaning of every flag, from the lowest bit on
+ * @property {{angle: number[], least: number[], most: number[]}} families subgrade reactions [MN/m^3] that go with
+ *   friction angles [deg]
  */
 
 /**
@@ -50,6 +41,7 @@ function judge(results, row, inputs, rules) {
   const overturned = reason === "overturns";
   const rated = valid && !overturned && (verdict !== "undecided" || reason === "error");
   const rating = rules.ratings.find(([, most]) => penetration <= most)?.[0] ?? null;
+  const flags = Object.keys(rules.flags).filter((_, bit) => (of("flags") >> bit) & 1);
   /** @param {number} value @param {boolean} known */
   const kept = (value, known = valid) => (known && !Number.isNaN(value) ? value : null);
   return {
@@ -70,52 +62,7 @@ function judge(results, row, inputs, rules) {
     vehicle_crush_m: kept(of("crush_max")),
     overlap_m: verdict === "error" ? null : overlap,
     solidity: verdict === "error" ? null : inputs.solidity,
-    validity: verdict === "error" ? null : flagsOf(results, row, inputs, overlap, rules).join(";"),
+    validity: verdict === "error" ? null : flags.join(";"),
     decided_by: of("decided_by"),
   };
-}
-
-/**
- * The flags of one design: those of `boulder_sweep.judge.validity`, held against them by a test.
- * @param {Record<string, Float64Array>} results
- * @param {number} row
- * @param {Record<string, number>} inputs
- * @param {number} overlap [m]
- * @param {Rules} rules
- * @returns {string[]} their names
- */
-function flagsOf(results, row, inputs, overlap, rules) {
-  const { tested } = rules;
-  const depth = inputs.embedment_depth_m;
-  /** @param {string} name @param {number} value */
-  const outside = (name, value) => value < tested.usual[name][0] || value > tested.usual[name][1];
-  /** @param {number[]} values */
-  const along = (values) => Math.exp(interpolated(tested.soil.angle, values.map(Math.log), inputs.friction_angle_deg));
-  const reaction = inputs.subgrade_reaction_MN_m3;
-  /** @type {Record<string, boolean>} */
-  const raised = {
-    crush: results.crush_max[row] > tested.crush,
-    rotation: results.theta_max[row] > tested.rotation,
-    size: ["boulder_length_m", "boulder_width_m", "boulder_height_m"].some((name) => outside(name, inputs[name])),
-    embedment: outside("embedment_ratio", depth / inputs.boulder_height_m),
-    rock_density: outside("boulder_density_kg_m3", inputs.boulder_density_kg_m3),
-    soil_pair: reaction > along(tested.soil.most) || reaction < along(tested.soil.least),
-    overlap: overlap < tested.overlap,
-    unproved: results.status[row] === rules.status.UNPROVABLE,
-  };
-  return Object.keys(tested.meanings).filter((name) => raised[name]);
-}
-
-/**
- * The value at a place between ascending ones, or at the nearer end.
- * @param {number[]} places
- * @param {number[]} values
- * @param {number} place
- */
-function interpolated(places, values, place) {
-  const next = places.findIndex((one) => one >= place);
-  if (next < 0) return values[values.length - 1];
-  if (next === 0) return values[0];
-  const share = (place - places[next - 1]) / (places[next] - places[next - 1]);
-  return values[next - 1] + share * (values[next] - values[next - 1]);
 }
