@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels._jit import plain
-from boulder_kernels.rules import Flaggable, Tested, flags_of
+from boulder_kernels.rules import FlagInputs, Tested, flags_of
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.settings.fields import BY_NAME
 
@@ -127,7 +127,7 @@ def largest_tested_rotation(preset: str) -> float:
     return math.radians(TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values())))
 
 
-def tested(calibrated_crush: float, rotation: float) -> Tested:
+def tested_of(calibrated_crush: float, rotation: float) -> Tested:
     """Return what the model was tested on; arguments: see `boulder_sweep.judge.verdict.Limits`."""
     ranges = [end for low_high in (*_SIZES, _EMBEDMENT, _ROCK) for end in low_high]
     return Tested(calibrated_crush, rotation, TESTED_OVERLAP_M, *ranges)
@@ -156,8 +156,8 @@ def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
     rocks = table.rho_b if designs.rocks is None else designs.rocks
     soil = run_by_run(lambda phi: family_bounds(np.degrees(phi)), table.phi)
     reached = outcomes.status, outcomes.crush_max, outcomes.theta_max, facts.overlap
-    rows = Flaggable(*reached, table.L, table.W, table.H, table.d, rocks, table.beta, *soil)
-    bits = plain(flags_of)(rows, tested(limits.calibrated_crush, limits.tested_rotation))
+    rows = FlagInputs(*reached, table.L, table.W, table.H, table.d, rocks, table.beta, *soil)
+    bits = plain(flags_of)(rows, tested_of(limits.calibrated_crush, limits.tested_rotation))
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))

@@ -20,7 +20,7 @@ from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
-from boulder_sweep.judge.validity import FLAGS, largest_tested_rotation, tested
+from boulder_sweep.judge.validity import FLAGS, largest_tested_rotation, tested_of
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import page_records
 from boulder_sweep.report.build import KERNEL
@@ -265,7 +265,7 @@ def _layout() -> dict[str, Any]:
         "history": page_records.HISTORY,
         "sizes": [
             *((SOURCES | OF_THE_PAGE).get(name, name) for name in rules.SIZES),
-            *((SOURCES | OF_FLAGS).get(name, name) for name in page_records.FLAG_INPUTS),
+            *((SOURCES | OF_FLAGS).get(name, name) for name in page_records.FLAG_SIZES),
         ],
         "rulings": [*rules.RULINGS, "flags", "decided_by"],
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
@@ -285,7 +285,7 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "rotation": rotation,
         "rating": rating,
-        "limits": [*limits, *tested(model["calibrated_crush_m"], largest_tested_rotation(model["preset"]))],
+        "limits": [*limits, *tested_of(model["calibrated_crush_m"], largest_tested_rotation(model["preset"]))],
         "verdicts": RULES,
         "not_finite": NOT_FINITE,
         "ratings": list(PENETRATION_LIMITS_M.items()),

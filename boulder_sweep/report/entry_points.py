@@ -68,7 +68,7 @@ from boulder_sweep.report.page_records import (
     V_0,
     copy_row,
     first_control,
-    flaggable_at,
+    flag_inputs_at,
     given_control,
     halved_control,
     layers_from,
@@ -351,7 +351,7 @@ def rows(
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
         `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is.
     sizes_at
-        Inputs of the rules and flags, shape (len(SIZES) + len(FLAG_INPUTS), n).
+        Inputs of the rules and flags, shape (len(SIZES) + len(FLAG_SIZES), n).
     limits_at
         Limits of the criterion, and what the model was tested on, shape (len(LIMITS),).
     outcomes_at, room_at
@@ -388,7 +388,7 @@ def rows(
             best.theta_error[row] = best.x_error[row] = np.inf
         ruling = ruling_of(best, sizes, row, limits)
         put_ruling(ruling, rulings, row)
-        rulings[-2, row] = flags_of(flaggable_at(outcome_at(counted, row), ruling.overlap, sizes, row), tested)
+        rulings[-2, row] = flags_of(flag_inputs_at(outcome_at(counted, row), ruling.overlap, sizes, row), tested)
         rulings[-1, row] = decided_by
 
 

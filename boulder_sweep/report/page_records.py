@@ -16,7 +16,7 @@ from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
 from boulder_kernels.plastic import LAST, Memory, is_plastic
-from boulder_kernels.rules import RULINGS, SIZES, Flaggable, Tested, VerdictLimits
+from boulder_kernels.rules import RULINGS, SIZES, FlagInputs, Tested, VerdictLimits
 from boulder_kernels.soil_laws import ELEMENT_LAWS
 
 DESIGN = (*Design._fields, *SecondSpring._fields)
@@ -34,9 +34,9 @@ OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
 LIMITS = (*VerdictLimits._fields, *Tested._fields)
 """Limits of the criterion, and what the model was tested on, in this order; rad, m, kg/m^3."""
-FLAG_INPUTS = Flaggable._fields[Flaggable._fields.index("L") :]
+FLAG_SIZES = FlagInputs._fields[FlagInputs._fields.index("L") :]
 """Inputs of the flags, behind those of the rules."""
-LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES) + len(FLAG_INPUTS), len(RULINGS)
+LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES) + len(FLAG_SIZES), len(RULINGS)
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
@@ -83,10 +83,10 @@ outcome_at = written_out(
     OutcomeTable=OutcomeTable,
 )
 """The results of one design, numbers in place of columns."""
-flaggable_at = written_out(
-    "def take(o, overlap, s, row):\n return Flaggable(o.status, o.crush_max, o.theta_max, overlap, "
-    f"{', '.join(f's[{k}, row]' for k in range(len(SIZES), len(SIZES) + len(FLAG_INPUTS)))})",
-    Flaggable=Flaggable,
+flag_inputs_at = written_out(
+    "def take(o, overlap, s, row):\n return FlagInputs(o.status, o.crush_max, o.theta_max, overlap, "
+    f"{', '.join(f's[{k}, row]' for k in range(len(SIZES), len(SIZES) + len(FLAG_SIZES)))})",
+    FlagInputs=FlagInputs,
 )
 """What the flags of one design depend on."""
 first_control = changing_control(

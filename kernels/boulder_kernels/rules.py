@@ -1,8 +1,9 @@
-"""Which rule decides a row, and whether another solution has to: for tables and for the page of a report.
+"""Which rule decides a row, which flags it has, and whether another solution has to decide it: for tables and pages.
 
 The rules are in order, the worst first; the first that applies decides the row. `boulder_sweep.judge.verdict` says what
-each means. `boulder_sweep.judge.refinement` says which rows are simulated again, and why; what tells that here takes
-numbers of one row in the page, and arrays of shape (n,) in a table.
+each means, `boulder_sweep.judge.validity` what the flags mean, and `boulder_sweep.judge.refinement` which rows are
+simulated again, and why. What tells flags and such rows takes arrays of shape (n,) in a table, which calls it as plain
+Python, and numbers of one row in the page of a report, into which it is compiled.
 """
 
 from __future__ import annotations
@@ -193,12 +194,14 @@ class Tested(NamedTuple):
     """Density of rock [kg/m^3]."""
 
 
-class Flaggable(NamedTuple):
-    """What flags depend on; numbers of one row, or arrays."""
+class FlagInputs(NamedTuple):
+    """What the flags of a row depend on; numbers of one row, or arrays."""
 
     status: Any
     crush: Any
+    """Largest crush [m]."""
     theta: Any
+    """Largest rotation [rad]."""
     overlap: Any
     """As of `Ruling` [m]."""
     L: Any
@@ -206,6 +209,7 @@ class Flaggable(NamedTuple):
     H: Any
     """Sides of the boulder [m]."""
     d: Any
+    """Embedment depth [m]."""
     rock: Any
     """Density of its rock [kg/m^3]."""
     beta: Any
@@ -215,11 +219,11 @@ class Flaggable(NamedTuple):
 
 
 @exact_inlined
-def flags_of(r: Flaggable, t: Tested) -> Any:
+def flags_of(r: FlagInputs, t: Tested) -> Any:
     """Flags of a row, bits of a whole number in the order of `FLAGS`."""
-    ratio = r.d / r.H
-    size = (t.least_L > r.L) | (t.most_L < r.L) | (t.least_W > r.W) | (t.most_W < r.W)
-    size = size | (t.least_H > r.H) | (t.most_H < r.H)
+    length, width, height, ratio = r.L, r.W, r.H, r.d / r.H
+    size = (length < t.least_L) | (length > t.most_L) | (width < t.least_W) | (width > t.most_W)
+    size = size | (height < t.least_H) | (height > t.most_H)
     return (
         1 * (r.crush > t.crush)
         + 2 * (r.theta > t.rotation)
@@ -287,7 +291,8 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: Any) -> Any:
     Parameters
     ----------
     coarse, fine
-        Solutions whose steps differ by a factor of two or more, each with its estimated errors.
+        Solutions whose steps differ by a factor of two or more, each with its estimated errors; tables, or the numbers
+        of one row.
     v_0
         Speed of impact [m/s]: an error of the displacement is one of the time, too, see
         `boulder_kernels.error_estimates.estimate_errors`.
