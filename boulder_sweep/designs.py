@@ -187,7 +187,11 @@ REASONS = (
     "impact height is above the top of the boulder",
     "second spring of the vehicle is softer than the first",
     "boulder is heavier than a solid box of its size and rock",
+    "unusual",
 )
+UNUSUAL = REASONS[-1]
+"""Stands among what is given of designs for whether some of it is so far from usual that the file must allow it, 1 or 0;
+of a file without a list of designs no such value is read."""
 
 
 def embedment_of_ratio(ratio: np.ndarray, height: np.ndarray) -> np.ndarray:
@@ -239,6 +243,11 @@ def refusal_of_mass(codes: np.ndarray, mass: np.ndarray, density: np.ndarray, *s
     return np.where(codes == 0, 5 * heavy, codes).astype(np.int8)
 
 
+def refusal_of_unusual(codes: np.ndarray, unusual: np.ndarray) -> np.ndarray:
+    """Return the same as `refusal` for designs of which some are `UNUSUAL`."""
+    return np.where(unusual > 0.0, REASONS.index(UNUSUAL), codes).astype(np.int8)
+
+
 def _completed(
     given: Mapping[str, Known], zero: Known, combine: Callable[..., Known]
 ) -> tuple[dict[str, Known], Known]:
@@ -268,6 +277,8 @@ def _completed(
     if BOULDER_MASS in known:
         weighed = (known[name] for name in (BOULDER_MASS, "boulder_density_kg_m3", *SIDES))
         refusals = combine(refusal_of_mass, refusals, *weighed)
+    if UNUSUAL in known:
+        refusals = combine(refusal_of_unusual, refusals, known[UNUSUAL])
     names = (*INPUT_COLUMNS, *(name for name in OPTIONAL_COLUMNS if name in known))
     return {name: known[name] for name in names}, refusals
 

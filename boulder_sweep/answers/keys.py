@@ -14,10 +14,10 @@ from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
 from boulder_sweep.settings.problems import LeafError, Position
 from boulder_sweep.settings.tree import Scalar
-from boulder_sweep.settings.values import outside, read_single
+from boulder_sweep.settings.values import NumberError, outside, read_quantity, read_single, refuse_bare
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from boulder_sweep.settings import Sweep
 
@@ -121,21 +121,34 @@ def key_of(word: str, *, most: bool = False, tolerance: str | float | None = Non
 
 
 def quantity(text: str | float, unit: str, option: str) -> float:
-    """Return a number with or without a unit, in the unit of the table.
+    """Return a number with its unit, or in the unit of the table where it is no text.
 
     Raises
     ------
     QuestionError
-        It is not a number of that kind.
+        It is not a number of that kind, or text without a unit.
     """
-    from boulder_sweep.settings.values import read_quantity
-
     if not isinstance(text, str):
         return float(text)
+    _refuse_bare(option, (text,), unit)
     try:
         return float(read_quantity(Scalar(Position(option), text), unit).value)
     except LeafError as problem:
         raise QuestionError(f"{option} {text}: {problem}") from None
+
+
+def _refuse_bare(option: str, given: Sequence[str | float], unit: str) -> None:
+    """Refuse text that is a number without a unit.
+
+    Raises
+    ------
+    QuestionError
+        There is such a text, and the unit is not 1.
+    """
+    try:
+        refuse_bare(option, [one for one in given if isinstance(one, str)], unit)
+    except NumberError as problem:
+        raise QuestionError(str(problem)) from None
 
 
 def share(text: str | float, option: str) -> float:
@@ -221,6 +234,7 @@ def _whole_range(
     """Return the search range, whatever the distribution of the input; arguments: see `range_of`."""
     one = np.ones(len(next(iter(given.values()))))
     if between is not None:
+        _refuse_bare("--between", between, key.field.unit)
         low, high = (bound(end, key.field) for end in between)
         if not low < high:
             raise QuestionError(f"--between {between[0]} {between[1]}: the first must be less than the second")

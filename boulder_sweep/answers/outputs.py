@@ -26,7 +26,7 @@ from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Criterion, completed
-from boulder_sweep.settings.sweep import Axis, DesignList
+from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
 from boulder_sweep.store.failures import settings_file
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.provenance import identity_in, judged_by, settings_sha256
@@ -288,6 +288,7 @@ def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
         table=listed,
         criterion=Criterion(**settings["criterion"]),
         model=model_of(settings, known_control(identity["control"])),
+        allowed=allowed_in(settings),
     )
 
 

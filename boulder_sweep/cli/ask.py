@@ -10,6 +10,7 @@ import click
 
 from boulder_sweep.cli.options import (
     OUTPUT,
+    Quantity,
     at_option,
     cluster_options,
     grid_argument,
@@ -51,9 +52,18 @@ Examples:
     "--open-readings", is_flag=True, help="With --probability: treat all readings of the paper as equally likely."
 )
 @click.option(
-    "--between", nargs=2, metavar="A B", help="Range to search [default: the axis of the file, or the usual]."
+    "--between",
+    nargs=2,
+    type=Quantity(),
+    metavar="A B",
+    help="Range to search, with units, e.g. '5 ft' '9 ft' [default: the axis of the file, or the usual].",
 )
-@click.option("--tolerance", metavar="T", help="Spacing of the values tried [1 mm, 0.01 deg, 0.01 m/s, ...].")
+@click.option(
+    "--tolerance",
+    type=Quantity(),
+    metavar="T",
+    help="Spacing of the values tried, with its unit [1 mm, 0.01 deg, 0.01 m/s, ...].",
+)
 @click.option(
     "--robust",
     is_flag=True,

@@ -33,6 +33,32 @@ class OutputPath(click.Path):
         return super().convert(value, param, ctx)
 
 
+class Quantity(click.ParamType):
+    """A number of some dimension: it needs its unit, whatever `--units` says, and stays the text that it is.
+
+    Parameters
+    ----------
+    unit
+        Unit of the table; None where an input that is named beside it decides, and the command refuses bare numbers.
+    """
+
+    name = "quantity"
+
+    def __init__(self, unit: str | None = None) -> None:
+        self.unit = unit
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse a number without a unit."""
+        from boulder_sweep.settings.values import NumberError, refuse_bare
+
+        if self.unit is not None and param is not None:
+            try:
+                refuse_bare(param.opts[0], [value], self.unit)
+            except NumberError as error:
+                raise click.UsageError(str(error), ctx) from None
+        return value
+
+
 OUTPUT = OutputPath()
 
 grid_argument = click.argument("grid", type=click.Path())
@@ -170,13 +196,11 @@ def refuse_unwritable_history(
 
 def quantity_of(option: str, text: str, unit: str) -> float:
     """Return the positive number that an option gives with its unit, in the unit of the table."""
-    from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+    from boulder_sweep.settings.units import UnitError, factor
     from boulder_sweep.settings.values import NumberError, split_number
 
     try:
         number, unit_text = split_number(text, unit)
-        if not unit_text:
-            raise click.UsageError(f"{option} '{text}': write the unit too ({EXPECTED[unit].examples})")
         value = float(number * factor(unit_text, unit))
     except (NumberError, UnitError) as error:
         raise click.UsageError(f"{option}: {error}") from None

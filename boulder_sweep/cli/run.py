@@ -13,6 +13,7 @@ import click
 from boulder_sweep.cli.options import (
     JOBS,
     OUTPUT,
+    Quantity,
     at_option,
     cluster_options,
     grid_argument,
@@ -51,7 +52,7 @@ Examples:
 @click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run.")
 @click.option("--force", is_flag=True, help="Run even if disk or memory seem too small.")
 @click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing.")
-@click.option("--accuracy", metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
+@click.option("--accuracy", type=Quantity("deg"), metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
 @second_opinion_option
 @at_option
 @cluster_options

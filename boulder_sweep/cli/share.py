@@ -13,6 +13,7 @@ import click
 
 from boulder_sweep.cli.options import (
     OUTPUT,
+    Quantity,
     at_option,
     load_sweep,
     refuse_missing,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 PLOT_EXAMPLES = """\b
 Examples:
   sweep plot m30-sizing.sweep
-  sweep plot m30-sizing.sweep -o map.png --at width=1.8
+  sweep plot m30-sizing.sweep -o map.png --at width=1.8m
   sweep plot m30-sizing.sweep --units us
   sweep plot m30-sizing.sweep --across width
   sweep plot depths.parquet
@@ -49,8 +50,9 @@ COLUMN = "COLUMN"
 @click.option(
     "--at",
     multiple=True,
+    type=Quantity(),
     metavar="COLUMN=VALUE",
-    help="Hold another input at a value, in the unit of its column [default: its middle one] (may be repeated).",
+    help="Hold another input at a value [default: its middle one] (may be repeated).",
 )
 @units_option
 def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes: Any) -> int:
@@ -118,11 +120,20 @@ def _plot_answers(file: AnswerFile, target: Path, units: str, asked: Sequence[st
 
 
 def _given(text: str) -> tuple[str, str]:
-    """Read ``COLUMN=VALUE``."""
-    name, equals, value = text.partition("=")
+    """Read ``COLUMN=VALUE``; the value of an input has its unit, behind it or in the name of the column."""
+    from boulder_sweep.settings.fields import BY_NAME
+    from boulder_sweep.settings.values import NumberError, refuse_bare
+
+    name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         raise click.UsageError(f"--at {text}: missing =; write COLUMN=VALUE")
-    return _column("at", name.strip()), value.strip()
+    column = _column("at", name)
+    if column in BY_NAME and column != name:
+        try:
+            refuse_bare(f"--at {name}=", [value], BY_NAME[column].unit)
+        except NumberError as error:
+            raise click.UsageError(str(error)) from None
+    return column, value
 
 
 def _column(option: str, word: str) -> str:
@@ -138,18 +149,22 @@ def _column(option: str, word: str) -> str:
 
 
 def _held(name: str, text: str, sets: Mapping[str, Sequence[str]]) -> float:
-    """Return the value at which an input is held; of a named soil or vehicle its number."""
+    """Return the value at which an input is held, in the unit of the table; of a named soil or vehicle its number."""
+    from boulder_sweep.settings.fields import BY_NAME
+    from boulder_sweep.settings.problems import LeafError, Position
+    from boulder_sweep.settings.tree import Scalar
+    from boulder_sweep.settings.values import read_quantity
+
     if name in sets:
         if text in sets[name]:
             return float(sets[name].index(text))
         raise click.UsageError(f"--at {name}={text}: there are {', '.join(sets[name])}")
+    if name not in BY_NAME:
+        raise click.UsageError(f"--at {name}={text}: this result has no named sets of {name}")
     try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise click.UsageError(f"--at {name}={text}: must be COLUMN=VALUE, with a finite number in the column's unit")
-    return value
+        return float(read_quantity(Scalar(Position("--at"), text), BY_NAME[name].unit).value)
+    except LeafError as error:
+        raise click.UsageError(f"--at {name}={text}: {error}") from None
 
 
 REPORT_EXAMPLES = """\b

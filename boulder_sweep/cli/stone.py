@@ -13,6 +13,7 @@ import click
 
 from boulder_sweep.cli.options import (
     OUTPUT,
+    Quantity,
     at_option,
     json_option,
     load_sweep,
@@ -48,7 +49,12 @@ Examples:
 @click.command("stone", short_help="Volume, mass, foot and profile of a scanned stone.", epilog=EXAMPLES)
 @click.argument("rock", type=click.Path())
 @click.argument("site", type=click.Path(), required=False)
-@click.option("--mass", metavar="'18.2 t'", help=f"Mass of the whole stone [default: rock of {ROCK_KG_M3:g} kg/m³].")
+@click.option(
+    "--mass",
+    type=Quantity("kg"),
+    metavar="'18.2 t'",
+    help=f"Mass of the whole stone [default: rock of {ROCK_KG_M3:g} kg/m³].",
+)
 @click.option("--unit", default="m", metavar="UNIT", help="Unit of the scan: m, mm, cm, in or ft [m].")
 @click.option("--up", metavar="END", help="End that is up, for a block of settings: a, -a, b, -b, c, -c, x, ...")
 @click.option("--facing", metavar="END", help="End that faces the vehicle, with --up.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boulder_sweep.cli.options import OUTPUT, json_option, quantity_of, refuse_unwritable
+from boulder_sweep.cli.options import OUTPUT, Quantity, json_option, quantity_of, refuse_unwritable
 from boulder_sweep.cli.output import say, show
 
 if TYPE_CHECKING:
@@ -29,10 +29,19 @@ In a settings file, in place of vehicle.speed:
 
 
 @click.command("speed", short_help="Speed with which a vehicle reaches the boulder.", epilog=SPEED_EXAMPLES)
-@click.option("--length", metavar="'80 m'", help="Run-up: from its beginning or last curve to the boulder.")
-@click.option("--from", "start", metavar="'0 mph'", help="Speed at the beginning of the run-up.")
-@click.option("--acceleration", metavar="'1.2 m/s^2'", help="Of the vehicle, at full throttle on level ground.")
-@click.option("--curve-radius", metavar="'25 m'", help="Of the curve that ends where the run-up begins.")
+@click.option(
+    "--length", type=Quantity("m"), metavar="'80 m'", help="Run-up: from its beginning or last curve to the boulder."
+)
+@click.option("--from", "start", type=Quantity("m/s"), metavar="'0 mph'", help="Speed at the beginning of the run-up.")
+@click.option(
+    "--acceleration",
+    type=Quantity("m/s^2"),
+    metavar="'1.2 m/s^2'",
+    help="Of the vehicle, at full throttle on level ground.",
+)
+@click.option(
+    "--curve-radius", type=Quantity("m"), metavar="'25 m'", help="Of the curve that ends where the run-up begins."
+)
 @click.option("--friction", metavar="MU", help="Coefficient of friction of the tyres in that curve [1].")
 @click.option("--grade", metavar="'-4 %'", help="Rise over run towards the boulder, negative downhill [0].")
 @json_option
@@ -63,23 +72,11 @@ def speed(as_json: bool, **given: str | None) -> int:
 
 
 def _as_block(given: dict[str, str]) -> Mapping:
-    """Return the options as the block of a settings file; each needs its unit here, zero too."""
+    """Return the options as the block of a settings file."""
     from boulder_sweep.settings.problems import Position
     from boulder_sweep.settings.tree import Entry, Mapping, Scalar
-    from boulder_sweep.settings.units import EXPECTED
-    from boulder_sweep.settings.values import NumberError, split_number
-    from boulder_sweep.settings.vehicle import APPROACH_FIELDS
 
     here = Position("sweep speed")
-    for key, text in given.items():
-        unit = APPROACH_FIELDS[key.replace("-", "_")].unit
-        try:
-            bare = unit != "1" and not split_number(text, unit)[1]
-        except NumberError:
-            continue  # the reader says what is wrong
-        if bare:
-            examples = EXPECTED[unit].examples
-            raise click.UsageError(f"--{key.replace('_', '-')} '{text}': write the unit too ({examples})")
     return Mapping(here, {key: Entry(key, here, Scalar(here, text)) for key, text in given.items()})
 
 
@@ -113,8 +110,12 @@ where it is not, name the column deceleration. Empty cells are gaps.
 
 @click.command("fit-vehicle", short_help="Fit spring and damper of a vehicle to a crash pulse.", epilog=FIT_EXAMPLES)
 @click.argument("pulse", type=click.Path())
-@click.option("--mass", required=True, metavar="'6800 kg'", help="Mass of the vehicle, with its unit.")
-@click.option("--speed", metavar="'30 mph'", help="Speed of impact, with its unit [default: fitted too].")
+@click.option(
+    "--mass", required=True, type=Quantity("kg"), metavar="'6800 kg'", help="Mass of the vehicle, with its unit."
+)
+@click.option(
+    "--speed", type=Quantity("m/s"), metavar="'30 mph'", help="Speed of impact, with its unit [default: fitted too]."
+)
 @click.option("--stages", type=click.IntRange(1, 2), default=1, help="Springs of the front [default: 1].")
 @click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw pulse, fit and residuals.")
 @json_option

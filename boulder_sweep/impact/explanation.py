@@ -25,6 +25,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
+from boulder_sweep.settings.sweep import allowed_in
 from boulder_sweep.store.manifest import load as load_manifest
 from boulder_sweep.store.provenance import differences, identity, judged_by
 from boulder_sweep.store.reader import read_row
@@ -166,6 +167,7 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
             step_s=step_s,
             horizon_s=control.horizon,
         ),
+        allowed=allowed_in(settings),
     )
 
 

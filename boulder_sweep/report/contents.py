@@ -61,9 +61,10 @@ OUTCOME_WORDS = {
 
 REFUSED_AT = (
     *("", "embedment_depth_m", "hood_height_m", "impact_height_m"),
-    *("vehicle_second_spring_N_m", "boulder_mass_kg"),
+    *("vehicle_second_spring_N_m", "boulder_mass_kg", ""),
 )
-"""The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`."""
+"""The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`; of an unusual value
+it says so in its note."""
 FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
 """Sides that the reader cannot change where the boulder is a stone with a profile of its own."""
 OF_THE_PAGE = {"L": "reach_m", "bed_offset": "bed_offset_m"}

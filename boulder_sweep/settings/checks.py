@@ -7,7 +7,7 @@ stop a run.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -15,14 +15,16 @@ from boulder_sweep.columns import BOULDER_MASS, SECOND_SPRING_COLUMNS, WAY_OUT
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, SIDES
 from boulder_sweep.investigation import api_curve, off_families, terzaghi_curve
 from boulder_sweep.settings import fields
+from boulder_sweep.settings.distributions import BOUNDED, Distribution, SetDistributions
 from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.fields import BY_NAME, Field
 from boulder_sweep.settings.model import UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.sweep import Sweep
-from boulder_sweep.settings.values import range_words
+from boulder_sweep.settings.values import is_unusual, range_words
 from boulder_sweep.stones.rock import ROCK_KG_M3
+from boulder_sweep.text import counted
 
 SLIDES = "or the ground slides"
 """What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""
@@ -62,6 +64,52 @@ def check_complete(entries: Entries) -> None:
             if leaf.is_axis:
                 message = "must be one value beside a table; lists and ranges are axes of a grid"
                 entries.problems.add(leaf.position, BY_NAME[name].path, message)
+
+
+def check_usual(entries: Entries) -> None:
+    """Report values so far from usual that the file must allow them; those of a table are left to its rows."""
+    found: list[tuple[Position, str, Field, np.ndarray, str]] = []
+    for field in fields.INPUTS:
+        leaf = entries.leaves.get(field.name)
+        if leaf is not None:
+            places = leaf.positions or [leaf.position] * len(leaf.values)
+            at: dict[Position, list[float]] = {}
+            for position, value in [*zip(places, leaf.values.tolist(), strict=True), *_ends(leaf.distribution)]:
+                at.setdefault(position, []).append(value)
+            found += [(position, field.path, field, np.array(values), leaf.written) for position, values in at.items()]
+    layers = np.array([layer.density_kg_m3 for layer in entries.settings.get("layers", ())])
+    found.append((entries.position_of("soil.layers"), "soil.layers", BY_NAME["soil_density_kg_m3"], layers, ""))
+    far = [
+        (position, path, field, values[off], written)
+        for position, path, field, values, written in found
+        if field.path not in entries.allowed and (off := is_unusual(values, field)).any()
+    ]
+    remedy = _allowing([*entries.allowed, *(field.path for _, _, field, _, _ in far)])
+    for position, path, field, values, written in far:
+        entries.problems.add(position, path, f"{_far_words(values, field, written)}; {remedy}")
+
+
+def _ends(spread: Distribution | SetDistributions | None) -> Iterator[tuple[Position, float]]:
+    """Yield both ends of distributions that reach from one to the other, each with its position."""
+    for one in spread.each if isinstance(spread, SetDistributions) else (spread,):
+        if one is not None and one.kind in BOUNDED:
+            yield from ((one.position, one.low), (one.position, one.high))
+
+
+def _allowing(paths: Iterable[str]) -> str:
+    """Return how the values of some entries are allowed."""
+    return f"if it is meant, the file allows it by {fields.ALLOW_UNUSUAL}: [{', '.join(sorted(set(paths)))}]"
+
+
+def _far_words(values: np.ndarray, field: Field, written: str = "") -> str:
+    """Return how far values are from usual, in the unit in which they were written, if any."""
+    assert field.usual is not None
+    low, high = float(values.min()), float(values.max())
+    usual = range_words(field.usual.low, field.usual.high, field.unit, written)
+    far = f"less than 1/{fields.UNUSUAL:g} of" if high < field.usual.low else f"more than {fields.UNUSUAL:g} times"
+    if low < field.usual.low < high:
+        far = f"more than {fields.UNUSUAL:g} times outside"
+    return f"{range_words(low, high, field.unit, written)} is {far} the usual {usual} ({field.usual.remark})"
 
 
 def _check_embedment(entries: Entries, present: set[str], unread_table: bool) -> None:
@@ -219,7 +267,13 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
     for group in groups:
         values |= group
     for name, of_input in values.items():
-        yield BY_NAME[name].path, _unusual(name, of_input, written.get(name, ""))
+        field = BY_NAME[name]
+        off = is_unusual(of_input, field) if sweep.is_held(name) else np.zeros(of_input.shape, dtype=bool)
+        if off.any():  # in a table: of single values and axes the file has been refused
+            rows = counted(np.count_nonzero(off), "design")
+            words = f"{_far_words(of_input[off], field)}: {rows} not computed (error, unusual), the first is design"
+            yield field.path, f"{words} {off.argmax()}; {_allowing([*sweep.allowed, field.path])}"
+        yield field.path, _unusual(name, of_input[~off], written.get(name, ""))
     for axis in sweep.axes:
         if len(set(axis.values.tolist())) < len(axis.values):
             yield BY_NAME[axis.name].path, "contains a value more than once"

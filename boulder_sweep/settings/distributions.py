@@ -15,7 +15,9 @@ from boulder_sweep.settings.tree import Mapping, Node, Scalar
 from boulder_sweep.settings.values import RANGE_KEYS, Leaf, outside, read_leaf, read_quantity, read_single
 
 T = TypeVar("T")
-KINDS = ("normal", "lognormal", "uniform", "triangular", "beta")
+BOUNDED = ("uniform", "triangular", "beta")
+"""Kinds that reach from one end to the other; others are truncated at theirs."""
+KINDS = ("normal", "lognormal", *BOUNDED)
 FRACTILE_5 = 1.6448536269514722
 """Distance of the 5 % fractile of a normal distribution below its mean, in standard deviations."""
 
@@ -158,7 +160,7 @@ def read_input(node: Node, field: Field) -> Input:
     if isinstance(node, Mapping) and not set(RANGE_KEYS) & set(node.entries) and _WORDS & set(node.entries):
         return _read_distribution(node, field)
     certain = read_leaf(node, field)
-    return Input(certain.values, certain.is_axis, certain.position, certain.written)
+    return Input(certain.values, certain.is_axis, certain.position, certain.written, certain.positions)
 
 
 def _read_distribution(node: Mapping, field: Field) -> Input:
@@ -211,8 +213,9 @@ def _read_distribution(node: Mapping, field: Field) -> Input:
     else:
         values = given.values if centre == "mean" else _means(node, kind, given.values, sd, cov)
     _check_values(node, values, distribution, field)
-    is_axis, written = (False, "") if given is None else (given.is_axis, given.written)
-    return Input(values, is_axis, node.position, written, distribution)
+    if given is None:
+        return Input(values, False, node.position, distribution=distribution)
+    return Input(values, given.is_axis, node.position, given.written, given.positions, distribution)
 
 
 def _kind(node: Mapping) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides_of, unfold_scan
 from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
-from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, nearest, shorten, wrong
+from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, nearest, shorten, unknown_word, wrong
 from boulder_sweep.settings.shape import ProfilePoint
 from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS, unfold_soils
 from boulder_sweep.settings.sweep import SECTION, DesignList
@@ -27,7 +27,7 @@ NAME = re.compile(r"\w[\w .+-]{0,79}")
 """Names of sweeps and of named sets."""
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
-TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION)
+TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, fields.ALLOW_UNUSUAL)
 SITE_KEYS = {"soil": METHODS, "vehicle": (APPROACH,)}
 """Keys of a block that stand for others, as the site gives them."""
 
@@ -51,6 +51,8 @@ class Entries:
         The table named in the file.
     derived : dict of str to Any
         What inputs were worked out of, by the key of the file.
+    allowed : tuple of str
+        Dotted keys whose values may be far from usual, sorted.
     """
 
     def __init__(self, root: Mapping, path: Path, problems: ProblemList) -> None:
@@ -64,12 +66,14 @@ class Entries:
         self.sets: dict[str, tuple[str, ...]] = {}
         self.table: DesignList | None = None
         self.derived: dict[str, Any] = {}
+        self.allowed: tuple[str, ...] = ()
 
     def read(self) -> None:
         """Read the whole file; mistakes go to `problems`."""
         for entry in self.root:
             if entry.key not in TOP_KEYS:
                 self.unknown(entry, "", TOP_KEYS)
+        self._read_allowed()
         self._read_table()
         self._unfold()
         for section in fields.SECTIONS:
@@ -123,6 +127,25 @@ class Entries:
     def _folder_of(self, position: Position) -> Path:
         """Return where a file lies that is named at a position: beside the settings, or in the current directory."""
         return self.path.parent if position.file == str(self.path) else Path()
+
+    def _read_allowed(self) -> None:
+        """Read ``allow_unusual: [vehicle.mass]``, or ``all``."""
+        node = self.root.get(fields.ALLOW_UNUSUAL)
+        if node is None:
+            return
+        allowed: set[str] = set()
+        for item in node.items if isinstance(node, Sequence) and node.unit is None else [node]:
+            word = item.text.strip() if isinstance(item, Scalar) else ""
+            if word == fields.EVERYTHING:
+                allowed.update(fields.HELD)
+            elif word in fields.HELD:
+                allowed.add(word)
+            else:
+                message = unknown_word(
+                    word, "an entry that is held to its usual range", (*fields.HELD, fields.EVERYTHING)
+                )
+                self.problems.add(item.position, fields.ALLOW_UNUSUAL, message)
+        self.allowed = tuple(sorted(allowed))
 
     def _read_table(self) -> None:
         node = self.root.get("table")
@@ -231,8 +254,6 @@ class Entries:
             other = next((field for field in fields.FIELDS if word in (field.key, *field.also)), None)
             if other is not None:
                 hint = f"; {other.key} belongs under {other.section}"
-            elif word[:1].isdigit():
-                hint = "; for a list, use brackets; for the rest of a number, use a decimal point in place of the comma"
         where = section or "the file"
         name = shorten(entry.key) or "(empty)"
         path = f"{section}.{name}" if section else name
@@ -299,4 +320,5 @@ def _axis_of_sets(section: str, leaves: list[Input], position: Position) -> Inpu
     """Return the values that the named sets give for an input, as an axis."""
     each = tuple(one if isinstance(one := leaf.distribution, Distribution) else None for leaf in leaves)
     spread = SetDistributions(section, each) if any(each) else None
-    return Input(np.concatenate([leaf.values for leaf in leaves]), True, position, leaves[0].written, spread)
+    values, positions = np.concatenate([leaf.values for leaf in leaves]), tuple(leaf.position for leaf in leaves)
+    return Input(values, True, position, leaves[0].written, positions, spread)

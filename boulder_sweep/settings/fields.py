@@ -7,7 +7,8 @@ path, its key or its column: see `named`.
 
 The admitted range is wide: at least a million times either side of what is normal wherever a material or
 mechanical constant is concerned. A value beyond it is a typing mistake and refused. A value outside the usual range
-is computed as given, with a note.
+is computed as given, with a note; of masses, densities, springs, dampers and speeds one that is more than `UNUSUAL`
+times outside must be allowed by the file.
 """
 
 from __future__ import annotations
@@ -37,6 +38,11 @@ def _input(path: str, name: str, admitted: Bound, usual: Usual | None = None, **
     return Field(section, key, name, column.unit, column.meaning, admitted, usual, **more)
 
 
+UNUSUAL = 30.0
+"""How many times outside the usual range a value must be for the file to have to allow it: a slip of unit, kN for N or t
+for kg, is a factor of 1000."""
+ALLOW_UNUSUAL, EVERYTHING = "allow_unusual", "all"
+"""The entry that allows such values, and its word for all of them."""
 _SIZE = Bound(0.01, 20.0, "the model is for boulders between a pebble and a house")
 _DENSITY = Bound(1e-3, 1e10, "a million times lighter or heavier than rock or soil")
 _CONSTANT = "a million times softer or harder than a truck or soil"
@@ -57,6 +63,7 @@ INPUTS: tuple[Field, ...] = (
         "boulder_density_kg_m3",
         _DENSITY,
         Usual(2400.0, 3074.0, "rock; a bare number is in kg/m^3, not in t/m^3 or pcf"),
+        held=True,
         also=("rho", "rho_b", "unit_weight"),
     ),
     _input(
@@ -64,6 +71,7 @@ INPUTS: tuple[Field, ...] = (
         "boulder_mass_kg",
         Bound(1e-3, 1e10, "a million times lighter or heavier than a boulder"),
         Usual(1500.0, 65000.0, "usual boulders; a bare number is in kg, not in t or lb"),
+        held=True,
         also=("m_b", "weight"),
         optional=True,
     ),
@@ -97,6 +105,7 @@ INPUTS: tuple[Field, ...] = (
         "soil_density_kg_m3",
         _DENSITY,
         Usual(1520.0, 2240.0, "sand and gravel; a bare number is in kg/m^3, not in t/m^3 or pcf"),
+        held=True,
         also=("rho", "rho_s", "unit_weight", "gamma"),
     ),
     _input(
@@ -126,6 +135,7 @@ INPUTS: tuple[Field, ...] = (
         "vehicle_mass_kg",
         Bound(1e-3, 1e10, "a million times lighter or heavier than a truck"),
         Usual(1000.0, 30000.0, "car to heavy truck; a bare number is in kg, not in lb"),
+        held=True,
         also=("m_v", "weight"),
     ),
     _input(
@@ -133,6 +143,7 @@ INPUTS: tuple[Field, ...] = (
         "impact_speed_m_s",
         Bound(0.0, 100.0, "up to 360 km/h"),
         Usual(4.0, 25.0, "15 to 90 km/h; a bare number is in m/s, not in mph or km/h"),
+        held=True,
         also=("v_0", "v0", "velocity", "impact_speed"),
     ),
     _input(
@@ -140,6 +151,7 @@ INPUTS: tuple[Field, ...] = (
         "vehicle_spring_N_m",
         Bound(1.0, 1e13, _CONSTANT),
         Usual(2e5, 5e7, "truck fronts; a bare number is in N/m, not in kN/m"),
+        held=True,
         also=("k_v", "stiffness"),
     ),
     _input(
@@ -147,6 +159,7 @@ INPUTS: tuple[Field, ...] = (
         "vehicle_damper_N_s_m",
         Bound(0.1, 1e12, _CONSTANT),
         Usual(1e4, 2e6, "truck fronts; a bare number is in N*s/m, not in kN*s/m"),
+        held=True,
         also=("c_v", "damping", "dashpot"),
     ),
     _input(
@@ -154,6 +167,7 @@ INPUTS: tuple[Field, ...] = (
         "vehicle_second_spring_N_m",
         Bound(1.0, 1e13, _CONSTANT),
         Usual(2e5, 5e7, "truck fronts; a bare number is in N/m, not in kN/m"),
+        held=True,
         also=("k_2", "second_stiffness"),
         optional=True,
     ),
@@ -239,6 +253,8 @@ SECTIONS: dict[str, str] = {
 }
 BY_NAME: dict[str, Field] = {field.name: field for field in FIELDS}
 BY_PATH: dict[str, Field] = {field.path: field for field in FIELDS}
+HELD: tuple[str, ...] = tuple(field.path for field in FIELDS if field.held)
+"""Entries whose values are held to the usual range unless the file allows them."""
 
 BOULDER_MASS = BY_NAME["boulder_mass_kg"]
 """The mass of the boulder: an input where a file gives it; else it follows from four others."""

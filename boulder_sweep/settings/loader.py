@@ -16,7 +16,7 @@ import numpy as np
 
 from boulder_sweep import elementary
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.checks import check_complete, check_pairs, notes_on
+from boulder_sweep.settings.checks import check_complete, check_pairs, check_usual, notes_on
 from boulder_sweep.settings.entries import NAME, NAME_RULE, TOP_KEYS, Entries
 from boulder_sweep.settings.model import SECOND_OPINIONS, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import (
@@ -105,6 +105,7 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     entries.read()
     heading = _read_heading(entries)
     check_complete(entries)
+    check_usual(entries)
     check_pairs(entries)
     problems.raise_if_any()
     return _build(name, heading, entries, tuple(overrides))
@@ -302,6 +303,7 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         overrides=overrides,
         heading=heading,
         derived=entries.derived,
+        allowed=entries.allowed,
     )
     positions = {field.path: entries.position_of(field.path) for field in fields.INPUTS}
     written = {name: leaf.written for name, leaf in entries.leaves.items()}

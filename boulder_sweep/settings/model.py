@@ -84,6 +84,9 @@ class Field:
         Values that are accepted; None for words.
     usual : Usual or None
         Values met in practice.
+    held : bool
+        Whether a value far outside the usual range is refused unless the file allows it: a slip of the unit decides
+        more about a mass than about a length.
     default : float or None
         Value of an input that the file does not give; None where there is none. (Settings have the defaults of the
         attributes that declare them.)
@@ -112,6 +115,7 @@ class Field:
     choices: tuple[str, ...] = ()
     kind: str = ""
     shown_default: float | str | None = None
+    held: bool = False
 
     @property
     def path(self) -> str:

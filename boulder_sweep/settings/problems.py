@@ -12,6 +12,8 @@ from boulder_sweep.locations import RemotePath
 
 MAX_REPORTED = 100
 """Most problems reported at once: a longer list does not help, and a hostile file could make it endless."""
+_SHORT_WORD = 3
+"""Letters of a word in which a single one makes another word."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,13 +218,23 @@ def shorten(text: str, limit: int = 60) -> str:
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """Return the known word nearest to `word`, None if none is as similar as `cutoff` (1 for the same word)."""
+    """Return the known word nearest to `word`, None if none is as similar as `cutoff` (1 for the same word).
+
+    A number in a word, and every letter of a short one, is its meaning: ``n60`` is not ``n1_60``, nor ``ax`` ``x``.
+    """
     # difflib takes a few milliseconds to import and is needed for mistakes only.
     from difflib import get_close_matches
 
     candidates = {name.lower(): name for name in known}
-    near = get_close_matches(word.lower()[:80], candidates, n=1, cutoff=cutoff)
-    return candidates[near[0]] if near else None
+    near = get_close_matches(word.lower()[:80], candidates, n=3, cutoff=cutoff)
+    return next((candidates[one] for one in near if _may_be_meant(word.lower(), one)), None)
+
+
+def _may_be_meant(word: str, known: str) -> bool:
+    """Return whether a word may be a slip of a known one, both in lower case."""
+    letters = [sorted(filter(str.isalnum, one)) for one in (word, known)]
+    numbers = ["".join(filter(str.isdigit, one)) for one in (word, known)]
+    return numbers[0] == numbers[1] and (letters[0] == letters[1] or max(map(len, letters)) > _SHORT_WORD)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

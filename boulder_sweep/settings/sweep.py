@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.designs import DesignBlock, DesignPlan, Label, Source
+from boulder_sweep.designs import UNUSUAL, DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
-from boulder_sweep.settings.fields import INPUTS
+from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, HELD, INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import Problem
 from boulder_sweep.settings.soil_readings import soil_words
+from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.settings.vehicle import APPROACH, approach_words
 
 MAX_LISTED = 1000
@@ -151,6 +152,9 @@ class Sweep:
         Project, client, author and date for the heading of a report.
     derived : dict of str to Any
         What inputs were worked out of, by the key of the file: the run-up that gives a speed.
+    allowed : tuple of str
+        Dotted keys whose values may be far from usual; a listed design with another such value cannot be computed. A
+        sweep that no file describes may take any.
     notes : tuple of Problem
         Notes that are not errors.
     """
@@ -171,6 +175,7 @@ class Sweep:
     overrides: tuple[str, ...] = ()
     heading: Heading = NO_HEADING
     derived: dict[str, Any] = field(default_factory=dict)
+    allowed: tuple[str, ...] = HELD
 
     @cached_property
     def plan(self) -> DesignPlan:
@@ -184,7 +189,18 @@ class Sweep:
         if self.table is not None:
             given |= {name: Source(values, (0,)) for name, values in self.table.columns.items()}
             labels = self.table.labels
+        rows = np.zeros(1 if self.table is None else len(self.table), dtype=bool)
+        for name, source in given.items():
+            # A file with axes has been refused for such values.
+            if self.is_held(name) and (self.table is not None or not source.axes):
+                rows |= is_unusual(source.values, BY_NAME[name])
+        if rows.any():
+            given[UNUSUAL] = Source(rows.astype(np.float64), () if self.table is None else (0,))
         return DesignPlan(self.lengths, given, labels)
+
+    def is_held(self, name: str) -> bool:
+        """Return whether an input is held to its usual range: a value far outside it is not computed."""
+        return BY_NAME[name].held and BY_NAME[name].path not in self.allowed
 
     @property
     def lengths(self) -> tuple[int, ...]:
@@ -237,6 +253,8 @@ class Sweep:
             more["partial_factor"] = {"friction_angle": self.partial_factor}
         if self.derived:
             more["derived"] = self.derived
+        if self.table is not None and self.allowed:
+            more[ALLOW_UNUSUAL] = list(self.allowed)
         ground = self.model.ground
         return {
             "name": self.name,
@@ -267,6 +285,11 @@ class Sweep:
             },
             **({SECTION: given} if (given := self.heading.given()) else {}),
         }
+
+
+def allowed_in(settings: dict[str, Any]) -> tuple[str, ...]:
+    """Return `Sweep.allowed` by what `Sweep.resolved` returned; of a grid every value has been allowed."""
+    return tuple(settings.get(ALLOW_UNUSUAL, ())) if settings["order"] == "table" else HELD
 
 
 def _listed(values: np.ndarray) -> Any:

@@ -14,7 +14,7 @@ from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.designs import Label
 from boulder_sweep.settings.fields import INPUTS, Field
 from boulder_sweep.settings.problems import Position, ProblemList, nearest, refuse, shorten
-from boulder_sweep.settings.units import UnitError, factor, name_suffix
+from boulder_sweep.settings.units import factor, name_suffix, suffix_unit
 from boulder_sweep.settings.values import outside
 
 MAX_COLUMNS = 1000
@@ -85,9 +85,9 @@ def _column(name: str) -> TableColumn | str:
         if name == field.name:
             return TableColumn(name, field)
         if name.startswith(f"{stem}_"):
-            ratio = _factor(name.removeprefix(f"{stem}_"), field.unit)
-            if ratio is not None:
-                return TableColumn(name, field, ratio)
+            unit = suffix_unit(name.removeprefix(f"{stem}_"), field.unit)
+            if unit:
+                return TableColumn(name, field, factor(unit, field.unit))
     if name in _STEMS:
         return f"the unit is missing at the end of the name, such as {name}{name_suffix(_STEMS[name].unit)}"
     meant = "" if _ID.fullmatch(name) else _meant(name)
@@ -108,18 +108,6 @@ def check_numbers(column: TableColumn, position: Position, problems: ProblemList
     return False
 
 
-def _factor(suffix: str, unit: str) -> Fraction | None:
-    """Return the factor of a unit at the end of a column name (``ft``, ``kN_m3``, ``lb_s_in``), None if it is none."""
-    parts = suffix.split("_")
-    products = [suffix, *("*".join(parts[:k]) + "/" + "/".join(parts[k:]) for k in range(1, len(parts)))]
-    for text in products:
-        try:
-            return factor(text, unit)
-        except UnitError:
-            continue
-    return None
-
-
 def _meant(name: str) -> str:
     """Return the input that a misspelled name stands for, with the unit it was given; empty if there is none near."""
     word = name.lower()
@@ -129,7 +117,7 @@ def _meant(name: str) -> str:
         if near is None:
             continue
         unit = _STEMS[near].unit
-        if suffix and _factor(suffix, unit) is not None:
+        if suffix and suffix_unit(suffix, unit):
             return f"{near}_{suffix}"
         if not suffix:
             return f"{near}{name_suffix(unit)}" if unit == "1" else f"{near}, with its unit at the end"

@@ -261,7 +261,7 @@ class _TreeReader:
                 self.problems.add(key.position, "", "a key must be one word")
             value, values = self.read_node(next(self.events), (*path, word or ""))
             size = _bounded(size + values)
-            if word is None:
+            if word is None or _joined(mapping, key, value):
                 continue
             first = mapping.entries.get(word)
             if first is not None:
@@ -288,6 +288,22 @@ class _TreeReader:
 
     def report(self, event: Any, message: str) -> None:
         self.problems.add(self.position(event), "", message)
+
+
+def _joined(mapping: Mapping, key: Node, value: Node) -> bool:
+    """Put a number that a comma has cut in two together again: ``{mass: 15,000 lb}`` has a key ``000 lb`` by YAML.
+
+    The reader of the number then says what is wrong with it.
+    """
+    last = next(reversed(mapping.entries.values()), None)
+    if last is None or not isinstance(key, Scalar) or not isinstance(last.value, Scalar):
+        return False
+    is_alone = isinstance(value, Scalar) and not value.text and not value.quoted
+    is_behind = key.text[:1].isdigit() and last.value.text[-1:].isdigit() and key.position.line == last.position.line
+    if is_alone and is_behind and not last.value.quoted:
+        last.value = Scalar(last.value.position, f"{last.value.text},{key.text}")
+        return True
+    return False
 
 
 def _bounded(size: int) -> int:

@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import cache, lru_cache
 from typing import NamedTuple
 
-from boulder_sweep.settings.problems import did_you_mean, shorten
+from boulder_sweep.settings.problems import shorten
 
 STANDARD_GRAVITY = Fraction("9.80665")
 
@@ -27,12 +27,12 @@ inch = 0.0254 metre = in = inches
 foot = 0.3048 metre = ft = feet
 yard = 0.9144 metre = yd = yards
 mile = 1609.344 metre = mi = miles
-second = [time] = s = sec = seconds
-millisecond = 0.001 second = ms = milliseconds
-microsecond = 0.000001 second = us = µs
-minute = 60 second = min = minutes
-hour = 3600 second = h = hr = hour = hours
-kilogram = [mass] = kg = kilograms
+second = [time] = s = sec = secs = seconds
+millisecond = 0.001 second = ms = msec = msecs = milliseconds
+microsecond = 0.000001 second = us = µs = usec = microseconds
+minute = 60 second = min = mins = minutes
+hour = 3600 second = h = hr = hrs = hours
+kilogram = [mass] = kg = kgs = kilograms
 gram = 0.001 kilogram = g = grams
 tonne = 1000 kilogram = t = tonnes = metric_ton = Mg
 pound = 0.45359237 kilogram = lb = lbs = lbm = pounds
@@ -42,6 +42,9 @@ slug = 14.593902937206364829 kilogram = slugs
 newton = kilogram * metre / second ** 2 = N = newtons
 kilonewton = 1000 newton = kN
 meganewton = 1000000 newton = MN
+newton_second = newton * second = Ns
+kilonewton_second = 1000 newton * second = kNs
+meganewton_second = 1000000 newton * second = MNs
 kilogram_force = 9.80665 newton = kgf
 pound_force = 4.4482216152605 newton = lbf
 kip = 4448.2216152605 newton = kips
@@ -58,7 +61,8 @@ pcf = pound_force / foot ** 3
 kci = kip / inch ** 3
 kcf = kip / foot ** 3
 mph = mile / hour
-kph = kilometre / hour = kmh
+kph = kilometre / hour = kmh = kmph
+mps = metre / second
 fps = foot / second
 degree = [angle] = deg = ° = degrees
 radian = 57.295779513082320876798154814105 degree = rad = radians
@@ -118,10 +122,20 @@ _TRANSLATION = str.maketrans(
 _TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-zµ_]+|[%°])\.?|(?P<power>(?:\^|\*\*)?\s*-?\d)|(?P<sign>[*/()\-]))")
 MAX_LENGTH = 60
 MAX_POWER = 9
+_LONG_WORD = 5
+"""Letters of a unit that is written out."""
 
 
 class UnitError(ValueError):
     """A unit that is unknown, malformed or of the wrong kind; the message says what is allowed."""
+
+
+class _UnknownUnitError(UnitError):
+    """A word that is no unit."""
+
+    def __init__(self, word: str) -> None:
+        super().__init__(f"'{shorten(word)}' is not a known unit")
+        self.word = word
 
 
 @lru_cache(maxsize=1024)
@@ -150,7 +164,21 @@ def factor(text: str, target: str) -> Fraction:
     Weights stand for masses where a mass or a density is asked (116 pcf, 18.2 kN/m^3, 15 kip), and a pound
     is a force where a force is asked (350 lb/in^3), with standard gravity in between.
     """
-    names = _read(text)
+    expected = EXPECTED[target]
+    allowed = f"{expected.words} is needed ({expected.examples})"
+    try:
+        names = _read(text)
+    except _UnknownUnitError as unknown:
+        meant = _meant(unknown.word, text, target)
+        raise UnitError(f"{unknown}; " + (f"did you mean {meant}?" if meant else allowed)) from None
+    ratio = _ratio(names, target)
+    if ratio is None:
+        raise UnitError(f"'{shorten(text)}' is {_kind(_product(names).dimension)}; {allowed}")
+    return ratio
+
+
+def _ratio(names: dict[str, int], target: str) -> Fraction | None:
+    """Return the factor from a product of units to the unit of the table, None for another kind of quantity."""
     unit, wanted = _product(names), _product(_read(target))
     ratio = unit.scale / wanted.scale
     if unit.dimension == wanted.dimension:
@@ -159,8 +187,56 @@ def factor(text: str, target: str) -> Fraction:
         return ratio / STANDARD_GRAVITY
     if "pound" in names and _times(unit.dimension, _ACCELERATION) == wanted.dimension:
         return ratio * STANDARD_GRAVITY
-    expected = EXPECTED[target]
-    raise UnitError(f"'{shorten(text)}' is {_kind(unit.dimension)}; {expected.words} is needed ({expected.examples})")
+    return None
+
+
+def _meant(word: str, text: str, target: str) -> str:
+    """Return the unit that a misspelled word in a unit stands for, empty where that is not certain.
+
+    A unit differs from others by one letter, so a word counts as misspelled only where it has the letters of the unit,
+    or is a long word that begins like it. What it makes of the text must be of the kind that is needed. Where the slip
+    may be one of size, M for m, the size is said.
+    """
+    # difflib takes a few milliseconds to import and is needed for mistakes only.
+    from difflib import get_close_matches
+
+    known = _vocabulary()
+    spellings = {name.lower(): name for name in known}
+    lower = word.lower()[:MAX_LENGTH]
+    near = [name for name in spellings if sorted(name) == sorted(lower)]
+    if len(lower) >= _LONG_WORD:
+        near += [name for name in get_close_matches(lower, spellings, cutoff=0.85) if name[0] == lower[0]]
+    for name in (spellings[one] for one in near):
+        try:
+            fits = _ratio(_read(text, known | {word: known[name]}), target) is not None
+        except UnitError:
+            continue
+        if fits:
+            full = known[name][0]
+            is_size_open = word[0] != name[0] and word[0] in "mM" and full != name
+            return f"{name} ({full})" if is_size_open else name
+    return ""
+
+
+def suffix_unit(suffix: str, unit: str) -> str:
+    """Return the unit at the end of a name (``ft``, ``kN_m3``, ``lb_s_in``) as it is written, empty if it is none.
+
+    Parameters
+    ----------
+    suffix : str
+        The end of the name, without the underline before it.
+    unit : str
+        Unit of the table that it must fit.
+    """
+    parts = suffix.split("_")
+    products = [suffix, *("*".join(parts[:k]) + "/" + "/".join(parts[k:]) for k in range(1, len(parts)))]
+    for text in products:
+        try:
+            factor(text, unit)
+        except UnitError:
+            continue
+        return text
+    return ""
 
 
 def name_suffix(unit: str) -> str:
@@ -276,5 +352,5 @@ def _full_name(name: str, known: dict[str, tuple[str, Unit]]) -> str:
     if name.lower() in ("ton", "tons"):
         raise UnitError(f"'{name}' is ambiguous; use short_ton, long_ton or tonne")
     if name not in known:
-        raise UnitError(f"'{shorten(name)}' is not a known unit{did_you_mean(name, known)}")
+        raise _UnknownUnitError(name)
     return known[name][0]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from boulder_sweep.settings.fields import Field
+from boulder_sweep.settings.fields import UNUSUAL, Field
 from boulder_sweep.settings.problems import (
     LeafError,
     Mistake,
@@ -26,6 +26,7 @@ from boulder_sweep.settings.problems import (
     unknown_word,
     wrong,
 )
+from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
 from boulder_sweep.settings.units import EXPECTED, UnitError, factor
 
@@ -41,7 +42,19 @@ _TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
 _NUMBER = re.compile(r"([+-]?)(\d*)(?:\.(\d*))?(?:[eE]([+-]?\d+))?", re.ASCII)
 _YES_NO = frozenset({"true", "false", "yes", "no", "on", "off", "y", "n"})
 _NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)\b.*", re.IGNORECASE)
-_FEET_AND_INCHES = re.compile(r"[+-]?[\d.]+\s*['′](?!\d{3}).*|[+-]?[\d.]+\s*(\"|″|'')")
+_FEET = r"(?P<feet>\d+\.?\d*|\.\d+)\s*(?:['′](?!['′])|(?:ft|foot|feet)(?![a-z])\.?)"
+_FEET_AND_INCHES = re.compile(
+    rf"(?P<sign>[+-]?)(?:{_FEET})?[\s-]*"
+    r"(?:(?P<inches>(?:\d+\.?\d*|\.\d+)(?![\d./]))?[\s-]*(?:(?P<top>\d+)/(?P<bottom>[1-9]\d*))?"
+    r"\s*(?P<mark>[\"″]|['′]{2}|(?:in|inch|inches)(?![a-z])\.?))?",
+    re.ASCII,
+)
+_FEET_AND_A_NUMBER = re.compile(rf"[+-]?{_FEET}\s*\d{{1,2}}(?:\.\d*)?", re.ASCII)
+_SEPARATED = re.compile(r"([+-]?)(\d[\d\s.,'’_]*\d)((?:[eE][+-]?\d+)?.*)", re.DOTALL)
+_GROUPS = re.compile(r"([1-9]\d{0,2}(?:([\s.,'’_])\d{3})(?:\2\d{3})*)(?:(?!\2)[.,](\d+))?")
+"""Digits in groups of three, and perhaps decimals behind another sign."""
+_DECIMAL_COMMA = re.compile(r"0,\d+|\d+,(?!\d{3}$)\d+")
+"""A comma that stands for a decimal point: before three digits it separates thousands."""
 EMPTY, NOT_A_NUMBER = "is empty", "is not a number"
 """What may be wrong with a number; the page of a report says the same."""
 _MAX_DIGITS = 40
@@ -73,12 +86,15 @@ class Leaf:
         Where it stands.
     written : str
         The unit in which it was written; empty for bare numbers.
+    positions : tuple of Position
+        Where each value stands; empty where all of them stand at `position`, as those of a range.
     """
 
     values: np.ndarray
     is_axis: bool
     position: Position
     written: str = ""
+    positions: tuple[Position, ...] = ()
 
 
 def read_leaf(node: Node, field: Field) -> Leaf:
@@ -111,7 +127,8 @@ def read_leaf(node: Node, field: Field) -> Leaf:
         raise wrong(node.position, f"{len(items)} values are too many; an axis takes at most {MAX_AXIS}")
     quantities = _read_all(items, field, unit)
     values = _check_values(quantities, items, field)
-    return Leaf(np.array(values), isinstance(node, Sequence), node.position, quantities[0].written)
+    positions = tuple(item.position for item in items)
+    return Leaf(np.array(values), isinstance(node, Sequence), node.position, quantities[0].written, positions)
 
 
 def read_single(node: Node, field: Field) -> float:
@@ -178,6 +195,17 @@ def outside(value: float, field: Field, written: str = "") -> str:
         return ""
     low, high = range_words(bound.low, bound.high, field.unit, written).split(" to ")
     return OUTSIDE.format(value=describe(value, field.unit, written), low=low, high=high, reason=bound.reason)
+
+
+def is_unusual(values: np.ndarray, field: Field) -> np.ndarray:
+    """Return which values are so far outside the usual range that a file must allow them, bool; see `Field.held`.
+
+    Zero is not: it is no slip of the unit, and a vehicle may stand.
+    """
+    if field.usual is None or not field.held:
+        return np.zeros(values.shape, dtype=bool)
+    low, high = field.usual.low / UNUSUAL, field.usual.high * UNUSUAL
+    return (values != 0.0) & ((values < low * (1.0 - 1e-9)) | (values > high * (1.0 + 1e-9)))
 
 
 def _unfold_text_list(node: Node) -> Node:
@@ -356,6 +384,9 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
         raise NumberError(f"{given} is a yes/no value; {words}")
     if _NOT_FINITE.fullmatch(stripped):
         raise NumberError(f"{given} is not a finite number; {words}")
+    length = _feet_and_inches(stripped)
+    if length is not None:
+        return length
     match = _NUMBER.match(stripped)
     sign, whole, decimals, exponent = match.groups() if match else ("", "", None, None)
     rest = stripped[match.end() :] if match else stripped
@@ -364,15 +395,16 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
     if whole == "0" and rest[:1].lower() in ("x", "o", "b"):
         raise NumberError(f"{given} is not a decimal number; {words}")
     if len(whole) > 1 and whole.startswith("0"):
-        raise NumberError(f"{given} begins with a zero, which some programs read as octal; remove the zero")
-    if _FEET_AND_INCHES.fullmatch(stripped):
-        raise NumberError(f"{given} is in feet and inches; write one number, such as 5.5 ft or 66 in")
+        cut_off = (
+            "; if a comma cuts it off a number, write that without a comma, as in 15000" if len(whole) == 3 else ""
+        )
+        raise NumberError(f"{given} begins with a zero, which some programs read as octal; remove the zero{cut_off}")
     if re.match(r"\s*[,;]\s+\d", rest) or rest[:1] == ";":
         raise NumberError(f"{given} is not one number; write a list in brackets, such as [34, 38] deg")
-    if rest[:1] in (",", "_", "'", ".") or re.match(r"\s+\d", rest):
-        raise NumberError(
-            f"{given} is not a plain number; use a decimal point and no thousands separators, as in 6800.5"
-        )
+    if rest[:1] in (",", "_", "'", "’", ".") or re.match(r"\s+\d", rest):
+        plain = plainly(stripped)
+        remedy = f"write {shorten(plain)}" if plain else "write digits and one decimal point only, as in 6800.5"
+        raise NumberError(f"{given} is not a plain number; {remedy}")
     if rest[:1] == ":" or re.match(r"\s*(\+|±|\.\.|to\b|/\s*\d|-\s*\d)", rest):
         raise NumberError(f"{given} is not one number; {words}, or a range {{from: ..., to: ..., count: ...}}")
     digits = whole + (decimals or "")
@@ -381,6 +413,92 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
         raise NumberError(f"{given} has too many digits or too large an exponent")
     value = Fraction(int(digits)) * Fraction(10) ** (power - len(decimals or ""))
     return (-value if sign == "-" else value), rest.strip()
+
+
+def _feet_and_inches(text: str) -> tuple[Fraction, str] | None:
+    """Return a length in feet and inches, ``5 ft 6 in`` or ``5' 6 1/2"``, as a number and its unit; None for others.
+
+    Raises
+    ------
+    NumberError
+        The inches are no part of a foot, or their sign is missing.
+    """
+    if len(text) > _MAX_DIGITS:
+        return None
+    match = _FEET_AND_INCHES.fullmatch(text)
+    if match is None:
+        if _FEET_AND_A_NUMBER.fullmatch(text):
+            raise NumberError(f"'{shorten(text)}' lacks the unit of the inches; write it as in 5 ft 6 in")
+        return None
+    feet, whole, top = match["feet"], match["inches"], match["top"]
+    if (whole is None and top is None) != (match["mark"] is None):
+        return None
+    inches = Fraction(whole or 0) + Fraction(int(top or 0), int(match["bottom"] or 1))
+    sign = -1 if match["sign"] == "-" else 1
+    if feet is None:
+        return None if match["mark"] is None else (sign * inches, "in")
+    if match["mark"] is not None and (Fraction(feet).denominator != 1 or inches >= 12):
+        raise NumberError(f"'{shorten(text)}': write whole feet and less than 12 inches, as in 5 ft 6 in")
+    return sign * (Fraction(feet) + inches / 12), "ft"
+
+
+def plainly(text: str) -> str:
+    """Return a number with its unit as it must be written, ``15000 lb`` for ``15,000 lb``; empty if that is not certain.
+
+    What stands before exactly three digits separates thousands, as a decimal comma would be read too small by a
+    thousand; a comma before any other number of digits is a decimal one.
+    """
+    match = _SEPARATED.fullmatch(text)
+    if match is None:
+        return ""
+    sign, number, rest = match.groups()
+    groups = _GROUPS.fullmatch(number)
+    if groups is not None:
+        whole = re.sub(r"\D", "", groups[1])
+        return f"{sign}{whole}{'' if groups[3] is None else '.' + groups[3]}{rest}"
+    return f"{sign}{number.replace(',', '.')}{rest}" if _DECIMAL_COMMA.fullmatch(number) else ""
+
+
+def refuse_bare(option: str, texts: list[str], unit: str) -> None:
+    """Refuse numbers of an option that have a dimension and no unit: they could be meant in feet, and be read in metres.
+
+    Parameters
+    ----------
+    option : str
+        The option; with ``=`` at its end where a name comes before the number.
+    texts : list of str
+        What was given to it. Text that is no number is left to its reader.
+    unit : str
+        Unit of the table.
+
+    Raises
+    ------
+    NumberError
+        Says how the numbers are written with a unit.
+    """
+    if unit == "1":
+        return
+    written: list[str | None] = []
+    for text in texts:
+        try:
+            written.append(split_number(text, unit)[1])
+        except NumberError:
+            written.append(None)
+    if "" not in written:
+        return
+    space = "" if option.endswith("=") else " "
+    units = [one for one in written if one] or [shown_unit(unit, system).unit for system in SYSTEMS]
+    forms = (
+        space.join(
+            [
+                option,
+                *(f"'{text} {one}'" if own == "" else f"'{text}'" for text, own in zip(texts, written, strict=True)),
+            ]
+        )
+        for one in dict.fromkeys(units[:2])
+    )
+    allowed = EXPECTED[unit].examples
+    raise NumberError(f"{space.join([option, *texts])}: write the unit too ({allowed}), as in {' or '.join(forms)}")
 
 
 def read_count(node: Node, what: str, largest: int) -> int:
